@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where controllers and hardware read their parameters from, without knowing whether a ROS master is there.
+
+`NodeHandle` is the small part of a ROS node handle they need. `MappingNodeHandle` serves it from a plain mapping
+(tests, programs without a master); the ROS edge has one that asks the parameter server.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+
+class ParameterError(Exception):
+    """A parameter is missing or has a value that is not allowed."""
+
+
+class NodeHandle(Protocol):
+    """Read access to the parameters below one namespace."""
+
+    @property
+    def namespace(self) -> str:
+        """Absolute namespace, for example "/" or "/arm_trajectory_controller"."""
+
+    def has_param(self, key: str) -> bool:
+        """Whether `key` (relative, parts separated by "/") is set."""
+
+    def get_param(self, key: str, default: Any = None) -> Any:
+        """Value of `key`, or `default` when it is not set."""
+
+    def child(self, name: str) -> NodeHandle:
+        """The handle of the namespace `name` below this one."""
+
+
+def join_names(namespace: str, name: str) -> str:
+    """Absolute name of `name` below `namespace`, with single slashes."""
+    parts = [part for part in f"{namespace}/{name}".split("/") if part]
+    return "/" + "/".join(parts)
+
+
+class MappingNodeHandle:
+    """A node handle over nested mappings.
+
+    Args:
+        parameters: nested mapping of the whole tree below `namespace`.
+        namespace: name used in messages.
+    """
+
+    def __init__(self, parameters: Mapping[str, Any] | None = None, namespace: str = "/") -> None:
+        self._parameters: Mapping[str, Any] = parameters if parameters is not None else {}
+        self._namespace = namespace
+
+    @property
+    def namespace(self) -> str:
+        return self._namespace
+
+    def _find(self, key: str) -> tuple[bool, Any]:
+        value: Any = self._parameters
+        for part in (part for part in key.split("/") if part):
+            if not isinstance(value, Mapping) or part not in value:
+                return False, None
+            value = value[part]
+        return True, value
+
+    def has_param(self, key: str) -> bool:
+        return self._find(key)[0]
+
+    def get_param(self, key: str, default: Any = None) -> Any:
+        found, value = self._find(key)
+        return value if found else default
+
+    def child(self, name: str) -> MappingNodeHandle:
+        found, value = self._find(name)
+        below = value if found and isinstance(value, Mapping) else {}
+        return MappingNodeHandle(below, join_names(self._namespace, name))
+
+
+def read_number(handle: NodeHandle, key: str, default: float, minimum: float | None = 0.0) -> float:
+    """A finite number parameter, checked.
+
+    Args:
+        handle: namespace to read in.
+        key: relative name.
+        default: value when the parameter is not set.
+        minimum: smallest allowed value; None for no bound.
+
+    Raises:
+        ParameterError: not a finite number, or below `minimum`.
+    """
+    value = handle.get_param(key, default)
+    where = join_names(handle.namespace, key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value or abs(value) == float("inf"):
+        raise ParameterError(f"parameter {where}: got {value!r}; expected a finite number")
+    if minimum is not None and value < minimum:
+        raise ParameterError(f"parameter {where}: got {value!r}; expected a number of at least {minimum}")
+    return float(value)
+
+
+def read_bool(handle: NodeHandle, key: str, default: bool) -> bool:
+    """A boolean parameter, checked.
+
+    Raises:
+        ParameterError: not true or false.
+    """
+    value = handle.get_param(key, default)
+    if not isinstance(value, bool):
+        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected true or false")
+    return value
+
+
+def read_names(handle: NodeHandle, key: str) -> list[str]:
+    """A parameter that is one name or a list of distinct names.
+
+    Raises:
+        ParameterError: not set, empty, not names, or a name twice.
+    """
+    value = handle.get_param(key)
+    names = [value] if isinstance(value, str) else value
+    where = join_names(handle.namespace, key)
+    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(name, str) and name for name in names):
+        raise ParameterError(f"parameter {where}: got {value!r}; expected a list of joint names")
+    if len(set(names)) != len(names):
+        raise ParameterError(f"parameter {where}: got {value!r}; each joint may be named once")
+    return list(names)

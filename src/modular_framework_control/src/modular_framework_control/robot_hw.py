@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The seam between controllers and whatever moves: base class of every robot, simulated or real.
+
+A user's own hardware is one subclass: a constructor without parameters, `init` that registers its interfaces, `read`
+that fills the joint states and `write` that sends the commands. Whoever owns the loop calls, once per cycle:
+`hw.read(t, dt)`, `controller_manager.update(t, dt)`, `hw.write(t, dt)`.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from enum import Enum
+from typing import Any, TypeVar, cast
+
+from modular_framework_control.hardware_interface import (
+    ControllerInfo,
+    HardwareInterface,
+    HardwareInterfaceError,
+    InterfaceResources,
+)
+from modular_framework_control.node_handle import NodeHandle
+
+InterfaceT = TypeVar("InterfaceT", bound=HardwareInterface[Any])
+
+
+class SwitchState(Enum):
+    """How far the hardware is with changing its mode for a switch of controllers."""
+
+    ONGOING = "ongoing"
+    DONE = "done"
+    ERROR = "error"
+
+
+class RobotHW:
+    """Base of all robot hardware; as it stands it has no joints.
+
+    `init`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `do_switch` and
+    `switch_result` run in the control loop and must neither block nor raise for an expected condition.
+    """
+
+    def __init__(self) -> None:
+        self._interfaces: dict[type[HardwareInterface[Any]], HardwareInterface[Any]] = {}
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        """Read parameters, connect, and register the interfaces.
+
+        Args:
+            root_nh: the namespace of the robot (robot_description is found there).
+            robot_hw_nh: the namespace of this hardware's own parameters.
+
+        Returns:
+            Whether the hardware can be used; the reason of a False is logged by the hardware.
+        """
+        del root_nh, robot_hw_nh
+        return True
+
+    def register_interface(self, interface: HardwareInterface[Any]) -> None:
+        """Offer `interface` to the controllers; called from `init`.
+
+        Raises:
+            HardwareInterfaceError: an interface of this class is already registered.
+        """
+        if type(interface) in self._interfaces:
+            raise HardwareInterfaceError(f"{type(self).__name__}: {interface.type_name} is registered twice")
+        self._interfaces[type(interface)] = interface
+
+    def get(self, interface_class: type[InterfaceT]) -> InterfaceT:
+        """The registered interface of that class.
+
+        Raises:
+            HardwareInterfaceError: this hardware has none; the message lists those it has.
+        """
+        if interface_class not in self._interfaces:
+            known = ", ".join(self.interface_names) or "none"
+            raise HardwareInterfaceError(f"{type(self).__name__} has no {interface_class.type_name}; it has: {known}")
+        return cast(InterfaceT, self._interfaces[interface_class])
+
+    @property
+    def interfaces(self) -> list[HardwareInterface[Any]]:
+        """All registered interfaces."""
+        return list(self._interfaces.values())
+
+    @property
+    def interface_names(self) -> list[str]:
+        """Type names of the registered interfaces, sorted."""
+        return sorted(interface.type_name for interface in self._interfaces.values())
+
+    def read(self, time_s: float, period_s: float) -> None:
+        """Fill the joint states with what is measured at `time_s` [s], `period_s` [s] after the last call."""
+
+    def write(self, time_s: float, period_s: float) -> None:
+        """Send the commands of the joint handles; `period_s` [s] is the time since the last call."""
+
+    def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
+        """Why these controllers may not run together; "" when they may.
+
+        The rule of the base class: a joint may be claimed by one controller only, whatever the interface. Hardware that
+        knows better overrides this.
+        """
+        owners: dict[str, str] = {}
+        conflicts: list[str] = []
+        for controller in controllers:
+            joints = {joint for claim in controller.claimed_resources for joint in claim.resources}
+            for joint in sorted(joints):
+                if joint in owners:
+                    conflicts.append(f"joint '{joint}' is claimed by '{owners[joint]}' and by '{controller.name}'")
+                else:
+                    owners[joint] = controller.name
+        return "; ".join(conflicts)
+
+    def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
+        """Get ready for a switch, off the control loop; False refuses it."""
+        del start, stop
+        return True
+
+    def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
+        """Begin the switch, in the control loop, before controllers are stopped and started."""
+
+    def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
+        """How far the switch begun by `do_switch` is, as a whole or for one controller that is to start."""
+        del controller
+        return SwitchState.DONE
+
+
+__all__ = ["ControllerInfo", "InterfaceResources", "RobotHW", "SwitchState"]
