@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A ROS master of its own and the launches that run on it, for tests beside each other and beside a user's master."""
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import rosgraph
+
+STOP_TIMEOUT_S = 15.0
+
+
+def free_port() -> int:
+    """Answers a TCP port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Launch:
+    """One running roslaunch on a given master; stopped as a user would stop it, with SIGINT."""
+
+    def __init__(self, command: list[str], env: Mapping[str, str], log_path: Path) -> None:
+        self._log_path = log_path
+        with log_path.open("w") as log_file:
+            self.process = subprocess.Popen(
+                command, env=dict(env), stdout=log_file, stderr=subprocess.STDOUT, start_new_session=True
+            )
+
+    def alive(self) -> bool:
+        return self.process.poll() is None
+
+    def log(self) -> str:
+        """Everything the launch has printed so far."""
+        return self._log_path.read_text(errors="replace")
+
+    def wait(self, timeout_s: float) -> int:
+        """Waits for the launch to end by itself and answers its exit code."""
+        try:
+            return self.process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"the launch still ran after {timeout_s} s; its log:\n{self.log()}") from None
+
+    def stop(self) -> None:
+        """Stops the launch and everything it started. May be called twice."""
+        with contextlib.suppress(ProcessLookupError):
+            if self.alive():
+                self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(self.process.pid, signal.SIGKILL)
+                self.process.wait(STOP_TIMEOUT_S)
+
+
+class RosSession:
+    """A private master; `launch` starts launch files on it.
+
+    Attributes:
+        port: TCP port of the master.
+        env: environment for processes that belong to this session.
+    """
+
+    def __init__(self, port: int | None = None) -> None:
+        self.port = port or free_port()
+        self._folder = tempfile.TemporaryDirectory(prefix="ros_session_")
+        self.folder = Path(self._folder.name)
+        self.env = {
+            **os.environ,
+            "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}",
+            "ROS_HOSTNAME": "127.0.0.1",
+            "ROS_HOME": str(self.folder / "ros_home"),
+            "ROS_LOG_DIR": str(self.folder / "log"),
+            "PYTHONUNBUFFERED": "1",
+        }
+        self.env.pop("ROS_IP", None)
+        self._launches: list[Launch] = []
+        self._master: Launch | None = None
+
+    def start_master(self, timeout_s: float = 20.0) -> None:
+        """Starts roscore on the session's port.
+
+        Raises:
+            AssertionError: it did not answer in time.
+        """
+        command = ["roscore", "-p", str(self.port)]
+        self._master = Launch(command, self.env, self.folder / "roscore.txt")
+        self._wait_until(self._master_answers, timeout_s, f"a ROS master on port {self.port}")
+
+    def launch(self, launch_xml: str | Path, **args: object) -> Launch:
+        """Starts roslaunch on a file, or on the text of one, with arguments `name:=value`."""
+        number = len(self._launches)
+        path = Path(launch_xml) if isinstance(launch_xml, Path) else self.folder / f"launch_{number}.launch"
+        if isinstance(launch_xml, str):
+            path.write_text(launch_xml)
+        command = ["roslaunch", "--wait", str(path), *(f"{name}:={value}" for name, value in args.items())]
+        started = Launch(command, self.env, self.folder / f"launch_{number}.txt")
+        self._launches.append(started)
+        return started
+
+    def wait_for_service(self, name: str, timeout_s: float = 30.0) -> None:
+        """Waits until a service is advertised; fails with the launches' logs."""
+        master = rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"])
+
+        def advertised() -> bool:
+            with contextlib.suppress(rosgraph.MasterException, OSError):
+                return bool(master.lookupService("/" + name.lstrip("/")))
+            return False
+
+        self._wait_until(advertised, timeout_s, f"service {name}")
+
+    def alive(self) -> bool:
+        """Whether every launch of this session still runs."""
+        return all(launch.alive() for launch in self._launches)
+
+    def log(self) -> str:
+        """What all launches have printed so far."""
+        return "".join(launch.log() for launch in self._launches)
+
+    def stop(self) -> None:
+        """Stops launches, then the master. May be called twice."""
+        for launch in reversed(self._launches):
+            launch.stop()
+        if self._master is not None:
+            self._master.stop()
+        with contextlib.suppress(OSError):
+            self._folder.cleanup()
+
+    def _master_answers(self) -> bool:
+        return rosgraph.is_master_online(self.env["ROS_MASTER_URI"])
+
+    def _wait_until(self, condition: object, timeout_s: float, what: str) -> None:
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end:
+            if condition():  # type: ignore[operator]
+                return
+            time.sleep(0.05)
+        raise AssertionError(f"waited {timeout_s} s for {what} in vain; log:\n{self.log()}")
