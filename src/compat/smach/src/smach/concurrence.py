@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A container that runs all its states at the same time, each in a thread, and ends when the last one has ended."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import smach
+from smach.container import Container
+from smach.state import State
+from smach.user_data import UserData
+
+__all__ = ["Concurrence"]
+
+OutcomeMap = Mapping[str, Mapping[str, str]]
+ChildTerminationCallback = Callable[[dict[str, "str | None"]], "bool | list[str] | tuple[str, ...] | None"]
+OutcomeCallback = Callable[[dict[str, "str | None"]], "str | None"]
+
+
+class Concurrence(Container):
+    """Runs its states side by side; its outcome is decided from theirs once all have ended.
+
+    The outcome is, in this order of precedence: what ``outcome_cb`` returns; the first entry of ``outcome_map``
+    whose children all gave the outcomes it names; ``default_outcome``.
+    """
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcome_map: OutcomeMap | None = None,
+        outcome_cb: OutcomeCallback | None = None,
+        child_termination_cb: ChildTerminationCallback | None = None,
+    ) -> None:
+        """Make an empty concurrence; states are added inside ``with concurrence:``.
+
+        Args:
+            outcomes: names of the outcomes.
+            default_outcome: given when nothing else decides.
+            input_keys: userdata keys copied from the parent before the states run.
+            output_keys: userdata keys copied to the parent after the states have ended.
+            outcome_map: outcome -> {label: outcome of that child}.
+            outcome_cb: gets {label: outcome} when all children have ended, returns an outcome or None.
+            child_termination_cb: gets {label: outcome, None while running} whenever a child has ended; True
+                stops all others, a list of labels stops those.
+        """
+        super().__init__(outcomes, input_keys, output_keys)
+        self._states: dict[str, State] = {}
+        self._remappings: dict[str, dict[str, str]] = {}
+        self._default_outcome = default_outcome
+        self._outcome_map = {name: dict(children) for name, children in (outcome_map or {}).items()}
+        self._outcome_cb = outcome_cb
+        self._child_termination_cb = child_termination_cb
+        self._child_outcomes: dict[str, str | None] = {}
+        self._active: list[str] = []
+        self._errors: list[smach.SmachError] = []
+        self._running = False
+        self._lock = threading.RLock()
+        self._ended = threading.Condition(self._lock)
+
+    # ---- construction --------------------------------------------------------------------------------------
+    @staticmethod
+    def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
+        """Add a state to the concurrence that is open.
+
+        Args:
+            label: its name in this concurrence.
+            state: the state, or a container.
+            remapping: userdata name in the state -> userdata name in this concurrence.
+
+        Returns:
+            The state.
+
+        Raises:
+            smach.InvalidStateError: the label is taken, or the object is not a state.
+        """
+        concurrence: Concurrence = Concurrence._currently_opened_container()
+        if label in concurrence._states:
+            raise smach.InvalidStateError(f"the concurrence already has a state with the label '{label}'")
+        if not isinstance(state, State):
+            raise smach.InvalidStateError(f"'{label}' is a {type(state).__name__}, not a smach.State")
+        concurrence._states[label] = state
+        concurrence._remappings[label] = dict(remapping or {})
+        return state
+
+    def check_consistency(self) -> None:
+        """Raise when there is no state, or when the outcome map names outcomes or states that are not there."""
+        if not self._states:
+            raise smach.InvalidStateError("the concurrence has no states")
+        faults = []
+        if self._default_outcome not in self._outcomes:
+            faults.append(f"default outcome '{self._default_outcome}' is not among the outcomes")
+        for outcome, children in self._outcome_map.items():
+            if outcome not in self._outcomes:
+                faults.append(f"the outcome map gives '{outcome}', which is not among the outcomes")
+            for label, child_outcome in children.items():
+                if label not in self._states:
+                    faults.append(f"the outcome map names the state '{label}'; there are {list(self._states)}")
+                elif child_outcome not in self._states[label].get_registered_outcomes():
+                    known = list(self._states[label].get_registered_outcomes())
+                    faults.append(f"the outcome map names '{child_outcome}' of '{label}', which gives {known}")
+        if faults:
+            raise smach.InvalidStateError(f"{'; '.join(faults)}; outcomes: {list(self._outcomes)}")
+
+    # ---- looking in ----------------------------------------------------------------------------------------
+    def get_children(self) -> dict[str, State]:
+        """Return the states by label, in the order they were added."""
+        return dict(self._states)
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of all states: they all start together."""
+        return list(self._states)
+
+    def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
+        """Put values in the local userdata; the choice of states is fixed, since all of them run.
+
+        Args:
+            initial_states: ignored with a warning unless it names all states or none.
+            userdata: values put in the local userdata.
+        """
+        if userdata is not None:
+            self.userdata.update(userdata)
+        if initial_states and set(initial_states) != set(self._states):
+            smach.logwarn(f"a concurrence starts all its states; the choice {list(initial_states)} is ignored")
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the states that are still running."""
+        with self._lock:
+            return list(self._active)
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the entries of the outcome map as (outcome of the child, label, outcome of the concurrence)."""
+        return [
+            (child_outcome, label, outcome)
+            for outcome, children in self._outcome_map.items()
+            for label, child_outcome in children.items()
+        ]
+
+    def is_running(self) -> bool:
+        """Tell whether the concurrence is executing."""
+        return self._running
+
+    # ---- running -------------------------------------------------------------------------------------------
+    def execute(self, parent_ud: Any = None) -> str:
+        """Run all states and return the outcome once the last of them has ended.
+
+        Args:
+            parent_ud: userdata the input keys are copied from and the output keys are copied to.
+
+        Raises:
+            smach.SmachError: the concurrence is inconsistent; or a state raised or returned something that is not
+                one of its outcomes (the others are then asked to stop, and waited for).
+        """
+        self.check_consistency()
+        self._copy_input_keys(parent_ud)
+        smach.loginfo(f"concurrence starts {list(self._states)}")
+        threads = [
+            threading.Thread(target=self._run_child, args=(label,), name=f"smach-{label}", daemon=True)
+            for label in self._states
+        ]
+        with self._lock:
+            self._child_outcomes = dict.fromkeys(self._states)
+            self._active = list(self._states)
+            self._errors = []
+            self._running = True
+            if self._preempt_requested:
+                self._preempt_active()
+        self.call_start_cbs()
+        try:
+            for thread in threads:
+                thread.start()
+            self._wait_for_children()
+        finally:
+            with self._lock:
+                self._running = False
+                outcomes = dict(self._child_outcomes)
+                errors = list(self._errors)
+        if errors:
+            self._recall_leftovers()
+            raise errors[0]
+        outcome = self._decide(outcomes)
+        self._settle_preempt()
+        self._copy_output_keys(parent_ud)
+        self.call_termination_cbs(list(self._states), outcome)
+        smach.loginfo(f"concurrence ends with '{outcome}': {outcomes}")
+        return outcome
+
+    def _run_child(self, label: str) -> None:
+        """Thread body: run one child and note how it ended."""
+        state = self._states[label]
+        outcome: str | None = None
+        error: smach.SmachError | None = smach.InvalidUserCodeError(f"state '{label}' ended its thread")
+        try:
+            outcome = self._execute_child(label, state, self._remappings[label])
+            error = None
+            if outcome not in state.get_registered_outcomes() and not smach.is_shutdown():
+                error = smach.InvalidTransitionError(
+                    f"state '{label}' of type {type(state).__name__} returned {outcome!r}, but its outcomes are "
+                    f"{list(state.get_registered_outcomes())}"
+                )
+        except smach.SmachError as raised:
+            error = raised
+        finally:  # also when the state left by SystemExit: the concurrence must not wait for it for ever
+            with self._ended:
+                self._child_outcomes[label] = outcome
+                self._active.remove(label)
+                if error is not None:
+                    smach.logerr(f"concurrent state '{label}' failed: {error}")
+                    self._errors.append(error)
+                self._ended.notify_all()
+
+    def _wait_for_children(self) -> None:
+        """Wait until all children have ended; after each end, decide whether others are to be stopped."""
+        known_active = list(self._states)
+        while known_active:
+            with self._ended:
+                while self._active == known_active:
+                    self._ended.wait()
+                known_active = list(self._active)
+                outcomes = dict(self._child_outcomes)
+                failed = bool(self._errors)
+            self.call_transition_cbs()
+            if failed:
+                self._preempt_active()
+            elif known_active:
+                self._ask_child_termination_cb(outcomes)
+
+    def _ask_child_termination_cb(self, outcomes: dict[str, str | None]) -> None:
+        if self._child_termination_cb is None:
+            return
+        try:
+            answer = self._child_termination_cb(outcomes)
+        except Exception as raised:
+            error = smach.InvalidUserCodeError(f"child termination callback raised {type(raised).__name__}: {raised}")
+            error.__cause__ = raised
+            with self._lock:
+                self._errors.append(error)
+            self._preempt_active()
+            return
+        if isinstance(answer, (list, tuple)):
+            self._preempt_active(answer)
+        elif answer:
+            self._preempt_active()
+
+    def _preempt_active(self, labels: Iterable[str] | None = None) -> None:
+        """Ask running children to stop: all of them, or those named."""
+        with self._lock:
+            wanted = set(self._active if labels is None else labels)
+            for label in self._active:
+                if label in wanted and not self._states[label].preempt_requested():
+                    self._states[label].request_preempt()
+
+    def _decide(self, outcomes: dict[str, str | None]) -> str:
+        """Return the outcome of the concurrence, given those of its children."""
+        if smach.is_shutdown() and not all(
+            outcome in self._states[label].get_registered_outcomes() for label, outcome in outcomes.items()
+        ):
+            return "preempted"
+        chosen: str | None = None
+        if self._outcome_cb is not None:
+            try:
+                chosen = self._outcome_cb(dict(outcomes))
+            except Exception as raised:
+                raise smach.InvalidUserCodeError(
+                    f"outcome callback raised {type(raised).__name__}: {raised}"
+                ) from raised
+        if chosen is None:
+            chosen = next(
+                (
+                    name
+                    for name, children in self._outcome_map.items()
+                    if all(outcomes[label] == child_outcome for label, child_outcome in children.items())
+                ),
+                self._default_outcome,
+            )
+        if chosen not in self._outcomes:
+            raise smach.InvalidStateError(
+                f"the concurrence chose the outcome {chosen!r}; its outcomes are {list(self._outcomes)}"
+            )
+        return chosen
+
+    def _settle_preempt(self) -> None:
+        """Acknowledge the request to stop when every child has acknowledged it; withdraw those left over."""
+        leftovers = self._recall_leftovers()
+        if self._preempt_requested and not leftovers:
+            self.service_preempt()
+
+    def _recall_leftovers(self) -> list[str]:
+        leftovers = [label for label, state in self._states.items() if state.preempt_requested()]
+        for label in leftovers:
+            smach.logdebug(f"state '{label}' ended without acknowledging the request to stop")
+            self._states[label].recall_preempt()
+        return leftovers
+
+    def request_preempt(self) -> None:
+        """Ask all running children to stop; the concurrence still waits until they have."""
+        with self._lock:
+            super().request_preempt()
+            if self._running:
+                self._preempt_active()

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A container: a state made of states. Building (``with container:``), userdata and callbacks common to all kinds."""
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import smach
+from smach.state import State
+from smach.user_data import Remapper, UserData
+
+__all__ = ["Container"]
+
+Callback = Callable[..., object]
+
+
+class _Construction(threading.local):
+    """The containers being built by this thread, the innermost one last."""
+
+    def __init__(self) -> None:
+        self.stack: list[Container] = []
+
+
+class Container(State):
+    """Base of the containers: children, local userdata, construction, and callbacks."""
+
+    _construction = _Construction()
+
+    def __init__(
+        self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()
+    ) -> None:
+        """Declare the interface of the container, as of any state."""
+        super().__init__(outcomes, input_keys, output_keys)
+        self.userdata = UserData()
+        self._start_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
+        self._transition_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
+        self._termination_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
+
+    # ---- what each kind of container defines ---------------------------------------------------------------
+    def get_children(self) -> dict[str, State]:
+        """Return the states in this container, by label."""
+        return {}
+
+    def __getitem__(self, key: str) -> State:
+        return self.get_children()[key]
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of the states that run first."""
+        return []
+
+    def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
+        """Choose the states that run first, and values to put in the local userdata before."""
+        raise self._unsupported("set_initial_state")
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the states that are running."""
+        return []
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the transitions inside the container as (outcome, from label, to label or container outcome)."""
+        return []
+
+    def check_consistency(self) -> None:
+        """Raise when the container cannot run as it was built."""
+        raise self._unsupported("check_consistency")
+
+    def is_running(self) -> bool:
+        """Tell whether the container is executing."""
+        return False
+
+    def _unsupported(self, method: str) -> smach.InvalidConstructionError:
+        return smach.InvalidConstructionError(f"{type(self).__name__} does not define {method}")
+
+    # ---- construction --------------------------------------------------------------------------------------
+    def open(self) -> None:
+        """Make this the container that ``add`` calls of this thread refer to."""
+        self._construction.stack.append(self)
+
+    def close(self) -> None:
+        """End building this container.
+
+        Raises:
+            smach.InvalidStateError: when another container was opened later and is still open, or none is open.
+        """
+        stack = self._construction.stack
+        if not stack or stack[-1] is not self:
+            raise smach.InvalidStateError("cannot close a container that is not the one opened last")
+        stack.pop()
+
+    def is_opened(self) -> bool:
+        """Tell whether this container is being built by this thread."""
+        return self in self._construction.stack
+
+    def assert_opened(self, msg: str = "the container is not open; use 'with container:'") -> None:
+        """Raise ``InvalidConstructionError`` with a message unless the container is open."""
+        if not self.is_opened():
+            raise smach.InvalidConstructionError(msg)
+
+    @contextmanager
+    def opened(self) -> Iterator[Container]:
+        """Open the container for the duration of a ``with`` block; the same as ``with container:``."""
+        with self as container:
+            yield container
+
+    def __enter__(self) -> Container:
+        self.open()
+        return self
+
+    def __exit__(self, exc_type: object, exc_val: object, exc_tb: object) -> None:
+        if exc_type is not None:
+            stack = self._construction.stack
+            del stack[stack.index(self):]
+            return
+        try:
+            self.check_consistency()
+        finally:
+            self.close()
+
+    @classmethod
+    def _currently_opened_container(cls) -> Any:
+        """Return the container being built; raise ``InvalidConstructionError`` when there is none of this kind."""
+        stack = cls._construction.stack
+        if not stack:
+            raise smach.InvalidConstructionError(
+                f"no container is open; call {cls.__name__}.add inside 'with container:'"
+            )
+        if not isinstance(stack[-1], cls):
+            raise smach.InvalidConstructionError(
+                f"{cls.__name__}.add was called while a {type(stack[-1]).__name__} is open; use its own add"
+            )
+        return stack[-1]
+
+    # ---- userdata ------------------------------------------------------------------------------------------
+    def _copy_input_keys(self, parent_ud: Any) -> None:
+        for key in self.get_registered_input_keys():
+            if parent_ud is not None and key in parent_ud:
+                self.userdata[key] = parent_ud[key]
+            elif parent_ud is not None and key not in self.userdata:
+                smach.logwarn(f"{type(self).__name__}: input key '{key}' has no value in the parent's userdata")
+
+    def _copy_output_keys(self, parent_ud: Any) -> None:
+        if parent_ud is None:
+            return
+        for key in self.get_registered_output_keys():
+            if key in self.userdata:
+                parent_ud[key] = self.userdata[key]
+
+    def _execute_child(self, label: str, state: State, remapping: Mapping[str, str]) -> str:
+        """Run a child with its own view of the userdata; raise ``InvalidUserCodeError`` for whatever it raises."""
+        view = Remapper(
+            self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping
+        )
+        try:
+            return state.execute(view)
+        except smach.InvalidUserCodeError:
+            smach.logerr(f"state '{label}' of type {type(state).__name__} could not be executed")
+            raise
+        except Exception as error:
+            raise smach.InvalidUserCodeError(
+                f"state '{label}' of type {type(state).__name__} raised {type(error).__name__}: {error}\n"
+                f"{traceback.format_exc()}"
+            ) from error
+
+    # ---- callbacks -----------------------------------------------------------------------------------------
+    def register_start_cb(self, start_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
+        """Call ``start_cb(userdata, initial_labels, *cb_args)`` when the container starts."""
+        self._start_cbs.append((start_cb, tuple(cb_args)))
+
+    def register_transition_cb(self, transition_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
+        """Call ``transition_cb(userdata, active_labels, *cb_args)`` when the running states have changed."""
+        self._transition_cbs.append((transition_cb, tuple(cb_args)))
+
+    def register_termination_cb(self, termination_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
+        """Call ``termination_cb(userdata, last_labels, outcome, *cb_args)`` when the container ends."""
+        self._termination_cbs.append((termination_cb, tuple(cb_args)))
+
+    def call_start_cbs(self) -> None:
+        """Call the start callbacks; an error in one of them is logged and changes nothing."""
+        self._call(self._start_cbs, "start", self.get_initial_states())
+
+    def call_transition_cbs(self) -> None:
+        """Call the transition callbacks; an error in one of them is logged and changes nothing."""
+        self._call(self._transition_cbs, "transition", self.get_active_states())
+
+    def call_termination_cbs(self, terminal_states: list[str], outcome: str | None) -> None:
+        """Call the termination callbacks; an error in one of them is logged and changes nothing."""
+        self._call(self._termination_cbs, "termination", terminal_states, outcome)
+
+    def _call(self, callbacks: list[tuple[Callback, tuple[Any, ...]]], kind: str, *args: Any) -> None:
+        for callback, extra in callbacks:
+            try:
+                callback(self.userdata, *args, *extra)
+            except Exception:  # a callback observes: it must not change what it observes
+                smach.logerr(f"{kind} callback {callback!r} raised:\n{traceback.format_exc()}")

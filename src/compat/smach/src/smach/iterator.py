@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A container that runs one state again and again, once for each item of a sequence."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import smach
+from smach.container import Container
+from smach.state import State
+from smach.user_data import UserData
+
+__all__ = ["Iterator"]
+
+
+class Iterator(Container):
+    """Puts one item after the other in its userdata and runs the contained state for each."""
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        it: Iterable[Any] | Callable[[], Iterable[Any]] = (),
+        it_label: str = "it_data",
+        exhausted_outcome: str = "exhausted",
+    ) -> None:
+        """Make an iterator; its state is set inside ``with iterator:``.
+
+        Args:
+            outcomes: names of the outcomes; ``exhausted_outcome`` is added when it is missing.
+            input_keys: userdata keys copied from the parent before the first run.
+            output_keys: userdata keys copied to the parent after the last run.
+            it: the items, or a function without arguments that returns them when the iterator starts.
+            it_label: userdata key under which the state finds the current item.
+            exhausted_outcome: the outcome when the items have run out.
+        """
+        super().__init__(dict.fromkeys([*outcomes, exhausted_outcome]), input_keys, output_keys)
+        self._items = it
+        self._items_label = it_label
+        self._exhausted_outcome = exhausted_outcome
+        self._state_label = ""
+        self._state: State | None = None
+        self._loop_outcomes: list[str] = []
+        self._break_outcomes: list[str] = []
+        self._final_outcome_map: dict[str, str] = {}
+        self._running = False
+        self._active = False
+        self._lock = threading.RLock()
+
+    @staticmethod
+    def set_contained_state(
+        label: str,
+        state: State,
+        loop_outcomes: Iterable[str] = (),
+        break_outcomes: Iterable[str] = (),
+        final_outcome_map: Mapping[str, str] | None = None,
+    ) -> None:
+        """Set the state that is run for each item.
+
+        Args:
+            label: its name.
+            state: the state, or a container.
+            loop_outcomes: outcomes of the state after which the next item follows; when empty, all that are not
+                in ``break_outcomes``.
+            break_outcomes: outcomes of the state that end the iteration at once.
+            final_outcome_map: outcome of the state -> outcome of the iterator, for the outcome that ended it; an
+                outcome not mentioned keeps its name.
+        """
+        iterator: Iterator = Iterator._currently_opened_container()
+        iterator._state_label = label
+        iterator._state = state
+        iterator._loop_outcomes = list(loop_outcomes)
+        iterator._break_outcomes = list(break_outcomes)
+        iterator._final_outcome_map = dict(final_outcome_map or {})
+
+    def set_iteritems(self, it: Iterable[Any] | Callable[[], Iterable[Any]], it_label: str) -> None:
+        """Replace the items and the key under which the state finds the current one."""
+        self._items = it
+        self._items_label = it_label
+
+    def check_consistency(self) -> None:
+        """Raise when there is no state, or when an outcome that ends the iteration is none of the iterator's."""
+        if not isinstance(self._state, State):
+            raise smach.InvalidStateError("the iterator has no contained state; call Iterator.set_contained_state")
+        registered = self._state.get_registered_outcomes()
+        both = sorted(set(self._loop_outcomes) & set(self._break_outcomes))
+        if both:
+            raise smach.InvalidTransitionError(f"{both} are loop outcomes and break outcomes at once")
+        named = [*self._loop_outcomes, *self._break_outcomes, *self._final_outcome_map]
+        unknown = [name for name in named if name not in registered]
+        if unknown:
+            raise smach.InvalidTransitionError(
+                f"{unknown} are not outcomes of '{self._state_label}', which gives {list(registered)}"
+            )
+        lost = [name for name in registered if self._breaks(name) and self._final(name) not in self._outcomes]
+        if lost:
+            raise smach.InvalidTransitionError(
+                f"{lost} of '{self._state_label}' end the iteration as {[self._final(name) for name in lost]}, but "
+                f"the iterator's outcomes are {list(self._outcomes)}"
+            )
+
+    def _breaks(self, outcome: str) -> bool:
+        if outcome in self._break_outcomes:
+            return True
+        return bool(self._loop_outcomes) and outcome not in self._loop_outcomes
+
+    def _final(self, outcome: str) -> str:
+        return self._final_outcome_map.get(outcome, outcome)
+
+    # ---- looking in ----------------------------------------------------------------------------------------
+    def get_children(self) -> dict[str, State]:
+        """Return the contained state by its label."""
+        return {} if self._state is None else {self._state_label: self._state}
+
+    def get_initial_states(self) -> list[str]:
+        """Return the label of the contained state, in a list."""
+        return list(self.get_children())
+
+    def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
+        """Put values in the local userdata; there is only one state to start with."""
+        if initial_states and list(initial_states) != self.get_initial_states():
+            smach.logwarn(f"an iterator starts with its contained state; {list(initial_states)} is ignored")
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_active_states(self) -> list[str]:
+        """Return the label of the contained state while it runs."""
+        return [self._state_label] if self._active else []
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return (outcome, label, label or outcome of the iterator) for each outcome of the contained state."""
+        if self._state is None:
+            return []
+        edges: list[tuple[str, str, str | None]] = []
+        for outcome in self._state.get_registered_outcomes():
+            if self._breaks(outcome):
+                edges.append((outcome, self._state_label, self._final(outcome)))
+            else:
+                edges.append((outcome, self._state_label, self._state_label))
+                edges.append((outcome, self._state_label, self._exhausted_outcome))
+        return edges
+
+    def is_running(self) -> bool:
+        """Tell whether the iterator is executing."""
+        return self._running
+
+    # ---- running -------------------------------------------------------------------------------------------
+    def execute(self, parent_ud: Any = None) -> str:
+        """Run the contained state for each item.
+
+        Args:
+            parent_ud: userdata the input keys are copied from and the output keys are copied to.
+
+        Returns:
+            The exhausted outcome, or the one the state broke out with; ``preempted`` (where the iterator has such
+            an outcome) when it was asked to stop between two items.
+        """
+        self.check_consistency()
+        self._copy_input_keys(parent_ud)
+        items = self._items() if callable(self._items) else self._items
+        self._running = True
+        self.call_start_cbs()
+        try:
+            outcome = self._run_over(items)
+        finally:
+            with self._lock:
+                self._running = False
+                self._active = False
+        self._copy_output_keys(parent_ud)
+        self.call_termination_cbs([self._state_label], outcome)
+        return outcome
+
+    def _run_over(self, items: Iterable[Any]) -> str:
+        for item in items:
+            if smach.is_shutdown():
+                self.service_preempt()
+                return "preempted"
+            if self._preempt_requested and "preempted" in self._outcomes:
+                self.service_preempt()
+                return "preempted"
+            self.userdata[self._items_label] = item
+            outcome = self._run_once()
+            if self._breaks(outcome):
+                return self._final(outcome)
+            self.call_transition_cbs()
+        return self._exhausted_outcome
+
+    def _run_once(self) -> str:
+        state = self.get_children()[self._state_label]
+        with self._lock:
+            self._active = True
+            if self._preempt_requested:
+                state.request_preempt()
+        outcome = self._execute_child(self._state_label, state, {})
+        with self._lock:
+            self._active = False
+            if self._preempt_requested and not state.preempt_requested():
+                self.service_preempt()
+            elif state.preempt_requested():
+                state.recall_preempt()
+        if outcome not in state.get_registered_outcomes() and not smach.is_shutdown():
+            raise smach.InvalidTransitionError(
+                f"state '{self._state_label}' of type {type(state).__name__} returned {outcome!r}, but its outcomes "
+                f"are {list(state.get_registered_outcomes())}"
+            )
+        return outcome
+
+    def request_preempt(self) -> None:
+        """Ask the iterator to stop: the request goes to the contained state when it runs."""
+        with self._lock:
+            super().request_preempt()
+            if self._active and self._state is not None:
+                self._state.request_preempt()

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A container that runs one state at a time and follows transitions from outcome to state until it reaches one of
+its own outcomes."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import smach
+from smach.container import Container
+from smach.state import State
+from smach.user_data import UserData
+
+__all__ = ["StateMachine"]
+
+
+class StateMachine(Container):
+    """Runs its states in the order its transitions give, starting with the first one added."""
+
+    def __init__(
+        self, outcomes: Iterable[str], input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()
+    ) -> None:
+        """Make an empty machine; states are added inside ``with machine:``."""
+        super().__init__(outcomes, input_keys, output_keys)
+        self._states: dict[str, State] = {}
+        self._transitions: dict[str, dict[str, str | None]] = {}
+        self._remappings: dict[str, dict[str, str]] = {}
+        self._initial_label: str | None = None
+        self._current_label: str | None = None
+        self._preempted_label: str | None = None
+        self._connector_outcomes: list[str] = []
+        self._connector_label: str | None = None
+        self._running = False
+        self._lock = threading.RLock()
+
+    # ---- construction --------------------------------------------------------------------------------------
+    @staticmethod
+    def add(
+        label: str,
+        state: State,
+        transitions: Mapping[str, str] | None = None,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
+        """Add a state to the machine that is open.
+
+        Args:
+            label: its name in this machine.
+            state: the state, or a container.
+            transitions: outcome of the state -> label of a state, or outcome of this machine. An outcome not
+                mentioned leads to the machine's outcome of the same name.
+            remapping: userdata name in the state -> userdata name in this machine.
+
+        Returns:
+            The state.
+
+        Raises:
+            smach.InvalidStateError: the label is taken, or the object is not a state.
+            smach.InvalidTransitionError: a transition starts from an outcome the state does not have.
+        """
+        machine: StateMachine = StateMachine._currently_opened_container()
+        machine.check_state_spec(label, state, transitions or {})
+        machine._connect_previous(label)
+        targets: dict[str, str | None] = dict.fromkeys(state.get_registered_outcomes())
+        targets.update(transitions or {})
+        machine._states[label] = state
+        machine._transitions[label] = targets
+        machine._remappings[label] = dict(remapping or {})
+        return state
+
+    @staticmethod
+    def add_auto(
+        label: str,
+        state: State,
+        connector_outcomes: Iterable[str],
+        transitions: Mapping[str, str] | None = None,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
+        """Add a state, some of whose outcomes lead to the state that is added next.
+
+        Args:
+            label: its name in this machine.
+            state: the state, or a container.
+            connector_outcomes: the outcomes that lead to the next state.
+            transitions: as for ``add``.
+            remapping: as for ``add``.
+        """
+        machine: StateMachine = StateMachine._currently_opened_container()
+        connectors = [outcome for outcome in connector_outcomes if outcome not in (transitions or {})]
+        for outcome in connectors:
+            if outcome not in state.get_registered_outcomes():
+                raise smach.InvalidTransitionError(
+                    f"state '{label}': connector outcome '{outcome}' is not an outcome of the state; "
+                    f"its outcomes are {list(state.get_registered_outcomes())}"
+                )
+        StateMachine.add(label, state, transitions, remapping)
+        machine._connector_label, machine._connector_outcomes = label, connectors
+        return state
+
+    def _connect_previous(self, label: str) -> None:
+        if self._connector_label is not None:
+            for outcome in self._connector_outcomes:
+                self._transitions[self._connector_label][outcome] = label
+        self._connector_label, self._connector_outcomes = None, []
+
+    def check_state_spec(self, label: str, state: State, transitions: Mapping[str, str]) -> None:
+        """Raise when a state cannot be added under a label with these transitions."""
+        if label in self._states:
+            raise smach.InvalidStateError(f"the machine already has a state with the label '{label}'")
+        if label in self._outcomes:
+            raise smach.InvalidStateError(f"'{label}' is an outcome of the machine and cannot also be a label")
+        if not isinstance(state, State):
+            raise smach.InvalidStateError(
+                f"'{label}' is a {type(state).__name__}, not a smach.State (was the class given, not an object?)"
+            )
+        unknown = [outcome for outcome in transitions if outcome not in state.get_registered_outcomes()]
+        if unknown:
+            raise smach.InvalidTransitionError(
+                f"state '{label}' has transitions from {unknown}, but its outcomes are "
+                f"{list(state.get_registered_outcomes())}"
+            )
+
+    def check_consistency(self) -> None:
+        """Raise when the machine has no state or a transition leads nowhere, naming every such transition."""
+        if not self._states:
+            raise smach.InvalidStateError("the state machine has no states")
+        if self._initial_label is not None and self._initial_label not in self._states:
+            raise smach.InvalidStateError(
+                f"the initial state '{self._initial_label}' is not in the machine; it has {list(self._states)}"
+            )
+        known = {*self._states, *self._outcomes}
+        faults = [
+            f"'{outcome}' of state '{label}' leads to '{target}'"
+            for outcome, label, target in self.get_internal_edges()
+            if target not in known
+        ]
+        if faults:
+            raise smach.InvalidTransitionError(
+                f"{'; '.join(faults)}: neither a state ({list(self._states)}) nor an outcome "
+                f"({list(self._outcomes)}) of the machine"
+            )
+
+    # ---- looking in ----------------------------------------------------------------------------------------
+    def get_children(self) -> dict[str, State]:
+        """Return the states by label, in the order they were added."""
+        return dict(self._states)
+
+    def get_initial_states(self) -> list[str]:
+        """Return the label of the first state, in a list."""
+        if self._initial_label is not None:
+            return [self._initial_label]
+        return list(self._states)[:1]
+
+    def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
+        """Choose the state that runs first.
+
+        Args:
+            initial_states: exactly one label.
+            userdata: values put in the machine's userdata.
+
+        Raises:
+            smach.InvalidStateError: when not exactly one label is given.
+        """
+        if len(initial_states) != 1:
+            raise smach.InvalidStateError(f"a state machine starts with one state, got {list(initial_states)}")
+        if userdata is not None:
+            self.userdata.update(userdata)
+        with self._lock:
+            self._initial_label = initial_states[0]
+
+    def get_active_states(self) -> list[str]:
+        """Return the label of the running state, in a list; empty when the machine is not running."""
+        label = self._current_label
+        return [] if label is None else [label]
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the transitions as (outcome, from label, to label or outcome of the machine)."""
+        return [
+            (outcome, label, outcome if target is None else target)
+            for label, transitions in self._transitions.items()
+            for outcome, target in transitions.items()
+        ]
+
+    def is_running(self) -> bool:
+        """Tell whether the machine is executing."""
+        return self._running
+
+    # ---- running -------------------------------------------------------------------------------------------
+    def execute(self, parent_ud: Any = None) -> str:
+        """Run until an outcome of the machine is reached.
+
+        Args:
+            parent_ud: userdata the machine's input keys are copied from and its output keys are copied to.
+
+        Returns:
+            The outcome; ``preempted`` when the process goes down (``set_shutdown_check``).
+
+        Raises:
+            smach.SmachError: the machine is inconsistent, a state raised, or a state returned something that is
+                not one of its outcomes.
+        """
+        self.check_consistency()
+        self._copy_input_keys(parent_ud)
+        label = self.get_initial_states()[0]
+        smach.loginfo(f"state machine starts in state '{label}' with userdata {sorted(self.userdata.keys())}")
+        self._running = True
+        self._preempted_label = None
+        try:
+            self._enter(label)
+            self.call_start_cbs()
+            outcome = self._run_from(label)
+        finally:
+            last = self.get_active_states()
+            with self._lock:
+                self._current_label = None
+                self._running = False
+        self._copy_output_keys(parent_ud)
+        self.call_termination_cbs(last, outcome)
+        return outcome
+
+    def _run_from(self, label: str) -> str:
+        while True:
+            if smach.is_shutdown():
+                return self._shut_down()
+            state = self._states[label]
+            outcome = self._execute_child(label, state, self._remappings[label])
+            self._settle_preempt(label, state)
+            if smach.is_shutdown():
+                return self._shut_down()
+            target = self._target(label, state, outcome)
+            if target in self._outcomes:
+                smach.loginfo(f"state machine ends: '{label}' gave '{outcome}', outcome '{target}'")
+                return target
+            smach.loginfo(f"state machine goes from '{label}' by '{outcome}' to '{target}'")
+            label = target
+            self._enter(label)
+            self.call_transition_cbs()
+
+    def _enter(self, label: str) -> None:
+        """Make a state the current one; a machine that was asked to stop passes the request on to it."""
+        with self._lock:
+            self._current_label = label
+            if self._preempt_requested:
+                self._preempted_label = label
+                self._states[label].request_preempt()
+
+    def _settle_preempt(self, label: str, state: State) -> None:
+        """Acknowledge the machine's own request once the state it was passed to has acknowledged it."""
+        with self._lock:
+            if self._preempted_label != label:
+                return
+            if state.preempt_requested():
+                smach.logdebug(f"state '{label}' ended without acknowledging the request to stop")
+                state.recall_preempt()
+            else:
+                self.service_preempt()
+            self._preempted_label = None
+
+    def _target(self, label: str, state: State, outcome: Any) -> str:
+        if outcome not in state.get_registered_outcomes():
+            raise smach.InvalidTransitionError(
+                f"state '{label}' of type {type(state).__name__} returned {outcome!r}, but its outcomes are "
+                f"{list(state.get_registered_outcomes())}"
+            )
+        name = str(outcome)
+        target = self._transitions[label].get(name)
+        target = name if target is None else target
+        if target not in self._states and target not in self._outcomes:
+            raise smach.InvalidTransitionError(f"'{name}' of state '{label}' leads to '{target}', which is nowhere")
+        return target
+
+    def _shut_down(self) -> str:
+        smach.loginfo("state machine stops: the process is going down")
+        self.service_preempt()
+        return "preempted"
+
+    def request_preempt(self) -> None:
+        """Ask the machine to stop: the request goes to the running state, and to those entered later."""
+        with self._lock:
+            super().request_preempt()
+            if self._running and self._current_label is not None and self._preempted_label is None:
+                self._preempted_label = self._current_label
+                self._states[self._current_label].request_preempt()

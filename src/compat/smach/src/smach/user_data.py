@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Userdata: the variables states hand to each other, and the view of them that one state is allowed to have."""
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Iterable, KeysView, Mapping
+from typing import Any
+
+import smach
+
+__all__ = ["Const", "Remapper", "UserData", "get_const"]
+
+
+class UserData:
+    """A set of named values, read and written as attributes or as items, safe to share between threads."""
+
+    def __init__(self) -> None:
+        object.__setattr__(self, "_data", {})
+        object.__setattr__(self, "_lock", threading.RLock())
+
+    def update(self, ud: UserData) -> None:
+        """Take over every value of another userdata, overwriting those with the same name."""
+        with self._lock:
+            self._data.update(ud._data)
+
+    def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
+        """Return shallow copies of some values under other names.
+
+        Args:
+            keys: names in this userdata.
+            remapping: new name -> name in this userdata; names not mentioned stay.
+        """
+        renamed = {here: there for there, here in remapping.items()}
+        if len(renamed) != len(remapping):
+            smach.logerr(f"userdata remapping {dict(remapping)} gives two names to one key; one of them is dropped")
+        result = UserData()
+        for key in keys:
+            result[renamed.get(key, key)] = copy.copy(self[key])
+        return result
+
+    def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
+        """Take shallow copies of some values of another userdata.
+
+        Args:
+            ud: where the values come from.
+            keys: names in ``ud``.
+            remapping: name in ``ud`` -> name here; names not mentioned stay.
+        """
+        for key in keys:
+            self[remapping.get(key, key)] = copy.copy(ud[key])
+
+    def keys(self) -> KeysView[str]:
+        """Return the names of all values."""
+        with self._lock:
+            return dict(self._data).keys()
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._data
+
+    def __getitem__(self, key: str) -> Any:
+        with self._lock:
+            return self._data[key]
+
+    def __setitem__(self, key: str, item: Any) -> None:
+        with self._lock:
+            self._data[key] = item
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"userdata has no key '{name}'; it has: {sorted(self.keys())}") from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name.startswith("_"):
+            object.__setattr__(self, name, value)
+        else:
+            self[name] = value
+
+
+def get_const(obj: Any) -> Any:
+    """Return a read-only proxy of an ordinary Python object; values without attributes of their own as they are.
+
+    Numbers, strings, containers and messages (whose classes use slots) have no instance dictionary and are
+    handed over unchanged.
+    """
+    return Const(obj) if hasattr(obj, "__dict__") and not isinstance(obj, type) else obj
+
+
+class Const:
+    """A proxy that lets attributes be read, and refuses to change them or to call methods."""
+
+    __slots__ = ("_obj",)
+
+    def __init__(self, obj: Any) -> None:
+        object.__setattr__(self, "_obj", obj)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(object.__getattribute__(self, "_obj"), name)
+        if callable(value):
+            raise self._refusal(f"call '{name}' of")
+        return get_const(value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise self._refusal(f"set '{name}' of")
+
+    def __delattr__(self, name: str) -> None:
+        raise self._refusal(f"delete '{name}' of")
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        raise self._refusal("call")
+
+    def __eq__(self, other: object) -> bool:
+        mine = object.__getattribute__(self, "_obj")
+        return bool(mine == (object.__getattribute__(other, "_obj") if isinstance(other, Const) else other))
+
+    def __hash__(self) -> int:
+        return hash(object.__getattribute__(self, "_obj"))
+
+    def __bool__(self) -> bool:
+        return bool(object.__getattribute__(self, "_obj"))
+
+    def __repr__(self) -> str:
+        return f"Const({object.__getattribute__(self, '_obj')!r})"
+
+    def _refusal(self, what: str) -> TypeError:
+        kind = type(object.__getattribute__(self, "_obj")).__name__
+        return TypeError(
+            f"a state tried to {what} a {kind} that it declared as an input key only, which makes it read-only; "
+            "declare the key in io_keys to use the object itself"
+        )
+
+
+class Remapper:
+    """The view a state has of its container's userdata: only its declared keys, under its own names."""
+
+    def __init__(
+        self,
+        ud: Any,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        remapping: Mapping[str, str] | None = None,
+    ) -> None:
+        """Look at ``ud`` through the interface of a state.
+
+        Args:
+            ud: the userdata looked at.
+            input_keys: names that may be read.
+            output_keys: names that may be written (a key that is input and output is handed over writable).
+            remapping: the state's name -> name in ``ud``; names not mentioned are the same in both.
+        """
+        object.__setattr__(self, "_ud", ud)
+        object.__setattr__(self, "_input_keys", tuple(input_keys))
+        object.__setattr__(self, "_output_keys", tuple(output_keys))
+        object.__setattr__(self, "_remapping", dict(remapping or {}))
+
+    def _remap(self, key: str) -> str:
+        return self._remapping.get(key, key)
+
+    def __getitem__(self, key: str) -> Any:
+        if key not in self._input_keys:
+            raise smach.InvalidUserCodeError(
+                f"userdata key '{key}' was read, but the state declares as input only: {list(self._input_keys)}; "
+                "add it to input_keys or io_keys"
+            )
+        value = self._ud[self._remap(key)]
+        return value if key in self._output_keys else get_const(value)
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        if key not in self._output_keys:
+            raise smach.InvalidUserCodeError(
+                f"userdata key '{key}' was written, but the state declares as output only: "
+                f"{list(self._output_keys)}; add it to output_keys or io_keys"
+            )
+        self._ud[self._remap(key)] = value
+
+    def keys(self) -> list[str]:
+        """Return the declared keys (under the state's names) that have a value."""
+        declared = dict.fromkeys([*self._input_keys, *self._output_keys])
+        return [key for key in declared if self._remap(key) in self._ud]
+
+    def __contains__(self, key: object) -> bool:
+        return isinstance(key, str) and key in self._input_keys and self._remap(key) in self._ud
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(
+                f"userdata key '{name}' has no value yet (it is called '{self._remap(name)}' in the container)"
+            ) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self[name] = value

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The base of the framework's states: one way to succeed, to fail with a reason, and to stop when asked.
+
+A plain ``smach.State`` only returns an outcome, so nobody learns why a task failed, and a state that waits
+cannot be interrupted unless its author thought of it. ``FrameworkState`` settles both. A state is written as::
+
+    class OpenDoor(FrameworkState):
+        def __init__(self, door_name, timeout=5.0, outcomes=("success", "fail"),
+                     input_keys=(), output_keys=(), io_keys=("arm_commander",)):
+            super().__init__(outcomes, input_keys, output_keys, io_keys)
+            ...
+
+        def execute(self, userdata):
+            if not self.wait_until(self._door_is_open, self._timeout):
+                if self.preempt_requested():
+                    return self.stopped()
+                return self.fail(f"door '{self._door_name}' did not open within {self._timeout} s")
+            return self.succeed()
+"""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable
+
+import smach
+
+DEFAULT_OUTCOMES = ("success", "fail")
+
+
+class FrameworkState(smach.State):
+    """A state whose first outcome is the positive one and whose last outcome is the negative one.
+
+    Attributes:
+        outcomes: the outcomes in the order they were declared.
+        reason: why the last execution did not succeed; "" after a success or before the first execution.
+    """
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] = DEFAULT_OUTCOMES,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+    ) -> None:
+        """Declare the interface of the state.
+
+        Args:
+            outcomes: names of the outcomes, at least two; first = positive, last = negative.
+            input_keys: userdata keys that are only read (ordinary Python objects arrive read-only).
+            output_keys: userdata keys that are only written.
+            io_keys: userdata keys that are read and written; commanders and clients, whose methods the state
+                calls, must be declared here.
+
+        Raises:
+            ValueError: when fewer than two different outcomes are given.
+        """
+        names = [outcomes] if isinstance(outcomes, str) else list(outcomes)
+        if len(names) < 2 or len(set(names)) != len(names):
+            raise ValueError(
+                f"{type(self).__name__}: outcomes are {names}; needed are at least two different names, "
+                "the first for success and the last for failure, for example [success, fail]"
+            )
+        super().__init__(
+            outcomes=names, input_keys=list(input_keys), output_keys=list(output_keys), io_keys=list(io_keys)
+        )
+        self.outcomes = names
+        self.reason = ""
+        self._preempt_event = threading.Event()
+
+    def succeed(self) -> str:
+        """Return the positive outcome."""
+        self.reason = ""
+        return self.outcomes[0]
+
+    def fail(self, reason: str) -> str:
+        """Record and log why the state did not reach its aim, and return the negative outcome.
+
+        Args:
+            reason: one sentence: what was attempted, what was got, and what was expected.
+        """
+        self.reason = reason
+        smach.logwarn(f"{type(self).__name__}: {reason}")
+        return self.outcomes[-1]
+
+    def stopped(self) -> str:
+        """Acknowledge a request to stop; return ``preempted`` where declared, the negative outcome otherwise."""
+        self.service_preempt()
+        self.reason = "stopped on request"
+        return "preempted" if "preempted" in self.outcomes else self.outcomes[-1]
+
+    def wait_until(self, condition: Callable[[], bool], timeout_s: float | None, period_s: float = 0.02) -> bool:
+        """Wait for a condition, for a request to stop, or for the timeout, whichever comes first.
+
+        Args:
+            condition: asked every ``period_s`` seconds.
+            timeout_s: longest wait [s, wall time]; None = no limit (a request to stop still ends it).
+            period_s: time between two questions [s].
+
+        Returns:
+            True when the condition held. When False, ``preempt_requested()`` tells a stop from a timeout.
+        """
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while not self.preempt_requested() and not smach.is_shutdown():
+            if condition():
+                return True
+            if deadline is not None and time.monotonic() >= deadline:
+                return False
+            self._preempt_event.wait(period_s)
+        return False
+
+    def request_preempt(self) -> None:
+        """Ask the state to stop. States that drive hardware extend this to cancel their motion at once."""
+        super().request_preempt()
+        self._preempt_event.set()
+
+    def recall_preempt(self) -> None:
+        """Take the request to stop back."""
+        super().recall_preempt()
+        self._preempt_event.clear()
+
+    def service_preempt(self) -> None:
+        """Mark the request to stop as dealt with."""
+        super().service_preempt()
+        self._preempt_event.clear()
