@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Decides which pairs of links and objects may touch, without ever loosening or tightening a pair nobody asked about.
+
+The reference matrix comes from the planning scene. Objects that appear later are added to it; the manipulator may then
+be allowed to touch itself or some objects. Forbidding again restores what the reference said.
+"""
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+LINK_SEPARATOR = "__"
+DEFAULT_LINK = "link"
+
+
+class AcmError(ValueError):
+    """A request cannot be served; the text says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionMatrix:
+    """A symmetric table of pairs that may touch.
+
+    Attributes:
+        names: Links and objects, one for each row and column.
+        rows: ``rows[i][j]`` is True when ``names[i]`` may touch ``names[j]``.
+        default_names: Links and objects with a rule for every pair that is not in the table.
+        default_values: The rules of ``default_names``.
+    """
+
+    names: tuple[str, ...]
+    rows: tuple[tuple[bool, ...], ...]
+    default_names: tuple[str, ...] = ()
+    default_values: tuple[bool, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Checks that the table is square and the defaults are paired."""
+        size = len(self.names)
+        widths = {len(row) for row in self.rows}
+        if len(self.rows) != size or (size and widths != {size}):
+            raise AcmError(f"The collision matrix names {size} entries but has {len(self.rows)} rows of widths "
+                           f"{sorted(widths)}; it must be square.")
+        if len(set(self.names)) != size:
+            raise AcmError("The collision matrix names an entry twice; every name must be unique.")
+        if len(self.default_names) != len(self.default_values):
+            raise AcmError(f"The collision matrix has {len(self.default_names)} default names but "
+                           f"{len(self.default_values)} default values.")
+
+    def allowed(self, first: str, second: str) -> bool | None:
+        """Returns whether a pair may touch, None when one of the two is not in the table."""
+        if first not in self.names or second not in self.names:
+            return None
+        return self.rows[self.names.index(first)][self.names.index(second)]
+
+
+@dataclass(slots=True)
+class _Table:
+    """Working copy of a matrix: rows are mutable."""
+
+    names: list[str]
+    rows: list[list[bool]]
+
+    @classmethod
+    def of(cls, matrix: CollisionMatrix) -> _Table:
+        return cls(list(matrix.names), [list(row) for row in matrix.rows])
+
+    def add(self, name: str) -> None:
+        for row in self.rows:
+            row.append(False)
+        self.names.append(name)
+        self.rows.append([False] * (len(self.names) - 1) + [True])
+
+    def delete(self, name: str) -> None:
+        index = self.names.index(name)
+        del self.names[index], self.rows[index]
+        for row in self.rows:
+            del row[index]
+
+    def set(self, first: str, second: str, value: bool) -> None:
+        i, j = self.names.index(first), self.names.index(second)
+        self.rows[i][j] = self.rows[j][i] = value
+
+
+@dataclass(frozen=True, slots=True)
+class AcmAnswer:
+    """A matrix and what the requester should hear about it.
+
+    Attributes:
+        matrix: Pairs that may touch from now on.
+        warnings: Parts of the request that had no effect.
+    """
+
+    matrix: CollisionMatrix
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class AcmManager:
+    """Keeps the reference matrix, the objects added since and the permissions given.
+
+    Objects may be added before the reference matrix is known; they join it when it arrives.
+    """
+
+    _initial: CollisionMatrix | None = None
+    _table: _Table | None = None
+    _objects: list[str] = field(default_factory=list)
+    _manipulator_links: tuple[str, ...] = ()
+    _lock: threading.RLock = field(default_factory=threading.RLock)
+
+    def set_initial(self, matrix: CollisionMatrix, manipulator_indices: Sequence[int] = (),
+                    manipulator_prefix: str = "") -> bool:
+        """Takes a new reference matrix and drops every permission given so far.
+
+        Args:
+            matrix: Matrix of the planning scene.
+            manipulator_indices: Positions of the manipulator's links in ``matrix.names``.
+            manipulator_prefix: Text found in the names of the manipulator's links; used when no index is given.
+
+        Returns:
+            True when an earlier reference was replaced.
+
+        Raises:
+            AcmError: An index points outside the matrix.
+        """
+        outside = [index for index in manipulator_indices if not 0 <= index < len(matrix.names)]
+        if outside:
+            raise AcmError(f"manipulator_links_indices holds {outside}, the matrix has {len(matrix.names)} entries "
+                           f"(0 to {len(matrix.names) - 1}); compute the indices from the matrix that is sent.")
+        links = [matrix.names[index] for index in manipulator_indices]
+        if not links and manipulator_prefix:
+            links = [name for name in matrix.names if manipulator_prefix in name]
+        with self._lock:
+            replaced = self._initial is not None
+            self._initial = matrix
+            self._manipulator_links = tuple(dict.fromkeys(links))
+            self._restore()
+            return replaced
+
+    def add_object(self, entry_name: str) -> str:
+        """Adds an object that may touch nothing yet.
+
+        Args:
+            entry_name: Name of the model, or the full ``<model>__<link>`` id of one of its links.
+
+        Returns:
+            A warning when the object is known already, else an empty text.
+
+        Raises:
+            AcmError: The name is empty.
+        """
+        name = object_id(entry_name)
+        with self._lock:
+            if name in self._objects:
+                return f"'{name}' is in the collision matrix already; nothing was added."
+            self._objects.append(name)
+            if self._table is not None and name not in self._table.names:
+                self._table.add(name)
+            return ""
+
+    def delete_object(self, entry_name: str) -> str:
+        """Removes an object.
+
+        Args:
+            entry_name: As given to :meth:`add_object`.
+
+        Returns:
+            A warning when there is no such object, else an empty text.
+
+        Raises:
+            AcmError: The name is empty, or names a link of the reference matrix.
+        """
+        name = object_id(entry_name)
+        with self._lock:
+            if name not in self._objects:
+                known = ", ".join(self._objects) or "none"
+                return f"'{name}' is not among the objects of the collision matrix ({known}); nothing was removed."
+            self._objects.remove(name)
+            in_reference = self._initial is not None and name in self._initial.names
+            if self._table is not None and name in self._table.names and not in_reference:
+                self._table.delete(name)
+            return ""
+
+    def reinitialise(self) -> None:
+        """Drops every permission given so far; the objects stay, for they are still there.
+
+        Raises:
+            AcmError: There is no reference matrix.
+        """
+        with self._lock:
+            self._require_initial()
+            self._restore()
+
+    def current(self) -> AcmAnswer:
+        """Returns the matrix as it stands.
+
+        Raises:
+            AcmError: There is no reference matrix.
+        """
+        with self._lock:
+            return AcmAnswer(self._matrix())
+
+    def allow_self_collision(self, allow: bool) -> AcmAnswer:
+        """Lets the links of the manipulator touch each other, or restores what the reference says.
+
+        Args:
+            allow: False restores the reference.
+
+        Returns:
+            The new matrix.
+
+        Raises:
+            AcmError: There is no reference matrix.
+        """
+        with self._lock:
+            initial, table = self._require_initial()
+            links = self._manipulator_links
+            for position, first in enumerate(links):
+                for second in links[position + 1:]:
+                    table.set(first, second, allow or bool(initial.allowed(first, second)))
+            return AcmAnswer(self._matrix(), self._link_warnings())
+
+    def allow_object_collision(self, objects: Iterable[str], allow: bool) -> AcmAnswer:
+        """Lets the manipulator touch objects, or restores what the reference says.
+
+        Args:
+            objects: Models or ids; none means every object added so far.
+            allow: False restores the reference.
+
+        Returns:
+            The new matrix, with a warning for every name that matches nothing.
+
+        Raises:
+            AcmError: There is no reference matrix.
+        """
+        with self._lock:
+            initial, table = self._require_initial()
+            wanted = list(objects)
+            targets, unknown = self._match(wanted, table) if wanted else (list(self._objects), [])
+            warnings = [f"No entry of the collision matrix belongs to the object '{name}'; add it first."
+                        for name in unknown]
+            if not wanted and not targets:
+                warnings.append("No object was added to the collision matrix; the manipulator may touch none.")
+            for target in targets:
+                for link in self._manipulator_links:
+                    if link != target:
+                        table.set(link, target, allow or bool(initial.allowed(link, target)))
+            return AcmAnswer(self._matrix(), (*warnings, *self._link_warnings()))
+
+    def _match(self, wanted: list[str], table: _Table) -> tuple[list[str], list[str]]:
+        candidates = [name for name in table.names if name not in self._manipulator_links]
+        found: list[str] = []
+        unknown: list[str] = []
+        for name in wanted:
+            hits = [entry for entry in candidates if entry == name or entry.startswith(name + LINK_SEPARATOR)]
+            found.extend(hits)
+            if not hits:
+                unknown.append(name)
+        return list(dict.fromkeys(found)), unknown
+
+    def _link_warnings(self) -> tuple[str, ...]:
+        if self._manipulator_links:
+            return ()
+        return ("No link of the manipulator is known; set manipulator_links_indices or manipulator_prefix "
+                "and send the reference matrix again.",)
+
+    def _require_initial(self) -> tuple[CollisionMatrix, _Table]:
+        if self._initial is None or self._table is None:
+            raise AcmError("There is no reference collision matrix yet; call set_init_acm first.")
+        return self._initial, self._table
+
+    def _restore(self) -> None:
+        if self._initial is None:
+            return
+        self._table = _Table.of(self._initial)
+        for name in self._objects:
+            if name not in self._table.names:
+                self._table.add(name)
+
+    def _matrix(self) -> CollisionMatrix:
+        initial, table = self._require_initial()
+        return CollisionMatrix(tuple(table.names), tuple(tuple(row) for row in table.rows), initial.default_names,
+                               initial.default_values)
+
+
+def object_id(entry_name: str) -> str:
+    """Completes a model's name to the id of its default link; an id that names a link stays.
+
+    Args:
+        entry_name: ``box`` or ``box__body``.
+
+    Returns:
+        ``box__link`` or ``box__body``.
+
+    Raises:
+        AcmError: The name is empty.
+    """
+    if not entry_name:
+        raise AcmError("entry_name is empty; give the name of the object.")
+    return entry_name if LINK_SEPARATOR in entry_name else f"{entry_name}{LINK_SEPARATOR}{DEFAULT_LINK}"

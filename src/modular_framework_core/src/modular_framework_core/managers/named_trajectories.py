@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads trajectories written as lists of named joint states, and times them."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from modular_framework_core.managers.yaml_entries import Entry, EntryError, read_entries
+
+WAYPOINT_KEYS = ("name", "interpolate_time", "pause_time")
+
+JointLookup = Callable[[str], Mapping[str, float] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A joint state to pass through.
+
+    Attributes:
+        entry: Where the waypoint is written.
+        joint_state_name: Name of the joint state.
+        interpolate_time_s: Time to get there from the waypoint before [s].
+        pause_time_s: Time to stay there [s].
+    """
+
+    entry: Entry
+    joint_state_name: str
+    interpolate_time_s: float
+    pause_time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TimedTrajectory:
+    """A trajectory of positions over time.
+
+    Attributes:
+        name: Name of the trajectory.
+        joint_names: Joints in alphabetical order.
+        points: (positions [rad or m] in the order of ``joint_names``, time from the start [s]).
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    points: tuple[tuple[tuple[float, ...], float], ...]
+
+
+def parse_waypoint(entry: Entry) -> Waypoint:
+    """Turns one list item into a waypoint.
+
+    Args:
+        entry: Mapping with ``name``, ``interpolate_time`` (> 0) and optionally ``pause_time`` (>= 0) [s].
+
+    Returns:
+        The waypoint.
+
+    Raises:
+        EntryError: A key is missing or unknown, or a time is out of range.
+    """
+    fields = {child.key: child for child in entry.children()}
+    unknown = sorted(set(fields) - set(WAYPOINT_KEYS))
+    if unknown:
+        raise entry.fault(f"unknown keys {unknown}; allowed are {list(WAYPOINT_KEYS)}")
+    missing = [key for key in ("name", "interpolate_time") if key not in fields]
+    if missing:
+        raise entry.fault(f"the keys {missing} are missing; every waypoint needs 'name' and 'interpolate_time'")
+    interpolate_time_s = fields["interpolate_time"].number()
+    if interpolate_time_s <= 0.0:
+        raise fields["interpolate_time"].fault(f"got {interpolate_time_s} s, must be more than 0")
+    pause_time_s = fields["pause_time"].number() if "pause_time" in fields else 0.0
+    if pause_time_s < 0.0:
+        raise fields["pause_time"].fault(f"got {pause_time_s} s, must be 0 or more")
+    return Waypoint(entry, fields["name"].text(), interpolate_time_s, pause_time_s)
+
+
+def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -> TimedTrajectory:
+    """Looks up the joint states of the waypoints and lays them out in time.
+
+    Args:
+        name: Name of the trajectory.
+        waypoints: At least one waypoint.
+        lookup: Gives {joint: position} of a joint state's name, None when there is none.
+
+    Returns:
+        The trajectory; a pause adds a second point at the same place.
+
+    Raises:
+        EntryError: A joint state is unknown, or its joints differ from those of the first waypoint.
+    """
+    joint_names: tuple[str, ...] = ()
+    points: list[tuple[tuple[float, ...], float]] = []
+    time_s = 0.0
+    for waypoint in waypoints:
+        joints = lookup(waypoint.joint_state_name)
+        if not joints:
+            raise waypoint.entry.fault(f"no joint state named '{waypoint.joint_state_name}' is stored; "
+                                       "add it to the named joint states or correct the name")
+        names = tuple(sorted(joints))
+        joint_names = joint_names or names
+        if names != joint_names:
+            raise waypoint.entry.fault(f"joint state '{waypoint.joint_state_name}' has the joints {list(names)}, "
+                                       f"the first waypoint has {list(joint_names)}; they must be the same")
+        positions = tuple(joints[joint] for joint in joint_names)
+        time_s += waypoint.interpolate_time_s
+        points.append((positions, time_s))
+        if waypoint.pause_time_s > 0.0:
+            time_s += waypoint.pause_time_s
+            points.append((positions, time_s))
+    return TimedTrajectory(name, joint_names, tuple(points))
+
+
+def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajectory], list[EntryError]]:
+    """Reads a file of trajectories.
+
+    Args:
+        path: YAML file, name to list of waypoints.
+        lookup: Gives {joint: position} of a joint state's name, None when there is none.
+
+    Returns:
+        The usable trajectories in file order, and one error for each entry (or for the file) that is not usable.
+    """
+    trajectories: list[TimedTrajectory] = []
+    faults: list[EntryError] = []
+    try:
+        for entry in read_entries(path):
+            if isinstance(entry, EntryError):
+                faults.append(entry)
+                continue
+            try:
+                waypoints = [parse_waypoint(item) for item in entry.items()]
+                if not waypoints:
+                    raise entry.fault("holds no waypoint; write at least one")
+                trajectories.append(time_trajectory(entry.key, waypoints, lookup))
+            except EntryError as error:
+                faults.append(error)
+    except EntryError as error:
+        faults.append(error)
+    return trajectories, faults

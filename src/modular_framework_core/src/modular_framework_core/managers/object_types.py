@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Remembers which model each simulated object was made from."""
+from __future__ import annotations
+
+import threading
+
+
+class ObjectTypeError(LookupError):
+    """A mapping of object names to types was refused; the text says why."""
+
+
+class ObjectTypes:
+    """Thread-safe map of object name to object type (a model's name or an SDF file)."""
+
+    def __init__(self) -> None:
+        self._types: dict[str, str] = {}
+        self._lock = threading.Lock()
+
+    def add(self, object_name: str, object_type: str) -> None:
+        """Registers an object.
+
+        Raises:
+            ObjectTypeError: The name is empty or in use; the earlier type is kept.
+        """
+        with self._lock:
+            if not object_name:
+                raise ObjectTypeError("An object needs a name, got an empty one.")
+            if object_name in self._types:
+                raise ObjectTypeError(f"An object named '{object_name}' exists already (type "
+                                      f"'{self._types[object_name]}'); delete it first or choose another name.")
+            self._types[object_name] = object_type
+
+    def get(self, object_name: str) -> str:
+        """Returns the type of an object.
+
+        Raises:
+            ObjectTypeError: No such object.
+        """
+        with self._lock:
+            if object_name not in self._types:
+                raise ObjectTypeError(self._unknown(object_name))
+            return self._types[object_name]
+
+    def delete(self, object_name: str) -> None:
+        """Forgets an object.
+
+        Raises:
+            ObjectTypeError: No such object.
+        """
+        with self._lock:
+            if object_name not in self._types:
+                raise ObjectTypeError(self._unknown(object_name))
+            del self._types[object_name]
+
+    def _unknown(self, object_name: str) -> str:
+        known = ", ".join(sorted(self._types)) or "none"
+        return f"No object named '{object_name}' is registered. Registered: {known}."

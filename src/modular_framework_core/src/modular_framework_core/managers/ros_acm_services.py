@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Serves the allowed collision matrix of the manipulator on the wire."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
+
+from modular_framework_core.acm import AcmAnswer, AcmError, AcmManager, CollisionMatrix
+from modular_framework_core.srv import (
+    GetModifiedACM,
+    GetModifiedACMRequest,
+    GetModifiedACMResponse,
+    SetInitACM,
+    SetInitACMResponse,
+    UpdateACMEntry,
+    UpdateACMEntryRequest,
+    UpdateACMEntryResponse,
+)
+
+INDICES_PARAMETER = "manipulator_links_indices"
+PREFIX_PARAMETER = "manipulator_prefix"
+
+
+def matrix_from_message(message: AllowedCollisionMatrix) -> CollisionMatrix:
+    """Converts a message.
+
+    Raises:
+        AcmError: The message is not square, or names an entry twice.
+    """
+    rows = tuple(tuple(map(bool, row.enabled)) for row in message.entry_values)
+    defaults = tuple(map(bool, message.default_entry_values))
+    return CollisionMatrix(tuple(message.entry_names), rows, tuple(message.default_entry_names), defaults)
+
+
+def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
+    """Converts to a message."""
+    return AllowedCollisionMatrix(
+        entry_names=list(matrix.names),
+        entry_values=[AllowedCollisionEntry(enabled=list(row)) for row in matrix.rows],
+        default_entry_names=list(matrix.default_names),
+        default_entry_values=list(matrix.default_values))
+
+
+class AcmServices:
+    """The collision matrix manager behind its services.
+
+    Parameters:
+        ``manipulator_links_indices`` (list of int): rows of the manipulator's links in the matrix of ``set_init_acm``.
+        ``manipulator_prefix`` (string): text in the names of the manipulator's links; used without the indices.
+        Both are read each time a reference matrix is set.
+
+    Services:
+        ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM).
+    """
+
+    def __init__(self) -> None:
+        """Makes a manager without a matrix; nothing is advertised before :meth:`connect`."""
+        self.manager = AcmManager()
+        self._services: list[rospy.Service] = []
+
+    def connect(self) -> None:
+        """Advertises the services."""
+        self._services = [rospy.Service("set_init_acm", SetInitACM, self._set_init),
+                          rospy.Service("update_acm_entry", UpdateACMEntry, self._update_entry),
+                          rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified)]
+
+    def close(self) -> None:
+        """Withdraws the services; may be called twice."""
+        while self._services:
+            self._services.pop().shutdown("the manager is closed")
+
+    def _set_init(self, request: Any) -> SetInitACMResponse:
+        try:
+            indices = rospy.get_param(INDICES_PARAMETER, [])
+            if not isinstance(indices, list) or not all(type(index) is int for index in indices):
+                raise AcmError(f"parameter '{rospy.resolve_name(INDICES_PARAMETER)}' is {indices!r}, "
+                               "expected a list of whole numbers")
+            prefix = str(rospy.get_param(PREFIX_PARAMETER, ""))
+            if self.manager.set_initial(matrix_from_message(request.acm), indices, prefix):
+                rospy.loginfo("set_init_acm: an earlier reference collision matrix was replaced.")
+            return SetInitACMResponse(success=True)
+        except (AcmError, rospy.ROSException) as error:
+            rospy.logerr("set_init_acm: %s", error)
+            return SetInitACMResponse(success=False)
+
+    def _update_entry(self, request: Any) -> UpdateACMEntryResponse:
+        try:
+            warning = self._apply_update(request.action, request.entry_name)
+        except AcmError as error:
+            rospy.logerr("update_acm_entry: %s", error)
+            return UpdateACMEntryResponse(success=False)
+        if warning:
+            rospy.logwarn("update_acm_entry: %s", warning)
+        return UpdateACMEntryResponse(success=True)
+
+    def _apply_update(self, action: int, entry_name: str) -> str:
+        match action:
+            case UpdateACMEntryRequest.ADD_ENTRY:
+                return self.manager.add_object(entry_name)
+            case UpdateACMEntryRequest.DELETE_ENTRY:
+                return self.manager.delete_object(entry_name)
+            case UpdateACMEntryRequest.REINIT:
+                self.manager.reinitialise()
+                return ""
+            case _:
+                raise AcmError(f"got action {action}, allowed are ADD_ENTRY=0, DELETE_ENTRY=1, REINIT=2")
+
+    def _get_modified(self, request: Any) -> GetModifiedACMResponse:
+        try:
+            answer = self._modify(request)
+        except AcmError as error:
+            rospy.logerr("get_modified_acm: %s", error)
+            return GetModifiedACMResponse(success=False)
+        for warning in answer.warnings:
+            rospy.logwarn("get_modified_acm: %s", warning)
+        return GetModifiedACMResponse(acm=matrix_to_message(answer.matrix), success=True)
+
+    def _modify(self, request: Any) -> AcmAnswer:
+        match request.modification:
+            case GetModifiedACMRequest.NOTHING:
+                return self.manager.current()
+            case GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION:
+                return self.manager.allow_self_collision(request.allow_collision)
+            case GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION:
+                return self.manager.allow_object_collision(request.objects, request.allow_collision)
+            case _:
+                raise AcmError(f"got modification {request.modification}, allowed are NOTHING=0, "
+                               "MANIPULATOR_SELF_COLLISION=1, MANIPULATOR_OBJECT_COLLISION=2")

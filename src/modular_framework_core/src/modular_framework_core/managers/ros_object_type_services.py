@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Serves the types of simulated objects on the wire."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+
+from modular_framework_core.managers.object_types import ObjectTypeError, ObjectTypes
+from modular_framework_core.srv import (
+    AddGazeboMapping,
+    AddGazeboMappingResponse,
+    DeleteGazeboMapping,
+    DeleteGazeboMappingResponse,
+    GetGazeboType,
+    GetGazeboTypeResponse,
+)
+
+
+class ObjectTypeServices:
+    """The object types behind their services.
+
+    Services:
+        ``add_gazebo_mapping`` (AddGazeboMapping), ``get_object_type`` (GetGazeboType),
+        ``delete_gazebo_mapping`` (DeleteGazeboMapping).
+    """
+
+    def __init__(self) -> None:
+        """Makes an empty map; nothing is advertised before :meth:`connect`."""
+        self.types = ObjectTypes()
+        self._services: list[rospy.Service] = []
+
+    def connect(self) -> None:
+        """Advertises the services."""
+        self._services = [rospy.Service("add_gazebo_mapping", AddGazeboMapping, self._add),
+                          rospy.Service("get_object_type", GetGazeboType, self._get),
+                          rospy.Service("delete_gazebo_mapping", DeleteGazeboMapping, self._delete)]
+
+    def close(self) -> None:
+        """Withdraws the services; may be called twice."""
+        while self._services:
+            self._services.pop().shutdown("the manager is closed")
+
+    def _add(self, request: Any) -> AddGazeboMappingResponse:
+        try:
+            self.types.add(request.object_name, request.object_type)
+            return AddGazeboMappingResponse(success=True)
+        except ObjectTypeError as error:
+            rospy.logwarn("add_gazebo_mapping: %s", error)
+            return AddGazeboMappingResponse(success=False)
+
+    def _get(self, request: Any) -> GetGazeboTypeResponse:
+        try:
+            return GetGazeboTypeResponse(object_type=self.types.get(request.object_name), success=True)
+        except ObjectTypeError as error:
+            rospy.logdebug("get_object_type: %s", error)
+            return GetGazeboTypeResponse(success=False)
+
+    def _delete(self, request: Any) -> DeleteGazeboMappingResponse:
+        try:
+            self.types.delete(request.object_name)
+            return DeleteGazeboMappingResponse(success=True)
+        except ObjectTypeError as error:
+            rospy.logwarn("delete_gazebo_mapping: %s", error)
+            return DeleteGazeboMappingResponse(success=False)

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The managers answer on the wire as clients of the original expect, without its defects."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import rospy
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
+from sensor_msgs.msg import JointState
+
+from modular_framework_core import srv
+from modular_framework_core.msg import StandardisedGrasp
+from modular_framework_core.srv import GetModifiedACMRequest, UpdateACMEntryRequest
+
+JOINT_STATES = """
+up: {a: 1.5707963268, b: 0.1}
+broken: {a: much}
+down: {b: -0.2, a: 0}
+"""
+TRAJECTORIES = """
+swing:
+  - {name: up, interpolate_time: 0.4, pause_time: 0.25}
+  - {name: down, interpolate_time: 0.4}
+lost:
+  - {name: nowhere, interpolate_time: 0.4}
+"""
+
+
+@pytest.fixture(scope="module")
+def managers(ros_launch, tmp_path_factory: pytest.TempPathFactory):
+    folder: Path = tmp_path_factory.mktemp("config")
+    (folder / "states.yaml").write_text(JOINT_STATES)
+    (folder / "trajectories.yaml").write_text(TRAJECTORIES)
+    session = ros_launch(f"""<launch>
+      <rosparam param="manipulator_links_indices">[1, 2]</rosparam>
+      <node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"
+            args="{folder}/states.yaml {folder}/trajectories.yaml"/></launch>""")
+    session.wait_for_service("/get_object_type", 20)
+    session.wait_for_service("/set_init_acm", 20)
+    return session
+
+
+def call(name: str, service_type, *args, **fields):
+    proxy = rospy.ServiceProxy(name, service_type)
+    proxy.wait_for_service(10)
+    return proxy(*args, **fields)
+
+
+def test_joint_states_of_the_file_keep_full_precision_and_survive_a_bad_neighbour(managers):
+    answer = call("get_joint_state", srv.GetJointState, "up")
+    assert answer.success
+    assert answer.joint_state.name == ["a", "b"]
+    assert answer.joint_state.position == (1.5707963268, 0.1)
+    assert call("get_joint_state", srv.GetJointState, "down").success
+    assert not call("get_joint_state", srv.GetJointState, "broken").success
+    assert "states.yaml:3" in managers.log()
+
+
+def test_trajectories_of_the_file_are_timed_and_a_bad_one_is_dropped(managers):
+    answer = call("get_trajectory", srv.GetJointTrajectory, "swing")
+    assert answer.success
+    times = [point.time_from_start.to_sec() for point in answer.joint_trajectory.points]
+    assert times == pytest.approx([0.4, 0.65, 1.05])
+    assert not call("get_trajectory", srv.GetJointTrajectory, "lost").success
+
+
+def test_anonymous_messages_come_out_oldest_first_and_only_once(managers):
+    for value in (1.0, 2.0, 3.0):
+        assert call("add_joint_state", srv.AddJointState, JointState(position=[value]), "").success
+    got = [call("get_joint_state", srv.GetJointState, "").joint_state.position[0] for _ in range(3)]
+    assert got == [1.0, 2.0, 3.0]
+    empty = call("get_joint_state", srv.GetJointState, "")
+    assert not empty.success
+    assert empty.joint_state == JointState()
+
+
+def test_named_messages_are_overwritten_and_stay_after_reading(managers):
+    for frame in ("first", "second"):
+        pose = PoseStamped()
+        pose.header.frame_id = frame
+        assert call("add_pose_stamped", srv.AddPoseStamped, pose, "place").success
+    for service in ("get_pose_stamped", "get_pose", "get_pose"):
+        answer = call(service, srv.GetPoseStamped, "place")
+        assert answer.success
+        assert answer.pose_stamped.header.frame_id == "second"
+
+
+def test_a_grasp_without_id_takes_its_name(managers):
+    call("add_grasp", srv.AddStandardisedGrasp, StandardisedGrasp(), "top")
+    assert call("get_grasp", srv.GetStandardisedGrasp, "top").grasp_message.grasp_id == "top"
+    call("add_grasp", srv.AddStandardisedGrasp, StandardisedGrasp(grasp_id="own"), "side")
+    assert call("get_grasp", srv.GetStandardisedGrasp, "side").grasp_message.grasp_id == "own"
+
+
+@pytest.mark.parametrize(("suffix", "get_type"), [
+    ("plan", srv.GetMoveitPlan), ("grasp", srv.GetStandardisedGrasp), ("trajectory", srv.GetJointTrajectory),
+    ("robot_pose", srv.GetRobotPose)])
+def test_every_manager_says_no_instead_of_raising(managers, suffix, get_type):
+    assert not call(f"get_{suffix}", get_type, "nobody").success
+    assert not call(f"get_{suffix}", get_type, "").success
+
+
+def test_object_types_are_unique_until_deleted(managers):
+    assert call("add_gazebo_mapping", srv.AddGazeboMapping, "box_1", "box").success
+    assert not call("add_gazebo_mapping", srv.AddGazeboMapping, "box_1", "can").success
+    assert call("get_object_type", srv.GetGazeboType, "box_1").object_type == "box"
+    assert call("delete_gazebo_mapping", srv.DeleteGazeboMapping, "box_1").success
+    assert not call("delete_gazebo_mapping", srv.DeleteGazeboMapping, "box_1").success
+    assert not call("get_object_type", srv.GetGazeboType, "box_1").success
+
+
+def matrix(names: list[str], allowed: list[tuple[str, str]]) -> AllowedCollisionMatrix:
+    rows = [AllowedCollisionEntry(enabled=[(a, b) in allowed or (b, a) in allowed for b in names]) for a in names]
+    return AllowedCollisionMatrix(entry_names=names, entry_values=rows)
+
+
+def allowed(acm: AllowedCollisionMatrix, first: str, second: str) -> bool:
+    return acm.entry_values[acm.entry_names.index(first)].enabled[acm.entry_names.index(second)]
+
+
+def test_the_collision_matrix_serves_allow_and_restore(managers):
+    assert not call("get_modified_acm", srv.GetModifiedACM, GetModifiedACMRequest.NOTHING, [], False).success
+    assert call("update_acm_entry", srv.UpdateACMEntry, UpdateACMEntryRequest.ADD_ENTRY, "early").success
+    assert call("set_init_acm", srv.SetInitACM, matrix(["arm", "palm", "finger"], [("palm", "finger")])).success
+    touch = GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION
+    answer = call("get_modified_acm", srv.GetModifiedACM, touch, [], True)
+    assert answer.success
+    assert allowed(answer.acm, "palm", "early__link")
+    assert allowed(answer.acm, "finger", "early__link")
+    assert not allowed(answer.acm, "arm", "early__link")
+    answer = call("get_modified_acm", srv.GetModifiedACM, touch, ["early"], False)
+    assert not allowed(answer.acm, "palm", "early__link")
+    assert allowed(answer.acm, "palm", "finger")
+    assert not call("update_acm_entry", srv.UpdateACMEntry, 9, "x").success
+    assert not call("update_acm_entry", srv.UpdateACMEntry, UpdateACMEntryRequest.ADD_ENTRY, "").success
+    assert not call("get_modified_acm", srv.GetModifiedACM, 9, [], True).success
+
+
+def test_the_links_of_the_manipulator_are_read_again_with_every_reference_matrix(managers):
+    names = ["arm", "thumb"]
+    rospy.set_param("manipulator_links_indices", [1])
+    assert call("set_init_acm", srv.SetInitACM, matrix(names, [])).success
+    answer = call("get_modified_acm", srv.GetModifiedACM, GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION,
+                  ["early"], True)
+    assert allowed(answer.acm, "thumb", "early__link")
+    assert not allowed(answer.acm, "arm", "early__link")
+    rospy.set_param("manipulator_links_indices", [7])
+    assert not call("set_init_acm", srv.SetInitACM, matrix(names, [])).success
+    assert managers.alive()
