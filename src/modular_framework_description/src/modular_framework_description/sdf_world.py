@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads which collision shapes an SDF world puts where, following its ``model://`` includes.
+
+Covers what set-up worlds are made of: models written out or included, their links, and box, cylinder, sphere and
+plane shapes. Anything else is refused by name, because a planning scene with a hole in it is worse than none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+
+from modular_framework_description.solids import rotation_from_rpy
+
+Array = npt.NDArray[np.float64]
+
+
+class WorldError(ValueError):
+    """A world or model file cannot be read; the message says where, what was got and what is allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedShape:
+    """A collision shape in the world.
+
+    Attributes:
+        kind: "box", "cylinder", "sphere" or "plane".
+        size: (x, y, z), (radius, length), (radius,) [m], or the normal of a plane.
+        pose: 4x4 transform of the shape in the world frame.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    pose: Array
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedLink:
+    """A link of a model in the world; its planning scene object is called ``<model>__<link>``."""
+
+    model: str
+    link: str
+    pose: Array
+    shapes: tuple[PlacedShape, ...]
+
+    @property
+    def object_id(self) -> str:
+        """Name of the link's object in a planning scene."""
+        return f"{self.model}__{self.link}"
+
+
+def transform_from_pose_text(text: str, where: str) -> Array:
+    """Return the 4x4 transform of an SDF pose "x y z roll pitch yaw" [m, rad]; an empty text is the identity."""
+    values = [float(value) for value in text.split()] or [0.0] * 6
+    if len(values) != 6:
+        raise WorldError(f"{where}: pose has {len(values)} numbers, allowed 6 (x y z roll pitch yaw)")
+    transform = np.eye(4)
+    transform[:3, :3] = rotation_from_rpy((values[3], values[4], values[5]))
+    transform[:3, 3] = values[:3]
+    return transform
+
+
+def _pose_of(element: ElementTree.Element, where: str) -> Array:
+    return transform_from_pose_text(element.findtext("pose", ""), where)
+
+
+def _floats(element: ElementTree.Element, tag: str) -> tuple[float, ...]:
+    return tuple(float(value) for value in element.findtext(tag, "").split())
+
+
+def _shape_of(collision: ElementTree.Element, pose: Array, where: str) -> PlacedShape:
+    geometry = collision.find("geometry")
+    shape = None if geometry is None else next(iter(geometry), None)
+    kind = "nothing" if shape is None else shape.tag
+    tags = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "plane": ("normal",)}
+    if shape is None or kind not in tags:
+        raise WorldError(f"{where}: collision geometry is {kind}, allowed {sorted(tags)}")
+    size = tuple(value for tag in tags[kind] for value in _floats(shape, tag))
+    return PlacedShape(kind, size, pose @ _pose_of(collision, where))
+
+
+def _links_of(model: ElementTree.Element, name: str, pose: Array) -> list[PlacedLink]:
+    links = []
+    for link in model.findall("link"):
+        where = f"model '{name}', link '{link.get('name')}'"
+        link_pose = pose @ _pose_of(link, where)
+        shapes = tuple(_shape_of(collision, link_pose, where) for collision in link.findall("collision"))
+        links.append(PlacedLink(name, str(link.get("name")), link_pose, shapes))
+    return links
+
+
+def _included_model(include: ElementTree.Element, models_dir: Path) -> ElementTree.Element:
+    uri = include.findtext("uri", "").strip()
+    folder = models_dir / uri.removeprefix("model://")
+    if not uri.startswith("model://") or not (folder / "model.sdf").is_file():
+        available = sorted(path.parent.name for path in models_dir.glob("*/model.sdf"))
+        raise WorldError(f"include '{uri}': no such model under {models_dir}, allowed model:// and one of {available}")
+    model = ElementTree.parse(folder / "model.sdf").getroot().find("model")
+    if model is None:
+        raise WorldError(f"{folder / 'model.sdf'}: no <model> element")
+    return model
+
+
+def read_world(world_file: Path, models_dir: Path) -> list[PlacedLink]:
+    """Return every link of a world in file order.
+
+    Args:
+        world_file: the ``.world`` file.
+        models_dir: folder that ``model://`` stands for.
+
+    Raises:
+        WorldError: when a model is missing or uses a shape that cannot be put into a scene.
+    """
+    world = ElementTree.parse(world_file).getroot().find("world")
+    if world is None:
+        raise WorldError(f"{world_file}: no <world> element")
+    links: list[PlacedLink] = []
+    for entry in world:
+        if entry.tag == "include":
+            model = _included_model(entry, models_dir)
+            name = entry.findtext("name", str(model.get("name"))).strip()
+            source = entry if entry.find("pose") is not None else model
+            links += _links_of(model, name, _pose_of(source, f"include '{name}'"))
+        elif entry.tag == "model":
+            name = str(entry.get("name"))
+            links += _links_of(entry, name, _pose_of(entry, f"model '{name}'"))
+    return links
