@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes a model as the URDF the physics engine loads.
+
+The engine's URDF loader handles inertia tensors, compounds of shapes, joint limits and meshes in one call, which its
+function interface does not. A static model becomes one link that carries the shapes of all its links.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.poses import Pose, rpy_from_quaternion
+
+STATIC_LINK = "static"
+"""Name of the one link of a static model in the written URDF."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyUrdf:
+    """A model in the engine's language.
+
+    Attributes:
+        text: The URDF.
+        root_in_model: Pose of the URDF's root link in the model frame.
+        inertia_from_file: Whether the description gives inertias; otherwise the engine computes them from the shapes.
+    """
+
+    text: str
+    root_in_model: Pose
+    inertia_from_file: bool
+
+
+def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: bool) -> BodyUrdf:
+    """Translates a model.
+
+    Args:
+        model: What to translate; its pose plays no role.
+        convex_parts: Cuts meshes for the engine.
+        with_visuals: Whether somebody will look at it.
+
+    Raises:
+        DescriptionError: A mesh cannot be used.
+    """
+    writer = _Writer(convex_parts, with_visuals)
+    if model.static:
+        shapes = [writer.shapes(link, link.pose, exact=True) for link in model.links]
+        body = f'<link name="{STATIC_LINK}">{"".join(shapes)}</link>'
+        return BodyUrdf(_robot(model.name, [body]), Pose(), True)
+    # URDF puts a link's frame at the joint above it, SDF anywhere; `frame_in_link` bridges the two.
+    joints = [joint for joint in model.joints if joint.parent != "world"]
+    frame_in_link = {link.name: Pose() for link in model.links}
+    frame_in_link.update({joint.child: joint.pose for joint in joints})
+    poses = {link.name: link.pose for link in model.links}
+    parts = [
+        f"<link name={quoteattr(link.name)}>{writer.inertial(link, frame_in_link[link.name].inverse())}"
+        f"{writer.shapes(link, frame_in_link[link.name].inverse(), exact=False)}</link>"
+        for link in model.links
+    ]
+    for joint in joints:
+        parent_frame = poses[joint.parent] @ frame_in_link[joint.parent]
+        parts.append(_joint(joint, parent_frame.inverse() @ poses[joint.child] @ joint.pose))
+    children = {joint.child for joint in joints}
+    root = next(link for link in model.links if link.name not in children)
+    has_inertia = all(link.inertial is not None for link in model.links)
+    return BodyUrdf(_robot(model.name, parts), root.pose, has_inertia)
+
+
+class _Writer:
+    def __init__(self, convex_parts: ConvexParts, with_visuals: bool) -> None:
+        self._convex_parts = convex_parts
+        self._with_visuals = with_visuals
+
+    def shapes(self, link: specs.Link, shift: Pose, exact: bool) -> str:
+        """Writes the shapes of a link, moved by `shift` into the frame of the URDF link."""
+        text = ""
+        for collision in link.collisions:
+            for geometry, attributes in self._collision_geometries(collision.geometry, exact):
+                text += f"<collision{attributes}>{_origin(shift @ collision.pose)}{geometry}</collision>"
+        if self._with_visuals:
+            for number, visual in enumerate(link.visuals):
+                colour = " ".join(f"{value:g}" for value in visual.colour)
+                material = f'<material name="{link.name}_{number}"><color rgba="{colour}"/></material>'
+                text += f"<visual>{_origin(shift @ visual.pose)}{_geometry(visual.geometry)}{material}</visual>"
+        return text
+
+    def inertial(self, link: specs.Link, shift: Pose) -> str:
+        """Writes the mass properties of a link."""
+        inertial = link.inertial or specs.Inertial(Pose(), 1.0, (1e-3, 0, 0, 1e-3, 0, 1e-3))
+        names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        moments = " ".join(f'{name}="{value!r}"' for name, value in zip(names, inertial.inertia, strict=True))
+        return (
+            f"<inertial>{_origin(shift @ inertial.pose)}"
+            f'<mass value="{inertial.mass!r}"/><inertia {moments}/></inertial>'
+        )
+
+    def _collision_geometries(self, geometry: specs.Geometry, exact: bool) -> Iterable[tuple[str, str]]:
+        if isinstance(geometry, specs.Mesh):
+            if exact:
+                return [(_mesh_file(str(self._convex_parts.exact(geometry))), ' concave="yes"')]
+            return [(_mesh_file(str(file)), "") for file in self._convex_parts.parts(geometry)]
+        return [(_geometry(geometry), "")]
+
+
+def _robot(name: str, parts: list[str]) -> str:
+    return f'<?xml version="1.0"?>\n<robot name={quoteattr(name)}>\n' + "\n".join(parts) + "\n</robot>\n"
+
+
+def _joint(joint: specs.Joint, pose_in_parent: Pose) -> str:
+    kind, limit = joint.kind.value, ""
+    if joint.kind in (specs.JointType.REVOLUTE, specs.JointType.PRISMATIC):
+        lower, upper = joint.lower, joint.upper
+        if kind == "revolute" and not (math.isfinite(lower) and math.isfinite(upper)):
+            kind = "continuous"
+        else:
+            bounds = (max(lower, -1e3), min(upper, 1e3))
+            limit = f'<limit lower="{bounds[0]!r}" upper="{bounds[1]!r}" effort="0" velocity="100"/>'
+    axis = " ".join(repr(value) for value in joint.axis)
+    return (
+        f'<joint name={quoteattr(joint.name)} type="{kind}">{_origin(pose_in_parent)}'
+        f"<parent link={quoteattr(joint.parent)}/><child link={quoteattr(joint.child)}/>"
+        f'<axis xyz="{axis}"/>{limit}</joint>'
+    )
+
+
+def _origin(pose: Pose) -> str:
+    xyz = " ".join(repr(value) for value in pose.position)
+    rpy = " ".join(repr(value) for value in rpy_from_quaternion(pose.quaternion))
+    return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+
+
+def _mesh_file(path: str) -> str:
+    return f"<geometry><mesh filename={quoteattr(path)}/></geometry>"
+
+
+def _geometry(geometry: specs.Geometry) -> str:
+    match geometry:
+        case specs.Box(size=(x, y, z)):
+            shape = f'<box size="{x!r} {y!r} {z!r}"/>'
+        case specs.Cylinder(radius=radius, length=length):
+            shape = f'<cylinder radius="{radius!r}" length="{length!r}"/>'
+        case specs.Sphere(radius=radius):
+            shape = f'<sphere radius="{radius!r}"/>'
+        case specs.Plane(normal=(x, y, z)):
+            shape = f'<plane normal="{x!r} {y!r} {z!r}"/>'
+        case specs.Mesh(path=path, scale=(x, y, z)):
+            shape = f'<mesh filename={quoteattr(str(path))} scale="{x!r} {y!r} {z!r}"/>'
+    return f"<geometry>{shape}</geometry>"

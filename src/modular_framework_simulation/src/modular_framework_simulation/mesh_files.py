@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads mesh files, and cuts them into convex parts for the physics engine.
+
+The engine computes contacts of convex bodies only, so a mesh that is not convex is decomposed by CoACD. That takes
+seconds, therefore the parts are kept in a cache folder under a name made of the mesh's own content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.sdf_specs import Mesh
+
+_CACHE_VERSION = "1"
+_CONCAVITY_THRESHOLD = 0.03
+"""CoACD's measure of how much a part may differ from its hull, relative to the size of the mesh."""
+
+_CONVEX_VOLUME_SHARE = 0.985
+"""A mesh that fills this share of its convex hull is treated as convex."""
+
+
+@dataclass(frozen=True, slots=True)
+class TriangleMesh:
+    """Triangles in the frame of the shape.
+
+    Attributes:
+        vertices: shape (n, 3) [m].
+        triangles: Indices of vertices, shape (m, 3), counter-clockwise seen from outside.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+
+def load_mesh(mesh: Mesh) -> TriangleMesh:
+    """Reads a mesh file, exactly as it is, and scales it.
+
+    Raises:
+        DescriptionError: The file holds no triangles or cannot be read.
+    """
+    import trimesh  # slow to load, and a warm cache needs it not at all
+
+    try:
+        loaded: Any = trimesh.load(mesh.path, force="mesh")
+    except Exception as error:  # the readers behind trimesh raise whatever they like on a broken file
+        problem = f"cannot be read as a mesh ({error})"
+        raise DescriptionError(str(mesh.path), problem, "allowed: stl, obj, dae") from error
+    vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
+    triangles = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
+    if len(triangles) == 0 or not np.isfinite(vertices).all():
+        raise DescriptionError(str(mesh.path), f"holds {len(triangles)} usable triangles", "expected at least one")
+    return TriangleMesh(vertices * np.asarray(mesh.scale), triangles)
+
+
+def default_cache_folder() -> Path:
+    """Returns where convex parts are kept: below $ROS_HOME, or ~/.ros without it."""
+    home = os.environ.get("ROS_HOME") or str(Path.home() / ".ros")
+    return Path(home) / "modular_framework" / "convex_parts"
+
+
+class ConvexParts:
+    """Gives the convex parts of meshes as .obj files, from the cache when they are there.
+
+    Args:
+        cache_folder: Made when first needed.
+    """
+
+    def __init__(self, cache_folder: Path) -> None:
+        self._cache_folder = cache_folder
+
+    def hull(self, mesh: Mesh) -> Path:
+        """Returns an .obj file with the convex hull of a mesh.
+
+        Raises:
+            DescriptionError: The mesh cannot be read or has no volume.
+        """
+        return self._cached(mesh, "hull")[0]
+
+    def parts(self, mesh: Mesh) -> tuple[Path, ...]:
+        """Returns .obj files of convex parts that together make up the mesh; one if it is convex already.
+
+        Raises:
+            DescriptionError: The mesh cannot be read or has no volume.
+        """
+        return self._cached(mesh, "parts")
+
+    def exact(self, mesh: Mesh) -> Path:
+        """Returns an .obj file with the triangles as they are, for bodies that never move."""
+        return self._cached(mesh, "exact")[0]
+
+    def _cached(self, mesh: Mesh, kind: str) -> tuple[Path, ...]:
+        try:
+            content = mesh.path.read_bytes()
+        except OSError as error:
+            raise DescriptionError(str(mesh.path), f"cannot be read ({error})", "give a readable mesh file") from error
+        key = hashlib.sha256(content)
+        key.update(f"{mesh.scale}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
+        folder = self._cache_folder / f"{mesh.path.stem}-{kind}-{key.hexdigest()[:20]}"
+        if not folder.is_dir():
+            self._write_atomically(folder, self._make(mesh, kind))
+        return tuple(sorted(folder.glob("*.obj")))
+
+    @staticmethod
+    def _make(mesh: Mesh, kind: str) -> list[TriangleMesh]:
+        import trimesh
+
+        loaded = load_mesh(mesh)
+        if kind == "exact":
+            return [loaded]
+        try:
+            solid = trimesh.Trimesh(loaded.vertices, loaded.triangles)
+            hull = solid.convex_hull
+        except Exception as error:  # qhull reports flat point sets by its own exceptions
+            raise DescriptionError(str(mesh.path), f"has no convex hull ({error})", "expected a solid") from error
+        filled = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
+        if kind == "hull" or filled > _CONVEX_VOLUME_SHARE:
+            return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]
+        return _decompose(loaded)
+
+    def _write_atomically(self, folder: Path, parts: list[TriangleMesh]) -> None:
+        self._cache_folder.mkdir(parents=True, exist_ok=True)
+        scratch = Path(tempfile.mkdtemp(dir=self._cache_folder))
+        for index, part in enumerate(parts):
+            (scratch / f"part_{index:03d}.obj").write_text(_obj_text(part), encoding="ascii")
+        scratch.chmod(0o755)
+        try:
+            scratch.rename(folder)
+        except OSError:
+            # Another process finished the same mesh first; its result is as good as ours.
+            for file in scratch.iterdir():
+                file.unlink()
+            scratch.rmdir()
+
+
+def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:
+    import coacd  # loading it takes long and most worlds never need it
+
+    coacd.set_log_level("error")
+    pieces = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.triangles), threshold=_CONCAVITY_THRESHOLD, seed=1)
+    return [TriangleMesh(np.asarray(vertices), np.asarray(faces)) for vertices, faces in pieces]
+
+
+def _obj_text(mesh: TriangleMesh) -> str:
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.triangles]
+    return "\n".join(lines) + "\n"

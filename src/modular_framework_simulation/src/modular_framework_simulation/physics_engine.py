@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One connection to the physics engine, set up the way this package needs it.
+
+Everything here must be called from one thread: the engine keeps global state.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from modular_framework_simulation.errors import DescriptionError, SimulationError
+from modular_framework_simulation.physics_settings import PhysicsSettings
+from modular_framework_simulation.poses import Vector3
+
+BASE_INDEX = -1
+"""The engine's number of a body's root link."""
+
+Log = Callable[[str], None]
+
+
+@contextlib.contextmanager
+def _silenced() -> Iterator[None]:
+    """Keeps the engine's C++ code from writing to the terminal; its problems come back as exceptions."""
+    saved = os.dup(1)
+    try:
+        with open(os.devnull, "w") as nothing:
+            os.dup2(nothing.fileno(), 1)
+            yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(saved)
+
+
+class PhysicsEngine:
+    """A physics engine with nothing in it.
+
+    Args:
+        settings: Numbers of the engine.
+        gravity: [m/s^2]
+        gui: Whether to open a window; without a display there is none, and a log line says so.
+        log: Takes a line of text about what was decided.
+    """
+
+    def __init__(self, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> None:
+        with _silenced():
+            import pybullet  # prints its build date when loaded
+
+        self.api: Any = pybullet
+        self.settings = settings
+        self.client = -1
+        self.has_window = False
+        if gui:
+            self._open_window(log)
+        if self.client < 0:
+            self.client = self.api.connect(self.api.DIRECT)
+        if self.client < 0:
+            raise SimulationError("the physics engine accepts no further connection; end another simulation first")
+        self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
+        self._files_written = 0
+        self._configure(gravity)
+
+    def _open_window(self, log: Log) -> None:
+        if not os.environ.get("DISPLAY"):
+            log("a window of the simulation was asked for, but there is no display: running headless")
+            return
+        try:
+            self.client = self.api.connect(self.api.GUI)
+        except self.api.error as error:
+            log(f"no window of the simulation could be opened ({error}): running headless")
+        self.has_window = self.client >= 0
+
+    def _configure(self, gravity: Vector3) -> None:
+        settings = self.settings
+        self.api.setGravity(*gravity, physicsClientId=self.client)
+        self.api.setPhysicsEngineParameter(
+            fixedTimeStep=settings.time_step_s,
+            numSolverIterations=settings.solver_iterations,
+            numSubSteps=0,
+            contactERP=settings.contact_erp,
+            frictionERP=settings.friction_erp,
+            enableConeFriction=1,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )
+        if self.has_window:
+            self.api.configureDebugVisualizer(self.api.COV_ENABLE_GUI, 0, physicsClientId=self.client)
+
+    def load_urdf(self, text: str, name: str, fixed: bool, flags: int) -> int:
+        """Loads a body at the world origin.
+
+        Args:
+            text: URDF with absolute mesh paths.
+            name: Named in the error.
+            fixed: Whether its root link is fastened to the world.
+            flags: The engine's URDF_ flags.
+
+        Returns:
+            The engine's number of the body.
+
+        Raises:
+            DescriptionError: The engine refuses the description.
+        """
+        # The engine remembers files by name, so each body needs a file of its own.
+        self._files_written += 1
+        file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
+        file.write_text(text, encoding="utf-8")
+        try:
+            with _silenced():
+                body: int = self.api.loadURDF(str(file), useFixedBase=fixed, flags=flags, physicsClientId=self.client)
+            file.unlink()
+        except self.api.error as error:
+            problem = f"is refused by the physics engine ({error})"
+            raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
+        return body
+
+    def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
+        """Returns the engine's record of every joint of a body, in the order of the link numbers."""
+        count = self.api.getNumJoints(body, physicsClientId=self.client)
+        return [self.api.getJointInfo(body, index, physicsClientId=self.client) for index in range(count)]
+
+    def step(self) -> None:
+        """Advances the physics by one time step."""
+        self.api.stepSimulation(physicsClientId=self.client)
+
+    def close(self) -> None:
+        """Ends the connection; may be called twice."""
+        if self.client >= 0:
+            with contextlib.suppress(self.api.error):
+                self.api.disconnect(physicsClientId=self.client)
+            self.client = -1
+            self._urdf_folder.cleanup()

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The numbers that decide how well the simulated world behaves, each with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsSettings:
+    """Settings of the physics engine.
+
+    Attributes:
+        time_step_ns: One physics step [ns]; an integer, so that simulated time never drifts. 2.5 ms is short enough for
+            a grasp held by friction to stay still, and four steps make one tick of a 100 Hz clock.
+        solver_iterations: Of the contact solver. A grasped object hangs in a chain arm - finger - object; with fewer
+            than about 50 iterations the solver leaves slip behind in that chain.
+        contact_erp: Share of a penetration that is corrected in one step; low, since a grasp is a standing penetration.
+        friction_erp: Share of the accumulated slip that is corrected in one step.
+        body_spinning_friction: Resistance of objects against spinning about a contact normal [m], where the
+            model does not say; about the radius of a small contact patch.
+        body_rolling_friction: Resistance of objects against rolling [m]; brings balls to rest on a table.
+        pad_friction: Lateral friction of the gripper's links (rubber pads). The engine multiplies the coefficients of
+            both sides of a contact.
+        pad_spinning_friction: Of the gripper's links [m]; soft pads touch over an area.
+        pad_rolling_friction: Of the gripper's links [m].
+    """
+
+    time_step_ns: int = 2_500_000
+    solver_iterations: int = 60
+    contact_erp: float = 0.2
+    friction_erp: float = 0.2
+    body_spinning_friction: float = 0.0005
+    body_rolling_friction: float = 0.0001
+    pad_friction: float = 1.2
+    pad_spinning_friction: float = 0.005
+    pad_rolling_friction: float = 0.0005
+
+    @property
+    def time_step_s(self) -> float:
+        """One physics step [s]."""
+        return self.time_step_ns * 1e-9

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The simulated world: models in it, and time that advances one physics step at a call.
+
+All calls come from one thread, the one that owns the loop.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from dataclasses import dataclass, replace
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.body_urdf import STATIC_LINK, model_to_urdf
+from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.physics_engine import Log, PhysicsEngine
+from modular_framework_simulation.physics_settings import PhysicsSettings
+from modular_framework_simulation.poses import Pose, Vector3, rotate_vector
+from modular_framework_simulation.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
+
+WORLD_FRAMES = ("", "world", "map")
+"""Names that stand for the frame of the world in requests."""
+
+SCOPE = "::"
+"""Separates model and link in the name of an entity, as in model::link."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A touch between two links.
+
+    Attributes:
+        model: The other model.
+        force: Normal force [N].
+        distance: Negative when they penetrate [m].
+    """
+
+    model: str
+    force: float
+    distance: float
+
+
+class PhysicsWorld:
+    """Models, a robot or two, and simulated time.
+
+    Args:
+        settings: Numbers of the physics engine.
+        convex_parts: Cuts meshes for the engine.
+        gravity: [m/s^2]
+        gui: Whether to open a window, if there is a display.
+        log: Takes lines of text about what was decided.
+    """
+
+    def __init__(
+        self,
+        settings: PhysicsSettings,
+        convex_parts: ConvexParts,
+        gravity: Vector3 = (0.0, 0.0, -9.8),
+        gui: bool = False,
+        log: Log = print,
+    ) -> None:
+        self.settings = settings
+        self.gravity = gravity
+        self.engine = PhysicsEngine(settings, gravity, gui, log)
+        self._convex_parts = convex_parts
+        self._bodies: dict[str, SimulatedBody] = {}
+        self._names_by_number: dict[int, str] = {}
+        self._initial_poses: dict[str, Pose] = {}
+        self._steps = 0
+        self.revision = 0
+        """Changes whenever a model appears, disappears or is put elsewhere by a request."""
+
+    @property
+    def time_ns(self) -> int:
+        """Simulated time [ns] since the start or the last reset."""
+        return self._steps * self.settings.time_step_ns
+
+    @property
+    def steps(self) -> int:
+        """Physics steps since the start or the last reset."""
+        return self._steps
+
+    def step(self) -> None:
+        """Advances the world by one time step."""
+        self.engine.step()
+        self._steps += 1
+
+    def names(self) -> list[str]:
+        """Returns the names of all models, in order of appearance."""
+        return list(self._bodies)
+
+    def body(self, name: str) -> SimulatedBody:
+        """Returns a model.
+
+        Raises:
+            UnknownEntityError: There is no such model.
+        """
+        body = self._bodies.get(name)
+        if body is None:
+            raise UnknownEntityError("model", name, self.names())
+        return body
+
+    def name_of(self, number: int) -> str:
+        """Returns the name of the model that has this number in the engine."""
+        return self._names_by_number[number]
+
+    def spawn(self, model: specs.Model) -> SimulatedBody:
+        """Adds a model at its pose.
+
+        Raises:
+            DuplicateModelError: Its name is taken.
+            DescriptionError: The engine cannot represent it.
+        """
+        if model.name in self._bodies:
+            raise DuplicateModelError(model.name)
+        api = self.engine.api
+        written = model_to_urdf(model, self._convex_parts, self.engine.has_window)
+        flags = api.URDF_USE_INERTIA_FROM_FILE if written.inertia_from_file else 0
+        fixed = model.static or any(joint.parent == "world" for joint in model.joints)
+        number = self.engine.load_urdf(written.text, model.name, fixed, flags)
+        body = SimulatedBody(self.engine, number, model.name, written.root_in_model, model.static, model)
+        self._set_surfaces(body, model)
+        self.add(body, model.pose)
+        return body
+
+    def add(self, body: SimulatedBody, pose: Pose) -> None:
+        """Takes a body that is already in the engine under the world's care, and puts it at a pose."""
+        if body.name in self._bodies:
+            raise DuplicateModelError(body.name)
+        body.set_state(BodyState(pose, Twist()))
+        self._bodies[body.name] = body
+        self._names_by_number[body.number] = body.name
+        self._initial_poses[body.name] = pose
+        self.revision += 1
+
+    def delete(self, name: str) -> None:
+        """Removes a model.
+
+        Raises:
+            UnknownEntityError: There is no such model.
+        """
+        body = self.body(name)
+        self.engine.api.removeBody(body.number, physicsClientId=self.engine.client)
+        del self._bodies[name], self._names_by_number[body.number], self._initial_poses[name]
+        self.revision += 1
+
+    def entity_state(self, entity: str) -> BodyState:
+        """Returns where a model or a link ("model::link") is in the world and how it moves.
+
+        Raises:
+            UnknownEntityError: There is no such model or link.
+        """
+        if entity in WORLD_FRAMES:
+            return BodyState(Pose(), Twist())
+        if entity in self._bodies:
+            return self._bodies[entity].state()
+        model, separator, link = entity.rpartition(SCOPE)
+        if separator:
+            return self.body(model).link_state(link)
+        raise UnknownEntityError("model", entity, self.names())
+
+    def state_relative_to(self, entity: str, reference: str) -> BodyState:
+        """Returns the state of a model or link as seen from another one.
+
+        Args:
+            entity: Model, or "model::link".
+            reference: Model, "model::link", or the world.
+
+        Raises:
+            UnknownEntityError: One of them does not exist.
+        """
+        state, frame = self.entity_state(entity), self.entity_state(reference)
+        if reference in WORLD_FRAMES:
+            return state
+        linear = tuple(a - b for a, b in zip(state.twist.linear, frame.twist.linear, strict=True))
+        angular = tuple(a - b for a, b in zip(state.twist.angular, frame.twist.angular, strict=True))
+        relative = Twist((linear[0], linear[1], linear[2]), (angular[0], angular[1], angular[2]))
+        return BodyState(frame.pose.inverse() @ state.pose, twist_in_frame(relative, frame.pose))
+
+    def set_state(self, name: str, state: BodyState, reference: str = "") -> None:
+        """Puts a model somewhere.
+
+        Args:
+            name: The model.
+            state: Seen from the reference.
+            reference: Model, "model::link", or the world.
+
+        Raises:
+            UnknownEntityError: The model or the reference does not exist.
+        """
+        body, frame = self.body(name), self.entity_state(reference)
+        offset = rotate_vector(frame.pose.quaternion, state.pose.position)
+        lever = cross(frame.twist.angular, offset)
+        turned = twist_in_frame(state.twist, frame.pose.inverse())
+        linear = tuple(a + b + c for a, b, c in zip(turned.linear, frame.twist.linear, lever, strict=True))
+        angular = tuple(a + b for a, b in zip(turned.angular, frame.twist.angular, strict=True))
+        twist = Twist((linear[0], linear[1], linear[2]), (angular[0], angular[1], angular[2]))
+        body.set_state(BodyState(frame.pose @ state.pose, twist))
+        self.revision += 1
+
+    def pose_in_world(self, pose: Pose, reference: str) -> Pose:
+        """Returns a pose given in a reference as a pose in the world."""
+        return self.entity_state(reference).pose @ pose
+
+    def contacts(self, body: SimulatedBody, link_index: int) -> list[Contact]:
+        """Returns what touches a link, other links of its own body left out."""
+        points = self.engine.api.getContactPoints(
+            bodyA=body.number, linkIndexA=link_index, physicsClientId=self.engine.client
+        )
+        return [
+            Contact(self._names_by_number[point[2]], point[9], point[8])
+            for point in points
+            if point[2] != body.number and point[2] in self._names_by_number
+        ]
+
+    def reset_poses(self) -> None:
+        """Puts every model where it first appeared, at rest; joints of models go to 0."""
+        for name, body in self._bodies.items():
+            if body.spec is not None:
+                body.reset_joints({})
+                body.set_state(BodyState(self._initial_poses[name], Twist()))
+        self.revision += 1
+
+    def reset_time(self) -> None:
+        """Starts simulated time at 0 again."""
+        self._steps = 0
+
+    def fingerprint(self) -> str:
+        """Returns a hash of the state of everything; equal hashes mean equal worlds, bit for bit."""
+        digest = hashlib.sha256(struct.pack("<q", self._steps))
+        for name in sorted(self._bodies):
+            values = self._bodies[name].fingerprint()
+            digest.update(name.encode())
+            digest.update(struct.pack(f"<{len(values)}d", *values))
+        return digest.hexdigest()
+
+    def model_spec(self, name: str) -> specs.Model | None:
+        """Returns a model's description with its present pose; None for a robot."""
+        body = self.body(name)
+        return replace(body.spec, pose=body.state().pose) if body.spec is not None else None
+
+    def close(self) -> None:
+        """Lets go of the physics engine; may be called twice."""
+        self.engine.close()
+
+    def _set_surfaces(self, body: SimulatedBody, model: specs.Model) -> None:
+        for link in model.links:
+            index = body.link_indices.get(STATIC_LINK if model.static else link.name)
+            if index is None or not link.collisions:
+                continue
+            torsional = [each.friction.torsional for each in link.collisions if each.friction.torsional is not None]
+            self.engine.api.changeDynamics(
+                body.number,
+                index,
+                # One coefficient a link is all the engine takes: the most slippery surface decides.
+                lateralFriction=min(each.friction.lateral for each in link.collisions),
+                spinningFriction=min(torsional, default=self.settings.body_spinning_friction),
+                rollingFriction=self.settings.body_rolling_friction,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.01,
+                physicsClientId=self.engine.client,
+            )
+        for index in body.joint_indices.values():
+            # Joints of models are free: the engine would otherwise brake them with a motor of its own.
+            self.engine.api.setJointMotorControl2(
+                body.number, index, self.engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=self.engine.client
+            )

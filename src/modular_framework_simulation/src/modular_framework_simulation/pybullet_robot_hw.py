@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The simulated robot behind the interface that every robot has: `RobotHW`.
+
+Which interfaces a joint offers is read from the transmissions of the robot description, as ros_control prescribes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
+
+from modular_framework_control.hardware_interface import (
+    ControllerInfo,
+    EffortJointInterface,
+    JointHandle,
+    JointStateHandle,
+    JointStateInterface,
+    PositionJointInterface,
+    VelocityJointInterface,
+    interface_from_name,
+)
+from modular_framework_control.joint_limits import (
+    JointLimits,
+    PositionJointSaturation,
+    SymmetricSaturation,
+    limits_with_parameters,
+)
+from modular_framework_control.node_handle import NodeHandle
+from modular_framework_control.robot_hw import RobotHW
+from modular_framework_simulation.robot_body import Drive, Mode, RobotBody
+from modular_framework_simulation.robot_description import RobotJoint
+
+_MODES = {
+    PositionJointInterface.type_name: Mode.POSITION,
+    VelocityJointInterface.type_name: Mode.VELOCITY,
+    EffortJointInterface.type_name: Mode.EFFORT,
+}
+
+Saturation: TypeAlias = PositionJointSaturation | SymmetricSaturation
+
+
+class PyBulletRobotHW(RobotHW):
+    """Joint states and commands of a robot in the simulated world.
+
+    A joint obeys the interface its running controller claimed; before any controller did, it holds its position.
+
+    Args:
+        robot: The robot in the physics engine.
+    """
+
+    def __init__(self, robot: RobotBody) -> None:
+        super().__init__()
+        self._robot = robot
+        self._states: list[JointStateHandle] = []
+        self._handles: dict[str, dict[Mode, JointHandle]] = {}
+        self._saturations: dict[str, dict[Mode, Saturation]] = {}
+        self._drives: dict[str, Drive] = {}
+        self._efforts: dict[str, float] = {}
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        """Registers a state handle for every movable joint and command handles as the transmissions say.
+
+        Args:
+            root_nh: Read for `joint_limits/<joint>/...`.
+            robot_hw_nh: Not read.
+
+        Raises:
+            HardwareInterfaceError: A transmission names an interface that does not exist.
+            ParameterError: A joint limit parameter has a wrong type.
+        """
+        del robot_hw_nh
+        states = JointStateInterface()
+        commands = {
+            Mode.POSITION: PositionJointInterface(),
+            Mode.VELOCITY: VelocityJointInterface(),
+            Mode.EFFORT: EffortJointInterface(),
+        }
+        joints = {joint.name: joint for joint in self._robot.description.joints}
+        for name in self._robot.joint_names:
+            state = states.register_handle(JointStateHandle(name))
+            self._states.append(state)
+            for interface in joints[name].interfaces:
+                mode = _MODES[interface_from_name(interface).type_name]
+                handle = JointHandle(state, supports_max_effort=True)
+                commands[mode].register_handle(handle)
+                limits = limits_with_parameters(name, _limits(joints[name]), root_nh)
+                self._add_command(name, mode, handle, limits)
+        self.register_interface(states)
+        for interface_object in commands.values():
+            if interface_object.names:
+                self.register_interface(interface_object)
+        self.read(0.0, 0.0)
+        self.hold()
+        return True
+
+    def _add_command(self, name: str, mode: Mode, handle: JointHandle, limits: JointLimits) -> None:
+        self._handles.setdefault(name, {})[mode] = handle
+        self._efforts[name] = limits.max_effort
+        saturation: Saturation
+        match mode:
+            case Mode.POSITION:
+                saturation = PositionJointSaturation(handle, limits)
+            case Mode.VELOCITY:
+                saturation = SymmetricSaturation(handle, limits.max_velocity)
+            case Mode.EFFORT:
+                saturation = SymmetricSaturation(handle, limits.max_effort)
+        self._saturations.setdefault(name, {})[mode] = saturation
+
+    def hold(self) -> None:
+        """Makes the present positions the commands; to be called after the robot was put somewhere."""
+        for name, handles in self._handles.items():
+            position = next(iter(handles.values())).position
+            for mode, handle in handles.items():
+                handle.command = position if mode is Mode.POSITION else 0.0
+                saturation = self._saturations[name][mode]
+                if isinstance(saturation, PositionJointSaturation):
+                    saturation.reset()
+            first = self._drives[name].mode if name in self._drives else next(iter(handles))
+            self._drives[name] = Drive(first, handles[first].command, 0.0, self._efforts[name])
+            if first is Mode.POSITION:
+                self._drives[name].command = position
+
+    def read(self, time_s: float, period_s: float) -> None:
+        """Fills the joint states with what the physics engine has."""
+        del time_s, period_s
+        for state, reading in zip(self._states, self._robot.read(), strict=True):
+            state.position = reading.position
+            state.velocity = reading.velocity
+            state.effort = reading.effort
+
+    def write(self, time_s: float, period_s: float) -> None:
+        """Saturates the commands and hands them to the motors for the coming physics steps."""
+        del time_s
+        for name, drive in self._drives.items():
+            handle = self._handles[name][drive.mode]
+            self._saturations[name][drive.mode].enforce_limits(period_s)
+            if drive.mode is Mode.POSITION and period_s > 0:
+                drive.feed_forward = (handle.command - drive.command) / period_s
+            drive.command = handle.command
+            limit = self._efforts[name]
+            drive.effort_limit = min(limit, handle.max_effort) if handle.max_effort > 0 else limit
+        self._robot.drive(self._drives)
+
+    def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
+        """Lets every joint obey the interface through which a starting controller claims it."""
+        del stop
+        for mode, joints in _claims(start):
+            for name in joints:
+                handle = self._handles[name][mode]
+                handle.command = handle.position if mode is Mode.POSITION else 0.0
+                saturation = self._saturations[name][mode]
+                if isinstance(saturation, PositionJointSaturation):
+                    if self._drives[name].mode is Mode.POSITION:
+                        # The drive keeps its set point: a loaded joint sags a little below it.
+                        handle.command = self._drives[name].command
+                    else:
+                        saturation.reset()
+                self._drives[name] = Drive(mode, handle.command, 0.0, self._efforts[name])
+
+
+def _claims(controllers: Iterable[ControllerInfo]) -> Iterable[tuple[Mode, frozenset[str]]]:
+    for controller in controllers:
+        for claim in controller.claimed_resources:
+            if claim.hardware_interface in _MODES:
+                yield _MODES[claim.hardware_interface], claim.resources
+
+
+def _limits(joint: RobotJoint) -> JointLimits:
+    return JointLimits(
+        min_position=joint.lower,
+        max_position=joint.upper,
+        max_velocity=joint.velocity,
+        max_effort=joint.effort,
+        continuous=joint.lower == float("-inf"),
+    )
+
+

@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot in the physics engine: all its joints are read in one call and driven in one call a step.
+
+Joints with a transmission follow commands. Joints that mimic one of them stand for the mechanism of an underactuated
+gripper: a mimic joint beside its leader (the other finger) is coupled to it as by one servo that closes both, a mimic
+joint further down the chain (a distal phalanx) is drawn towards its free-motion angle with limited torque only, so
+that it gives way when an object presses against it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.robot_description import RobotDescription, RobotJoint
+from modular_framework_simulation.simulated_body import SimulatedBody
+
+_POSITION_GAIN = 0.2
+"""Share of a position error that a drive corrects within one physics step; velocities are fed forward in full."""
+
+_COUPLING_FACTOR = 2.0
+"""How much stronger the coupling of a second finger is than the drive of the first, so that the object is centred."""
+
+
+class Role(Enum):
+    """What moves a joint."""
+
+    DRIVEN = "driven"
+    COUPLED = "coupled"
+    COMPLIANT = "compliant"
+    FREE = "free"
+
+
+class Mode(Enum):
+    """How a driven joint takes its command."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    EFFORT = "effort"
+
+
+@dataclass(slots=True)
+class Drive:
+    """The command of one driven joint.
+
+    Attributes:
+        mode: What `command` is.
+        command: Position [rad or m], velocity [rad/s or m/s] or effort [Nm or N].
+        feed_forward: Velocity of the moving position command [rad/s or m/s].
+        effort_limit: Largest effort [Nm or N].
+    """
+
+    mode: Mode
+    command: float
+    feed_forward: float
+    effort_limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class JointReading:
+    """Measured state of one joint, in SI units."""
+
+    position: float
+    velocity: float
+    effort: float
+
+
+class RobotBody:
+    """A robot that stands in the world.
+
+    Args:
+        world: Where to put it.
+        description: What it is made of.
+        name: Instance name in the world.
+        pose: Of its root link in the world frame.
+        positions: Starting joint positions [rad or m]; joints that are not named start at 0 or at the nearest limit,
+            mimic joints where their leader puts them.
+
+    Raises:
+        DuplicateModelError: The name is taken.
+        DescriptionError: The engine refuses the robot, or a joint in `positions` does not exist.
+    """
+
+    def __init__(
+        self,
+        world: PhysicsWorld,
+        description: RobotDescription,
+        name: str,
+        pose: Pose,
+        positions: dict[str, float],
+    ) -> None:
+        self.description = description
+        self.world = world
+        api = world.engine.api
+        flags = api.URDF_USE_INERTIA_FROM_FILE | api.URDF_USE_SELF_COLLISION
+        number = world.engine.load_urdf(description.engine_urdf, name, True, flags)
+        self.body = SimulatedBody(world.engine, number, name, Pose(), True, None)
+        self.roles = {joint.name: _role(joint, description) for joint in description.joints}
+        self.joint_names = [joint.name for joint in description.joints if joint.name in self.body.joint_indices]
+        self._joints = [joint for joint in description.joints if joint.name in self.body.joint_indices]
+        self._indices = [self.body.joint_indices[name] for name in self.joint_names]
+        self._rank = {joint_name: rank for rank, joint_name in enumerate(self.joint_names)}
+        self.readings = [JointReading(0.0, 0.0, 0.0)] * len(self._indices)
+        self.starting_positions = self._complete(positions)
+        self._limit_self_collisions()
+        self._set_surfaces()
+        self._disarm_default_motors()
+        world.add(self.body, pose)
+        self.reset()
+
+    @property
+    def gripper_joints(self) -> list[RobotJoint]:
+        """The joints of the gripper: those that mimic, and those they follow."""
+        leaders = {joint.mimic.leader for joint in self._joints if joint.mimic is not None}
+        return [joint for joint in self._joints if joint.mimic is not None or joint.name in leaders]
+
+    @property
+    def fingers(self) -> list[list[int]]:
+        """The engine's link numbers of each finger: a chain of links below one palm."""
+        chains: dict[str, list[int]] = {}
+        for joint in self.gripper_joints:
+            chains.setdefault(_chain_root(joint, self.gripper_joints), []).append(
+                self.body.link_indices[joint.child_link]
+            )
+        return list(chains.values())
+
+    def reset(self) -> None:
+        """Puts the joints at their starting positions, at rest."""
+        self.body.reset_joints(self.starting_positions)
+        self.read()
+
+    def read(self) -> list[JointReading]:
+        """Measures all joints; the result is in the order of `joint_names`."""
+        engine = self.world.engine
+        records = engine.api.getJointStates(self.body.number, self._indices, physicsClientId=engine.client)
+        self.readings = [JointReading(record[0], record[1], record[3]) for record in records]
+        return self.readings
+
+    def drive(self, drives: dict[str, Drive]) -> None:
+        """Sets the motors of all joints for the coming physics steps.
+
+        Args:
+            drives: Commands of the driven joints by name; joints that are not named hang free.
+        """
+        step_s = self.world.settings.time_step_s
+        indices: list[int] = []
+        targets: list[float] = []
+        velocities: list[float] = []
+        efforts: list[float] = []
+        for rank, joint in enumerate(self._joints):
+            position = self.readings[rank].position
+            target, velocity, effort = position, 0.0, 0.0
+            drive = drives.get(joint.name)
+            if drive is not None and drive.mode is Mode.POSITION:
+                target, velocity, effort = drive.command, drive.feed_forward, drive.effort_limit
+            elif drive is not None and drive.mode is Mode.VELOCITY:
+                velocity, effort = drive.command, drive.effort_limit
+            elif joint.mimic is not None and joint.mimic.leader in self._rank:
+                leader = self.readings[self._rank[joint.mimic.leader]].position
+                target = joint.mimic.multiplier * leader + joint.mimic.offset
+                effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
+            reach = joint.velocity * step_s / _POSITION_GAIN
+            indices.append(self._indices[rank])
+            targets.append(max(position - reach, min(position + reach, target)))
+            velocities.append(velocity)
+            efforts.append(effort)
+        self._set_motors(indices, targets, velocities, efforts)
+        self._apply_efforts(drives)
+
+    def _set_motors(
+        self, indices: list[int], targets: Sequence[float], velocities: Sequence[float], efforts: Sequence[float]
+    ) -> None:
+        engine = self.world.engine
+        engine.api.setJointMotorControlArray(
+            self.body.number,
+            indices,
+            engine.api.POSITION_CONTROL,
+            targetPositions=targets,
+            targetVelocities=velocities,
+            forces=efforts,
+            positionGains=[_POSITION_GAIN] * len(indices),
+            velocityGains=[1.0] * len(indices),
+            physicsClientId=engine.client,
+        )
+
+    def _apply_efforts(self, drives: dict[str, Drive]) -> None:
+        engine = self.world.engine
+        for name, drive in drives.items():
+            if drive.mode is Mode.EFFORT:
+                effort = max(-drive.effort_limit, min(drive.effort_limit, drive.command))
+                index = self.body.joint_indices[name]
+                engine.api.setJointMotorControl2(
+                    self.body.number, index, engine.api.TORQUE_CONTROL, force=effort, physicsClientId=engine.client
+                )
+
+    def _complete(self, positions: dict[str, float]) -> dict[str, float]:
+        unknown = sorted(set(positions) - set(self._rank))
+        if unknown:
+            known = ", ".join(self.joint_names)
+            raise DescriptionError("starting pose", f"names unknown joints {unknown}", f"allowed: {known}")
+        complete = {
+            joint.name: max(joint.lower, min(joint.upper, positions.get(joint.name, 0.0))) for joint in self._joints
+        }
+        for joint in self._joints:
+            if joint.mimic is not None and joint.name not in positions and joint.mimic.leader in complete:
+                followed = joint.mimic.multiplier * complete[joint.mimic.leader] + joint.mimic.offset
+                complete[joint.name] = max(joint.lower, min(joint.upper, followed))
+        return complete
+
+    def _limit_self_collisions(self) -> None:
+        """Leaves collisions between fingers only: the planner sees to the rest of the robot."""
+        engine, number = self.world.engine, self.body.number
+        every = sorted(self.body.link_indices.values())
+        fingers = self.fingers
+        allowed = {
+            frozenset((a, b)) for one in fingers for other in fingers if one is not other for a in one for b in other
+        }
+        for i, a in enumerate(every):
+            for b in every[i + 1 :]:
+                enable = int(frozenset((a, b)) in allowed)
+                engine.api.setCollisionFilterPair(number, number, a, b, enable, physicsClientId=engine.client)
+
+    def _set_surfaces(self) -> None:
+        engine, settings = self.world.engine, self.world.settings
+        finger_links = {index for finger in self.fingers for index in finger}
+        for index in self.body.link_indices.values():
+            on_finger = index in finger_links
+            engine.api.changeDynamics(
+                self.body.number,
+                index,
+                lateralFriction=settings.pad_friction if on_finger else 0.5,
+                spinningFriction=settings.pad_spinning_friction if on_finger else 0.0,
+                rollingFriction=settings.pad_rolling_friction if on_finger else 0.0,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=engine.client,
+            )
+
+    def _disarm_default_motors(self) -> None:
+        engine = self.world.engine
+        for index in self._indices:
+            engine.api.setJointMotorControl2(
+                self.body.number, index, engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=engine.client
+            )
+
+
+def _role(joint: RobotJoint, description: RobotDescription) -> Role:
+    if joint.mimic is not None:
+        family = [
+            other
+            for other in description.joints
+            if other.name == joint.mimic.leader or (other.mimic and other.mimic.leader == joint.mimic.leader)
+        ]
+        above = {other.child_link for other in family if other.name != joint.name}
+        link = joint.parent_link
+        while link:
+            if link in above:
+                return Role.COMPLIANT
+            link = description.parents.get(link, "")
+        return Role.COUPLED
+    return Role.DRIVEN if joint.interfaces else Role.FREE
+
+
+def _chain_root(joint: RobotJoint, gripper: list[RobotJoint]) -> str:
+    """Returns the first link of the finger a gripper joint belongs to."""
+    by_child = {each.child_link: each for each in gripper}
+    while joint.parent_link in by_child:
+        joint = by_child[joint.parent_link]
+    return joint.child_link

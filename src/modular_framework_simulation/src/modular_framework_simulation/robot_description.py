@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads what the simulation needs of a robot's URDF, and rewrites the URDF for the physics engine.
+
+The engine gets convex hulls in place of the collision meshes and, without a window, no visual shapes: it then loads in
+a fraction of the time and computes contacts faster.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.sdf_resources import PackageFinder
+from modular_framework_simulation.sdf_specs import Mesh
+
+MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that follows another: position = multiplier * leader + offset."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
+class RobotJoint:
+    """A movable joint of the robot.
+
+    Attributes:
+        name: As in the description.
+        parent_link: The link it is fastened to.
+        child_link: The link it moves.
+        lower: [rad or m]
+        upper: [rad or m]
+        effort: Largest effort of its drive [Nm or N].
+        velocity: Largest velocity [rad/s or m/s].
+        interfaces: Hardware interfaces its transmission names; empty for a joint without a drive of its own.
+        mimic: The joint it follows, if it follows one.
+    """
+
+    name: str
+    parent_link: str
+    child_link: str
+    lower: float
+    upper: float
+    effort: float
+    velocity: float
+    interfaces: tuple[str, ...]
+    mimic: Mimic | None
+
+
+@dataclass(frozen=True, slots=True)
+class RobotDescription:
+    """A robot as the simulation sees it.
+
+    Attributes:
+        name: Name of the robot in its description.
+        joints: The movable joints, in file order.
+        links: All link names, in file order.
+        parents: Parent link of every link that has one.
+        engine_urdf: The URDF for the physics engine.
+    """
+
+    name: str
+    joints: tuple[RobotJoint, ...]
+    links: tuple[str, ...]
+    parents: dict[str, str]
+    engine_urdf: str
+
+
+def read_robot(
+    text: str, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool
+) -> RobotDescription:
+    """Reads a robot description.
+
+    Args:
+        text: URDF.
+        find_package: Looks up the packages of package:// URIs.
+        convex_parts: Makes convex hulls of collision meshes.
+        with_visuals: Whether visual shapes are kept.
+
+    Raises:
+        DescriptionError: The text is no URDF, or refers to something that is not there.
+    """
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise DescriptionError("robot_description", f"is not well-formed XML ({error})", "expected a URDF") from error
+    links = tuple(link.get("name", "") for link in root.findall("link"))
+    if root.tag != "robot" or not links:
+        raise DescriptionError("robot_description", f"<{root.tag}> with {len(links)} links", "expected a URDF <robot>")
+    transmissions = _transmissions(root)
+    joints = tuple(
+        _joint(joint, transmissions) for joint in root.findall("joint") if joint.get("type") in MOVABLE_TYPES
+    )
+    _rewrite_meshes(root, find_package, convex_parts, with_visuals)
+    _give_frames_no_weight(root)
+    engine_urdf = ElementTree.tostring(root, encoding="unicode")
+    parents = {_link_of(joint, "child"): _link_of(joint, "parent") for joint in root.findall("joint")}
+    return RobotDescription(root.get("name", "robot"), joints, links, parents, engine_urdf)
+
+
+def _transmissions(root: ElementTree.Element) -> dict[str, tuple[str, ...]]:
+    interfaces: dict[str, tuple[str, ...]] = {}
+    for transmission in root.findall("transmission"):
+        for joint in transmission.findall("joint"):
+            name = joint.get("name", "")
+            texts = [(each.text or "").strip() for each in joint.findall("hardwareInterface")]
+            if not texts:
+                where = f"robot_description: <transmission name='{transmission.get('name')}'>, joint '{name}'"
+                raise DescriptionError(where, "has no <hardwareInterface>", "name the position, velocity or effort one")
+            interfaces[name] = interfaces.get(name, ()) + tuple(texts)
+    return interfaces
+
+
+def _joint(joint: ElementTree.Element, transmissions: dict[str, tuple[str, ...]]) -> RobotJoint:
+    name = joint.get("name", "")
+    limit, mimic_element = joint.find("limit"), joint.find("mimic")
+
+    def limit_value(key: str, default: float) -> float:
+        return _number(name, limit, key, default) if limit is not None else default
+
+    continuous = joint.get("type") == "continuous"
+    mimic = None
+    if mimic_element is not None:
+        mimic = Mimic(
+            mimic_element.get("joint", ""),
+            _number(name, mimic_element, "multiplier", 1.0),
+            _number(name, mimic_element, "offset", 0.0),
+        )
+    return RobotJoint(
+        name=name,
+        parent_link=_link_of(joint, "parent"),
+        child_link=_link_of(joint, "child"),
+        lower=float("-inf") if continuous else limit_value("lower", 0.0),
+        upper=float("inf") if continuous else limit_value("upper", 0.0),
+        effort=limit_value("effort", 1e3),
+        velocity=limit_value("velocity", 1e3),
+        interfaces=transmissions.get(name, ()),
+        mimic=mimic,
+    )
+
+
+def _link_of(joint: ElementTree.Element, role: str) -> str:
+    element = joint.find(role)
+    if element is None or not element.get("link"):
+        where = f"robot_description: joint '{joint.get('name')}'"
+        raise DescriptionError(where, f"has no <{role} link=...>", "a joint connects two links")
+    return element.get("link", "")
+
+
+def _number(joint: str, element: ElementTree.Element, key: str, default: float) -> float:
+    text = element.get(key)
+    try:
+        return default if text is None else float(text)
+    except ValueError as error:
+        where = f"robot_description: joint '{joint}', <{element.tag} {key}=...>"
+        raise DescriptionError(where, f"got '{text}'", "expected a number") from error
+
+
+def _rewrite_meshes(
+    root: ElementTree.Element, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool
+) -> None:
+    for link in root.findall("link"):
+        if not with_visuals:
+            for visual in link.findall("visual"):
+                link.remove(visual)
+        for shape in link.findall("collision") + link.findall("visual"):
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            path = _mesh_path(link.get("name", ""), mesh.get("filename", ""), find_package)
+            if shape.tag == "visual":
+                mesh.set("filename", str(path))
+                continue
+            x, y, z = (float(value) for value in mesh.get("scale", "1 1 1").split())
+            mesh.set("filename", str(convex_parts.hull(Mesh(path, (x, y, z)))))
+            mesh.attrib.pop("scale", None)
+
+
+def _give_frames_no_weight(root: ElementTree.Element) -> None:
+    """Links without mass are mere frames; the engine would take each of them for a kilogram."""
+    for link in root.findall("link"):
+        if link.find("inertial") is None:
+            inertial = ElementTree.SubElement(link, "inertial")
+            ElementTree.SubElement(inertial, "mass", value="1e-5")
+            moments = {"ixx": "1e-9", "ixy": "0", "ixz": "0", "iyy": "1e-9", "iyz": "0", "izz": "1e-9"}
+            ElementTree.SubElement(inertial, "inertia", moments)
+
+
+def _mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:
+    where = f"robot_description: mesh of link '{link}'"
+    scheme, separator, rest = uri.partition("://")
+    if separator and scheme == "package":
+        package, _, relative = rest.partition("/")
+        try:
+            path = Path(find_package(package)) / relative
+        except Exception as error:  # the finder is the caller's: whatever it raises means "not there"
+            raise DescriptionError(where, f"package '{package}' is not found ({error})", "install it") from error
+    elif separator and scheme == "file":
+        path = Path(rest)
+    elif separator:
+        raise DescriptionError(where, f"got '{uri}'", "allowed: package://, file:// or an absolute path")
+    else:
+        path = Path(uri)
+    if not path.is_file():
+        raise DescriptionError(where, f"'{path}' does not exist", "check the name, and that its package is installed")
+    return path

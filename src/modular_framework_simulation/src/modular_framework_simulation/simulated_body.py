@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A model as it is in the physics engine: converts between the engine's centre-of-mass frames and link frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_simulation.errors import UnknownEntityError
+from modular_framework_simulation.physics_engine import BASE_INDEX, PhysicsEngine
+from modular_framework_simulation.poses import Pose, Vector3, rotate_vector
+from modular_framework_simulation.sdf_specs import Model
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Velocities in the world frame: linear [m/s] of the frame's origin, and angular [rad/s]."""
+
+    linear: Vector3 = (0.0, 0.0, 0.0)
+    angular: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyState:
+    """Pose and velocity of a model or link."""
+
+    pose: Pose
+    twist: Twist
+
+
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Returns the cross product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def add(a: Vector3, b: Vector3) -> Vector3:
+    """Returns the sum of two vectors."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+class SimulatedBody:
+    """One model in the engine.
+
+    Args:
+        engine: Where it lives.
+        number: The engine's number of the body.
+        name: Instance name.
+        root_in_model: Pose of the engine's root link in the model frame.
+        static: Whether it never moves.
+        spec: The model's description; None for a robot.
+    """
+
+    def __init__(
+        self,
+        engine: PhysicsEngine,
+        number: int,
+        name: str,
+        root_in_model: Pose,
+        static: bool,
+        spec: Model | None,
+    ) -> None:
+        self.number = number
+        self.name = name
+        self.static = static
+        self.spec = spec
+        self._engine = engine
+        self._root_in_model = root_in_model
+        self._model_in_root = root_in_model.inverse()
+        api, client = engine.api, engine.client
+        root_name = api.getBodyInfo(number, physicsClientId=client)[0].decode()
+        infos = engine.joint_infos(number)
+        self.link_indices: dict[str, int] = {root_name: BASE_INDEX}
+        self.link_indices.update({info[12].decode(): info[0] for info in infos})
+        self.joint_indices: dict[str, int] = {
+            info[1].decode(): info[0] for info in infos if info[2] in (api.JOINT_REVOLUTE, api.JOINT_PRISMATIC)
+        }
+        dynamics = api.getDynamicsInfo(number, BASE_INDEX, physicsClientId=client)
+        self._centre_in_root = Pose(tuple(dynamics[3]), tuple(dynamics[4]))
+        self._root_in_centre = self._centre_in_root.inverse()
+
+    def link_names(self) -> list[str]:
+        """Returns the names of the links as its description has them."""
+        if self.spec is not None:
+            return [link.name for link in self.spec.links]
+        return list(self.link_indices)
+
+    def state(self) -> BodyState:
+        """Returns where the model frame is in the world and how it moves."""
+        centre, twist = self._base()
+        pose = centre @ self._root_in_centre @ self._model_in_root
+        return BodyState(pose, _moved_twist(twist, centre, pose))
+
+    def link_state(self, link: str) -> BodyState:
+        """Returns where a link frame is in the world and how it moves.
+
+        Raises:
+            UnknownEntityError: The model has no such link.
+        """
+        if self.static and self.spec is not None:
+            for each in self.spec.links:
+                if each.name == link:
+                    return BodyState(self.state().pose @ each.pose, Twist())
+        index = self.link_indices.get(link)
+        if index is None:
+            raise UnknownEntityError("link", f"{self.name}::{link}", [f"{self.name}::{n}" for n in self.link_names()])
+        if index == BASE_INDEX:
+            centre, twist = self._base()
+            pose = centre @ self._root_in_centre
+            return BodyState(pose, _moved_twist(twist, centre, pose))
+        api, client = self._engine.api, self._engine.client
+        record = api.getLinkState(self.number, index, 1, 1, physicsClientId=client)
+        centre, twist = Pose(record[0], record[1]), Twist(record[6], record[7])
+        pose = Pose(record[4], record[5]) @ self._sdf_frame_in_urdf_frame(link)
+        return BodyState(pose, _moved_twist(twist, centre, pose))
+
+    def set_state(self, state: BodyState) -> None:
+        """Puts the model somewhere; its joints keep their positions.
+
+        Args:
+            state: Of the model frame, in the world frame.
+        """
+        api, client = self._engine.api, self._engine.client
+        centre = state.pose @ self._root_in_model @ self._centre_in_root
+        api.resetBasePositionAndOrientation(self.number, centre.position, centre.quaternion, physicsClientId=client)
+        if not self.static:
+            twist = _moved_twist(state.twist, state.pose, centre)
+            api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
+
+    def reset_joints(self, positions: dict[str, float]) -> None:
+        """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
+        api, client = self._engine.api, self._engine.client
+        for name, index in self.joint_indices.items():
+            api.resetJointState(self.number, index, positions.get(name, 0.0), 0.0, physicsClientId=client)
+
+    def fingerprint(self) -> list[float]:
+        """Returns every number of the body's state, for comparing whole worlds."""
+        api, client = self._engine.api, self._engine.client
+        position, quaternion = api.getBasePositionAndOrientation(self.number, physicsClientId=client)
+        linear, angular = api.getBaseVelocity(self.number, physicsClientId=client)
+        values = [*position, *quaternion, *linear, *angular]
+        if self.joint_indices:
+            records: Any = api.getJointStates(self.number, list(self.joint_indices.values()), physicsClientId=client)
+            values += [value for record in records for value in record[:2]]
+        return values
+
+    def _base(self) -> tuple[Pose, Twist]:
+        api, client = self._engine.api, self._engine.client
+        position, quaternion = api.getBasePositionAndOrientation(self.number, physicsClientId=client)
+        if self.static:
+            return Pose(position, quaternion), Twist()
+        linear, angular = api.getBaseVelocity(self.number, physicsClientId=client)
+        return Pose(position, quaternion), Twist(linear, angular)
+
+    def _sdf_frame_in_urdf_frame(self, link: str) -> Pose:
+        if self.spec is not None:
+            for joint in self.spec.joints:
+                if joint.child == link and joint.parent != "world":
+                    return joint.pose.inverse()
+        return Pose()
+
+
+def _moved_twist(twist: Twist, known_at: Pose, wanted_at: Pose) -> Twist:
+    """Returns the twist of a rigid body as seen at another of its points, both poses in the world frame."""
+    x, y, z = (b - a for a, b in zip(known_at.position, wanted_at.position, strict=True))
+    return Twist(add(twist.linear, cross(twist.angular, (x, y, z))), twist.angular)
+
+
+def twist_in_frame(twist: Twist, frame: Pose) -> Twist:
+    """Returns a world-frame twist with its vectors turned into a frame's axes."""
+    back = frame.inverse().quaternion
+    return Twist(rotate_vector(back, twist.linear), rotate_vector(back, twist.angular))

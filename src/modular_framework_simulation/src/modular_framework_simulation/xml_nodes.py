@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""XML whose elements remember their file and line, so that a fault in a model can be pointed at."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from modular_framework_simulation.errors import DescriptionError
+
+
+@dataclass(slots=True)
+class XmlNode:
+    """One element of a description.
+
+    Attributes:
+        tag: Element name.
+        attributes: Attribute values by name.
+        source: File (or other origin) the element stands in.
+        line: Line in that source, from 1.
+        text: Text directly inside the element.
+        children: Elements inside, in order.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    source: str
+    line: int
+    text: str = ""
+    children: list[XmlNode] = field(default_factory=list)
+
+    @property
+    def where(self) -> str:
+        """Source, line and element, as an error message starts."""
+        name = self.attributes.get("name")
+        label = f"<{self.tag} name='{name}'>" if name is not None else f"<{self.tag}>"
+        return f"{self.source}:{self.line}: {label}"
+
+    def find(self, tag: str) -> XmlNode | None:
+        """Returns the first child element of that name, None if there is none."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def find_all(self, tag: str) -> list[XmlNode]:
+        """Returns all child elements of that name."""
+        return [child for child in self.children if child.tag == tag]
+
+    def find_path(self, *tags: str) -> XmlNode | None:
+        """Returns the element reached by following the first child of each name."""
+        node: XmlNode | None = self
+        for tag in tags:
+            node = node.find(tag) if node is not None else None
+        return node
+
+    def require(self, tag: str) -> XmlNode:
+        """Returns the first child of that name.
+
+        Raises:
+            DescriptionError: There is none.
+        """
+        child = self.find(tag)
+        if child is None:
+            got = ", ".join(f"<{each.tag}>" for each in self.children) or "nothing"
+            raise DescriptionError(self.where, f"has no <{tag}>", f"a <{tag}> is needed here, got {got}")
+        return child
+
+    def name(self) -> str:
+        """Returns the attribute `name`.
+
+        Raises:
+            DescriptionError: It is missing or empty.
+        """
+        value = self.attributes.get("name", "")
+        if not value:
+            raise DescriptionError(self.where, "has no name", "give it a non-empty attribute 'name'")
+        return value
+
+    def numbers(self, count: int) -> tuple[float, ...]:
+        """Returns the text as that many finite numbers.
+
+        Raises:
+            DescriptionError: Another count, or something that is not a finite number.
+        """
+        return parse_numbers(self.where, self.text, count)
+
+    def number(self) -> float:
+        """Returns the text as one finite number."""
+        return self.numbers(1)[0]
+
+    def flag(self) -> bool:
+        """Returns the text as a truth value.
+
+        Raises:
+            DescriptionError: Neither true, false, 1 nor 0.
+        """
+        value = self.text.strip().lower()
+        if value in ("true", "1"):
+            return True
+        if value in ("false", "0"):
+            return False
+        raise DescriptionError(self.where, f"got '{value}'", "allowed: true, false, 1, 0")
+
+
+def parse_numbers(where: str, text: str, count: int) -> tuple[float, ...]:
+    """Returns a text as that many finite numbers.
+
+    Args:
+        where: Named in the error.
+        text: Numbers separated by white space.
+        count: How many there have to be.
+
+    Raises:
+        DescriptionError: Another count, or something that is not a finite number.
+    """
+    words = text.split()
+    try:
+        values = tuple(float(word) for word in words)
+    except ValueError:
+        values = ()
+    if len(words) != count or len(values) != count or not all(math.isfinite(value) for value in values):
+        raise DescriptionError(where, f"got '{text.strip()}'", f"expected {count} finite number(s)")
+    return values
+
+
+def parse_xml(text: str, source: str) -> XmlNode:
+    """Parses a document.
+
+    Args:
+        text: The XML.
+        source: Where it comes from, for messages.
+
+    Returns:
+        The root element.
+
+    Raises:
+        DescriptionError: The text is not well-formed XML.
+    """
+    parser = expat.ParserCreate("utf-8")
+    document = XmlNode("document", {}, source, 1)
+    stack = [document]
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        node = XmlNode(tag, attributes, source, parser.CurrentLineNumber)
+        stack[-1].children.append(node)
+        stack.append(node)
+
+    def end(_tag: str) -> None:
+        stack.pop()
+
+    def characters(data: str) -> None:
+        stack[-1].text += data
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = characters
+    try:
+        parser.Parse(text.encode(), True)
+    except expat.ExpatError as error:
+        where = f"{source}:{error.lineno}"
+        raise DescriptionError(where, f"is not well-formed XML ({error})", "mend the file") from error
+    return document.children[0]
+
+
+def read_xml(path: Path) -> XmlNode:
+    """Parses a file.
+
+    Raises:
+        DescriptionError: It cannot be read or is not well-formed XML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(str(path), f"cannot be read ({error})", "give a readable UTF-8 XML file") from error
+    return parse_xml(text, str(path))
