@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every controller is: a class made without arguments that is initialised, started, updated and stopped.
+
+`init` runs on a thread that may wait; `starting`, `update`, `stopping` and `failed` run in the control loop and must
+not block. All time a controller knows is the time it is given there, so that it behaves alike under simulated and real
+time.
+"""
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from modular_framework_control.hardware_interface import HardwareInterface
+from modular_framework_control.node_handle import NodeHandle
+
+
+class ControllerError(Exception):
+    """A controller cannot be set up or used as asked."""
+
+
+class Controller:
+    """Base of all controllers.
+
+    Attributes:
+        interface_class: the hardware interface this controller works on.
+    """
+
+    interface_class: ClassVar[type[HardwareInterface[Any]]]
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        """Get the joint handles and read the parameters.
+
+        Args:
+            hw: the interface of class `interface_class`; the joints asked of it are claimed for this controller.
+            root_nh: namespace of the robot.
+            controller_nh: namespace of this controller's own parameters, topics and actions.
+
+        Returns:
+            Whether the controller can be used. Raising an exception that says why not is preferred over False.
+        """
+        del hw, root_nh, controller_nh
+        return True
+
+    def starting(self, time_s: float) -> None:
+        """Called once before the first update after a start."""
+
+    def update(self, time_s: float, period_s: float) -> None:
+        """One control cycle.
+
+        Args:
+            time_s: time of this cycle [s].
+            period_s: time since the last cycle [s].
+        """
+
+    def stopping(self, time_s: float) -> None:
+        """Called once after the last update before a stop."""
+
+    def failed(self, time_s: float, reason: str) -> None:
+        """Called in place of `stopping` when this controller raised; `reason` is for whoever waits for a result."""
+        del reason
+        self.stopping(time_s)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where message classes meet the types of the controllers."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import genpy
+from control_msgs.msg import (
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    GripperCommandFeedback,
+    GripperCommandResult,
+    JointTrajectoryControllerState,
+)
+from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_control.controller_manager import ControllerReport
+from modular_framework_control.gripper_action_controller import GripperState
+from modular_framework_control.joint_state_controller import JointStateSnapshot
+from modular_framework_control.trajectory import Array, JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectorySnapshot
+from modular_framework_control.trajectory_tolerances import JointTolerance
+
+
+def trajectory_from_msg(message: JointTrajectoryMsg) -> JointTrajectory:
+    """A trajectory_msgs/JointTrajectory as sent; it is not checked here."""
+    points = tuple(TrajectoryPoint(point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities),
+                                   tuple(point.accelerations)) for point in message.points)
+    return JointTrajectory(tuple(message.joint_names), points, message.header.stamp.to_sec())
+
+
+def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
+    return {message.name: JointTolerance(message.position, message.velocity) for message in messages}
+
+
+def goal_from_msg(message: FollowJointTrajectoryGoal) -> TrajectoryGoal:
+    """A control_msgs/FollowJointTrajectoryGoal as sent; it is not checked here."""
+    return TrajectoryGoal(trajectory_from_msg(message.trajectory), _tolerances_from_msg(message.path_tolerance),
+                          _tolerances_from_msg(message.goal_tolerance), message.goal_time_tolerance.to_sec())
+
+
+def trajectory_result_to_msg(code: TrajectoryErrorCode, text: str) -> FollowJointTrajectoryResult:
+    """Result of a trajectory goal."""
+    return FollowJointTrajectoryResult(error_code=int(code), error_string=text)
+
+
+def _point(state: Array) -> JointTrajectoryPoint:
+    rows = [row.tolist() for row in state]
+    return JointTrajectoryPoint(positions=rows[0], velocities=rows[1], accelerations=rows[2] if len(rows) > 2 else [])
+
+
+def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Sequence[str]) -> Any:
+    """Write a snapshot into a JointTrajectoryControllerState or a FollowJointTrajectoryFeedback; returns it."""
+    message.header.stamp = genpy.Time.from_sec(snapshot.time_s)
+    message.joint_names = list(joint_names)
+    message.desired = _point(snapshot.desired)
+    message.actual = _point(snapshot.actual)
+    message.error = _point(snapshot.error)
+    return message
+
+
+def snapshot_to_msg(snapshot: TrajectorySnapshot, joint_names: Sequence[str]) -> JointTrajectoryControllerState:
+    """State of a trajectory controller."""
+    return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names)
+
+
+def gripper_result_to_msg(state: GripperState) -> GripperCommandResult:
+    """Result of a gripper goal."""
+    return GripperCommandResult(state.position, state.effort, state.stalled, state.reached_goal)
+
+
+def gripper_feedback_to_msg(state: GripperState) -> GripperCommandFeedback:
+    """Feedback of a gripper goal."""
+    return GripperCommandFeedback(state.position, state.effort, state.stalled, state.reached_goal)
+
+
+def joint_state_to_msg(snapshot: JointStateSnapshot) -> JointState:
+    """A sensor_msgs/JointState."""
+    message = JointState(name=snapshot.names, position=snapshot.positions, velocity=snapshot.velocities,
+                         effort=snapshot.efforts)
+    message.header.stamp = genpy.Time.from_sec(snapshot.time_s)
+    return message
+
+
+def controller_report_to_msg(report: ControllerReport) -> ControllerState:
+    """One line of list_controllers."""
+    claims = [HardwareInterfaceResources(claim.hardware_interface, sorted(claim.resources))
+              for claim in report.info.claimed_resources]
+    return ControllerState(report.info.name, report.state.value, report.info.type, claims)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Moves a gripper of one joint to a position with bounded effort, and notices when something is in its way.
+
+A grasp ends in a *stall*: the fingers cannot go on because they hold something. As in ros_controllers the goal is then
+aborted with `stalled` set, and the command stays, so that the fingers go on squeezing.
+"""
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_control.controller import Controller
+from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
+from modular_framework_control.hardware_interface import JointHandle, PositionJointInterface
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+from modular_framework_control.rates import next_due, period_of
+
+
+@dataclass(frozen=True, slots=True)
+class GripperState:
+    """Feedback and result of a gripper goal.
+
+    Attributes:
+        position: measured [rad|m].
+        effort: measured [Nm|N].
+        stalled: the joint does not move and is not at its goal.
+        reached_goal: the joint is within `goal_tolerance` of its goal.
+    """
+
+    position: float
+    effort: float
+    stalled: bool
+    reached_goal: bool
+
+
+GripperTicket = GoalTicket[GripperState]
+
+
+class GripperGoalError(Exception):
+    """A gripper goal that cannot be taken up."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    position: float
+    max_effort: float
+    ticket: GripperTicket
+
+
+class GripperActionController(Controller):
+    """position_controllers/GripperActionController.
+
+    A joint counts as standing still when it has stayed within `stall_velocity_threshold * stall_timeout` of one place
+    for `stall_timeout`: the mean velocity over that time, rather than the velocity of one cycle, so that the trembling
+    of a contact does not hide a stall. The time counts from the beginning of the goal at the earliest.
+
+    Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, used for
+    goals that give none, 0 = the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
+    1.0; `action_monitor_rate` [1/s] 20.
+
+    Attributes:
+        on_feedback: called in the control loop at `action_monitor_rate` with the active ticket and the state.
+    """
+
+    interface_class = PositionJointInterface
+
+    def __init__(self) -> None:
+        self.on_feedback: Callable[[GripperTicket, GripperState], None] | None = None
+        self._mailbox: deque[_Order | GripperTicket] = deque()
+        self._active: _Order | None = None
+        self._running = False
+        self._command = 0.0
+        self._max_effort = 0.0
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        names = read_names(controller_nh, "joint")
+        if len(names) != 1:
+            where = join_names(controller_nh.namespace, "joint")
+            raise ParameterError(f"parameter {where}: got {names!r}; expected the name of one joint")
+        self._handle: JointHandle = hw.get_handle(names[0])
+        self._goal_tolerance = read_number(controller_nh, "goal_tolerance", 0.01)
+        self._default_max_effort = read_number(controller_nh, "max_effort", 0.0)
+        self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
+        threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
+        self._stall_distance = threshold * self._stall_timeout_s
+        self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
+        return True
+
+    # ---- any thread ----
+
+    def submit(self, position: float, max_effort: float, ticket: GripperTicket) -> None:
+        """Hand a goal to the control loop.
+
+        Args:
+            position: where to go [rad|m].
+            max_effort: bound on the effort [Nm|N]; 0 for the controller's default.
+            ticket: where to report.
+
+        Raises:
+            GripperGoalError: not a number, negative effort, or the controller does not run.
+        """
+        if not self._running:
+            raise GripperGoalError("the controller is not running; start it first")
+        if not math.isfinite(position) or not math.isfinite(max_effort) or max_effort < 0.0:
+            raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers and an "
+                                   "effort of at least 0 (0 = default)")
+        self._mailbox.append(_Order(position, max_effort, ticket))
+
+    def cancel(self, ticket: GripperTicket) -> None:
+        """Ask the control loop to stop working on the goal of `ticket`."""
+        self._mailbox.append(ticket)
+
+    # ---- control loop ----
+
+    def starting(self, time_s: float) -> None:
+        self._hold()
+        self._active = None
+        self._apply()
+        self._running = True
+
+    def stopping(self, time_s: float) -> None:
+        self._end_all(GoalStatus.CANCELED, "the controller was stopped")
+
+    def failed(self, time_s: float, reason: str) -> None:
+        self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+
+    def _end_all(self, status: GoalStatus, text: str) -> None:
+        self._running = False
+        self._finish(status, self._state(False, False), text)
+        while self._mailbox:
+            order = self._mailbox.popleft()
+            if isinstance(order, _Order):
+                order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), text)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        while self._mailbox:
+            order = self._mailbox.popleft()
+            if isinstance(order, _Order):
+                self._take_up(order, time_s)
+            elif self._active is not None and self._active.ticket is order:
+                self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
+                self._hold()
+        self._apply()
+        if self._active is not None:
+            self._check(self._active, time_s)
+
+    def _take_up(self, order: _Order, time_s: float) -> None:
+        self._finish(GoalStatus.CANCELED, self._state(False, False), "preempted by a new goal")
+        self._active = order
+        self._command = order.position
+        self._max_effort = order.max_effort if order.max_effort > 0.0 else self._default_max_effort
+        self._rest_position = self._handle.position
+        self._rest_since_s = time_s
+        self._next_feedback_s = time_s
+        order.ticket.activate()
+
+    def _check(self, order: _Order, time_s: float) -> None:
+        position = self._handle.position
+        error = order.position - position
+        if abs(error) <= self._goal_tolerance:
+            self._finish(GoalStatus.SUCCEEDED, self._state(False, True), "goal position reached")
+            return
+        if not abs(position - self._rest_position) <= self._stall_distance:
+            self._rest_position = position
+            self._rest_since_s = time_s
+        elif time_s - self._rest_since_s > self._stall_timeout_s:
+            self._finish(GoalStatus.ABORTED, self._state(True, False),
+                         f"stalled: joint '{self._handle.name}' stands at {position:.6g}, {error:+.6g} short of its "
+                         f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s")
+            return
+        if self.on_feedback is not None and time_s >= self._next_feedback_s:
+            self._next_feedback_s = next_due(self._next_feedback_s, self._monitor_period_s, time_s)
+            self.on_feedback(order.ticket, self._state(False, False))
+
+    def _hold(self) -> None:
+        self._command = self._handle.position
+        self._max_effort = self._default_max_effort
+
+    def _apply(self) -> None:
+        self._handle.command = self._command
+        self._handle.max_effort = self._max_effort
+
+    def _state(self, stalled: bool, reached_goal: bool) -> GripperState:
+        return GripperState(self._handle.position, self._handle.effort, stalled, reached_goal)
+
+    def _finish(self, status: GoalStatus, state: GripperState, text: str) -> None:
+        order, self._active = self._active, None
+        if order is not None:
+            order.ticket.finish(status, state, text)

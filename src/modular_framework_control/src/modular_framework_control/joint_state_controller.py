@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reports the measured state of all joints at a fixed rate."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_control.controller import Controller
+from modular_framework_control.hardware_interface import JointStateHandle, JointStateInterface
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_number
+from modular_framework_control.rates import next_due, period_of
+
+
+@dataclass(frozen=True, slots=True)
+class JointStateSnapshot:
+    """States of all joints in one cycle.
+
+    Attributes:
+        time_s: time of the cycle [s].
+        names: joint names, sorted; extra joints last.
+        positions: [rad|m].
+        velocities: [rad/s|m/s].
+        efforts: [Nm|N].
+    """
+
+    time_s: float
+    names: list[str]
+    positions: list[float]
+    velocities: list[float]
+    efforts: list[float]
+
+
+class JointStateController(Controller):
+    """joint_state_controller/JointStateController.
+
+    Parameters, below the controller's name: `publish_rate` [1/s] 50; `extra_joints`: list of {name, position,
+    velocity, effort} reported as constants unless the hardware has a joint of that name.
+
+    Attributes:
+        on_state: called in the control loop at `publish_rate`; must not block.
+    """
+
+    interface_class = JointStateInterface
+
+    def __init__(self) -> None:
+        self.on_state: Callable[[JointStateSnapshot], None] | None = None
+        self._handles: list[JointStateHandle] = []
+        self._extra: list[JointStateHandle] = []
+        self._next_s = -math.inf
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        self._handles = [hw.get_handle(name) for name in sorted(hw.names)]
+        self._period_s = period_of(read_number(controller_nh, "publish_rate", 50.0))
+        self._extra = [joint for joint in _extra_joints(controller_nh) if joint.name not in hw.names]
+        self._names = [handle.name for handle in (*self._handles, *self._extra)]
+        return True
+
+    def starting(self, time_s: float) -> None:
+        self._next_s = time_s
+
+    def update(self, time_s: float, period_s: float) -> None:
+        if time_s < self._next_s or self.on_state is None:
+            return
+        self._next_s = next_due(self._next_s, self._period_s, time_s)
+        joints = (*self._handles, *self._extra)
+        self.on_state(JointStateSnapshot(time_s, self._names, [joint.position for joint in joints],
+                                         [joint.velocity for joint in joints], [joint.effort for joint in joints]))
+
+
+def _extra_joints(controller_nh: NodeHandle) -> list[JointStateHandle]:
+    entries = controller_nh.get_param("extra_joints", [])
+    where = join_names(controller_nh.namespace, "extra_joints")
+    if not isinstance(entries, list):
+        raise ParameterError(f"parameter {where}: got {entries!r}; expected a list of mappings with name, position, "
+                             "velocity, effort")
+    joints = []
+    for number, entry in enumerate(entries):
+        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
+            raise ParameterError(f"parameter {where}: entry {number} is {entry!r}; expected a mapping with a name")
+        try:
+            values = [float(entry.get(key, 0.0)) for key in ("position", "velocity", "effort")]
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"parameter {where}: entry {number} ('{entry['name']}'): {error}") from error
+        joints.append(JointStateHandle(entry["name"], *values))
+    return joints

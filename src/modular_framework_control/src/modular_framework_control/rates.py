@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When something that is done at a fixed rate is due again, counted in the time of the control loop."""
+import math
+
+
+def period_of(rate: float) -> float:
+    """Period [s] of a rate [1/s]; a rate of 0 means never."""
+    return 1.0 / rate if rate > 0.0 else math.inf
+
+
+def next_due(due_s: float, period_s: float, time_s: float) -> float:
+    """When something with this period is due after it was done at `time_s` [s]; missed turns are not made up for."""
+    following_s = due_s + period_s
+    return following_s if following_s > time_s else time_s + period_s

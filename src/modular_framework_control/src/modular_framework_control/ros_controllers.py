@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics, actions and services of each controller, under the names of ros_controllers."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    GripperCommandAction,
+    GripperCommandGoal,
+    JointTrajectoryControllerState,
+)
+from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateRequest, QueryTrajectoryStateResponse
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+
+from modular_framework_control import conversions
+from modular_framework_control.controller import Controller, ControllerError
+from modular_framework_control.goal_ticket import GoalTicket
+from modular_framework_control.gripper_action_controller import (
+    GripperActionController,
+    GripperGoalError,
+    GripperState,
+    GripperTicket,
+)
+from modular_framework_control.joint_state_controller import JointStateController, JointStateSnapshot
+from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
+from modular_framework_control.node_handle import join_names
+from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
+from modular_framework_control.ros_outbox import Outbox
+from modular_framework_control.trajectory_goal import (
+    GoalRejectedError,
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectorySnapshot,
+    TrajectoryTicket,
+)
+
+
+class JointStateEdge:
+    """Publishes `joint_states` (sensor_msgs/JointState) in the namespace of the robot."""
+
+    def __init__(self, controller: JointStateController, namespace: str, name: str, outbox: Outbox) -> None:
+        del name
+        self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=10)
+        controller.on_state = lambda snapshot: outbox.put_droppable(self._publish, snapshot)
+
+    def _publish(self, snapshot: JointStateSnapshot) -> None:
+        self._publisher.publish(conversions.joint_state_to_msg(snapshot))
+
+    def close(self) -> None:
+        """Close the topic."""
+        self._publisher.unregister()
+
+
+class JointTrajectoryEdge:
+    """Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
+    `<name>/query_state` (service)."""
+
+    def __init__(self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox) -> None:
+        self._controller = controller
+        self._name = join_names(namespace, name)
+        self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
+        self._action = ControllerActionServer(f"{self._name}/follow_joint_trajectory", FollowJointTrajectoryAction,
+                                              self._submit, controller.cancel, _trajectory_result, outbox)
+        self._command = rospy.Subscriber(f"{self._name}/command", JointTrajectoryMsg, self._on_command, queue_size=1)
+        self._query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
+        controller.on_state = lambda snapshot: outbox.put_droppable(self._publish_state, snapshot)
+        controller.on_feedback = lambda ticket, snapshot: outbox.put_droppable(self._feedback, ticket, snapshot)
+
+    def close(self) -> None:
+        """Close topics, action and service."""
+        for endpoint in (self._command, self._state):
+            endpoint.unregister()
+        self._query.shutdown("controller unloaded")
+        self._action.close()
+
+    def _submit(self, message: FollowJointTrajectoryGoal, ticket: TrajectoryTicket) -> None:
+        try:
+            self._controller.submit(conversions.goal_from_msg(message), ticket)
+        except GoalRejectedError as error:
+            result = conversions.trajectory_result_to_msg(error.code, str(error))
+            raise GoalRefusedError(result, str(error)) from error
+
+    def _on_command(self, message: JointTrajectoryMsg) -> None:
+        try:
+            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message)))
+        except GoalRejectedError as error:
+            rospy.logwarn("%s/command ignored: %s", self._name, error)
+
+    def _on_query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
+        try:
+            state = self._controller.desired_at(request.time.to_sec())
+        except ControllerError as error:
+            raise rospy.ServiceException(f"{self._name}/query_state: {error}") from error
+        return QueryTrajectoryStateResponse(self._controller.joint_names, *(row.tolist() for row in state))
+
+    def _publish_state(self, snapshot: TrajectorySnapshot) -> None:
+        if self._state.get_num_connections() > 0:
+            self._state.publish(conversions.snapshot_to_msg(snapshot, self._controller.joint_names))
+
+    def _feedback(self, ticket: TrajectoryTicket, snapshot: TrajectorySnapshot) -> None:
+        message = conversions.fill_snapshot(FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names)
+        self._action.publish_feedback(ticket, message)
+
+
+def _trajectory_result(ticket: GoalTicket[TrajectoryErrorCode]) -> Any:
+    code = TrajectoryErrorCode.INVALID_GOAL if ticket.result is None else ticket.result
+    return conversions.trajectory_result_to_msg(code, ticket.text)
+
+
+class GripperEdge:
+    """Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action)."""
+
+    def __init__(self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox) -> None:
+        self._controller = controller
+        self._action = ControllerActionServer(join_names(namespace, f"{name}/gripper_cmd"), GripperCommandAction,
+                                              self._submit, controller.cancel, _gripper_result, outbox)
+        controller.on_feedback = lambda ticket, state: outbox.put_droppable(self._feedback, ticket, state)
+
+    def close(self) -> None:
+        """Close the action."""
+        self._action.close()
+
+    def _submit(self, message: GripperCommandGoal, ticket: GripperTicket) -> None:
+        try:
+            self._controller.submit(message.command.position, message.command.max_effort, ticket)
+        except GripperGoalError as error:
+            raise GoalRefusedError(None, str(error)) from error
+
+    def _feedback(self, ticket: GripperTicket, state: GripperState) -> None:
+        self._action.publish_feedback(ticket, conversions.gripper_feedback_to_msg(state))
+
+
+def _gripper_result(ticket: GoalTicket[GripperState]) -> Any:
+    return None if ticket.result is None else conversions.gripper_result_to_msg(ticket.result)
+
+
+_EDGES: tuple[tuple[type[Controller], Any], ...] = (
+    (JointStateController, JointStateEdge),
+    (JointTrajectoryController, JointTrajectoryEdge),
+    (GripperActionController, GripperEdge),
+)
+
+
+def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox) -> Callable[[], None]:
+    """Open the topics, actions and services of a controller.
+
+    Args:
+        controller: an initialised controller; one of a class unknown here gets none.
+        namespace: absolute namespace of the robot.
+        name: name of the controller.
+        outbox: thread that talks to ROS for the control loop.
+
+    Returns:
+        What closes them.
+    """
+    for controller_class, edge_class in _EDGES:
+        if isinstance(controller, controller_class):
+            close: Callable[[], None] = edge_class(controller, namespace, name, outbox).close
+            return close
+    return lambda: None

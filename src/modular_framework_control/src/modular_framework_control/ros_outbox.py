@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Carries what the control loop has to say to ROS, so that the loop never waits for a message to be sent."""
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+
+_Job = tuple[Callable[..., None], tuple[Any, ...]]
+
+
+class Outbox:
+    """A queue worked off by one thread, in order.
+
+    Args:
+        backlog: how many jobs may wait before jobs that may be dropped are dropped.
+    """
+
+    def __init__(self, backlog: int = 200) -> None:
+        self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
+        self._backlog = backlog
+        self._thread = threading.Thread(target=self._work, name="control_outbox", daemon=True)
+
+    def start(self) -> None:
+        """Begin to work."""
+        self._thread.start()
+
+    def put(self, job: Callable[..., None], *arguments: Any) -> None:
+        """Queue a job that must not be lost (a result)."""
+        self._jobs.put((job, arguments))
+
+    def put_droppable(self, job: Callable[..., None], *arguments: Any) -> None:
+        """Queue a job that is dropped when too many wait (a state)."""
+        if self._jobs.qsize() < self._backlog:
+            self._jobs.put((job, arguments))
+
+    def close(self) -> None:
+        """Work off what waits, then end; may be called twice."""
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._jobs.put(None)
+            self._thread.join(timeout=2.0)
+
+    def _work(self) -> None:
+        for job, arguments in iter(self._jobs.get, None):
+            try:
+                job(*arguments)
+            except rospy.ROSException as error:
+                rospy.logdebug("message not sent: %s", error)
+            except Exception as error:  # a message that cannot be sent must not stop the ones behind it
+                rospy.logerr("control outbox: %s raised %s: %s", job, type(error).__name__, error)

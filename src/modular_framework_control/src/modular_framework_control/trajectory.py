@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint trajectories: what a sender may ask for, checked, and the piecewise polynomials that connect the points.
+
+Between two points the curve is linear, cubic or quintic, by what both of them give: positions; positions and
+velocities; positions, velocities and accelerations. The coefficients follow from the boundary conditions of each
+segment.
+"""
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+POSITION, VELOCITY, ACCELERATION = 0, 1, 2
+
+
+class InvalidTrajectoryError(Exception):
+    """A trajectory that cannot be followed; the message lists everything that is wrong with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryPoint:
+    """One point as it was sent.
+
+    Attributes:
+        time_s: time from the start of the trajectory [s].
+        positions: one per joint [rad|m].
+        velocities: one per joint [rad/s|m/s], or empty.
+        accelerations: one per joint [rad/s^2|m/s^2], or empty.
+    """
+
+    time_s: float
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] = ()
+    accelerations: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class JointTrajectory:
+    """A trajectory as it was sent.
+
+    Attributes:
+        joint_names: the joints, in the order of the values of each point.
+        points: in the order of time; none means "stop".
+        stamp_s: when it starts [s of the controller's time]; 0 means at once.
+    """
+
+    joint_names: tuple[str, ...]
+    points: tuple[TrajectoryPoint, ...]
+    stamp_s: float = 0.0
+
+
+def check_points(trajectory: JointTrajectory) -> None:
+    """Check sizes, numbers and times of a trajectory.
+
+    Raises:
+        InvalidTrajectoryError: lists all faults.
+    """
+    faults: list[str] = []
+    last_s = -math.inf
+    for number, point in enumerate(trajectory.points):
+        faults += [f"point {number}: {fault}" for fault in _faults_of(point, len(trajectory.joint_names))]
+        if not point.time_s > last_s:
+            faults.append(f"point {number}: time_from_start {point.time_s:.9g} s does not come after "
+                          f"{last_s:.9g} s of the point before it; times must increase strictly")
+        last_s = point.time_s
+    if trajectory.points and trajectory.points[0].time_s < 0.0:
+        faults.append(f"point 0: time_from_start {trajectory.points[0].time_s} s is negative")
+    if not math.isfinite(trajectory.stamp_s):
+        faults.append(f"header stamp {trajectory.stamp_s} is not a time")
+    if faults:
+        raise InvalidTrajectoryError("; ".join(faults))
+
+
+def _faults_of(point: TrajectoryPoint, joints: int) -> list[str]:
+    faults = []
+    for name, values, optional in (("positions", point.positions, False), ("velocities", point.velocities, True),
+                                   ("accelerations", point.accelerations, True)):
+        if len(values) != joints and not (optional and not values):
+            faults.append(f"has {len(values)} {name}; expected {joints}{' or none' if optional else ''}")
+        if not all(map(math.isfinite, values)):
+            faults.append(f"{name} contain a value that is not a finite number: {list(values)}")
+    if point.accelerations and not point.velocities:
+        faults.append("has accelerations but no velocities; give both or only positions")
+    return faults
+
+
+def segment_coefficients(start: Array, end: Array, duration_s: float, order: int) -> Array:
+    """Polynomial coefficients, lowest power first, of one segment for all joints.
+
+    Args:
+        start: state (position, velocity, acceleration) at its beginning, shape (3, joints).
+        end: state at its end, shape (3, joints).
+        duration_s: length [s], positive.
+        order: 1, 3 or 5: how many boundary conditions are used.
+
+    Returns:
+        Coefficients of shape (6, joints).
+    """
+    coefficients = np.zeros((6, start.shape[1]))
+    t = duration_s
+    way = end[POSITION] - start[POSITION]
+    coefficients[0] = start[POSITION]
+    if order == 1:
+        coefficients[1] = way / t
+        return coefficients
+    v0, v1 = start[VELOCITY], end[VELOCITY]
+    coefficients[1] = v0
+    if order == 3:
+        coefficients[2] = (3.0 * way - t * (2.0 * v0 + v1)) / t**2
+        coefficients[3] = (t * (v0 + v1) - 2.0 * way) / t**3
+        return coefficients
+    a0, a1 = start[ACCELERATION], end[ACCELERATION]
+    coefficients[2] = 0.5 * a0
+    coefficients[3] = (20.0 * way - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3)
+    coefficients[4] = (-30.0 * way + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4)
+    coefficients[5] = (12.0 * way - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5)
+    return coefficients
+
+
+class Spline:
+    """A checked trajectory with the coefficients of all segments between its points.
+
+    Args:
+        trajectory: at least one point, as `check_points` allows.
+
+    Attributes:
+        times_s: time of each point from the start [s], shape (points,).
+        states: what each point gives, missing values 0, shape (points, 3, joints).
+        orders: highest order each point allows: 1, 3 or 5.
+        coefficients: of the segment from point i to point i + 1, shape (points - 1, 6, joints).
+    """
+
+    __slots__ = ("times_s", "states", "orders", "coefficients")
+
+    def __init__(self, trajectory: JointTrajectory) -> None:
+        points = trajectory.points
+        self.times_s = np.array([point.time_s for point in points])
+        self.states = np.zeros((len(points), 3, len(trajectory.joint_names)))
+        self.orders = [5 if point.accelerations else 3 if point.velocities else 1 for point in points]
+        for state, point in zip(self.states, points, strict=True):
+            state[POSITION] = point.positions
+            if point.velocities:
+                state[VELOCITY] = point.velocities
+            if point.accelerations:
+                state[ACCELERATION] = point.accelerations
+        self.coefficients = np.zeros((len(points) - 1, 6, len(trajectory.joint_names)))
+        for i in range(len(points) - 1):
+            duration_s = self.times_s[i + 1] - self.times_s[i]
+            order = min(self.orders[i], self.orders[i + 1])
+            self.coefficients[i] = segment_coefficients(self.states[i], self.states[i + 1], duration_s, order)
+
+
+class Track:
+    """What some joints of a controller are to do over time: consecutive segments, then rest at the last position.
+
+    Args:
+        joints: indices of the joints in the controller.
+        starts_s: start of each segment [s of the controller's time].
+        coefficients: of each segment, shape (segments, 6, joints).
+        end_s: end of the last segment [s].
+        end_position: where it ends, shape (joints,).
+    """
+
+    __slots__ = ("joints", "end_s", "_starts_s", "_coefficients", "_end_position")
+
+    def __init__(self, joints: Sequence[int], starts_s: Sequence[float], coefficients: Array, end_s: float,
+                 end_position: Array) -> None:
+        self.joints = list(joints)
+        self.end_s = end_s
+        self._starts_s = list(starts_s)
+        self._coefficients = coefficients
+        self._end_position = end_position
+
+    @classmethod
+    def hold(cls, joints: Sequence[int], position: Array, time_s: float) -> Track:
+        """Rest at `position`, shape (joints,), from `time_s` on."""
+        return cls(joints, [], np.zeros((0, 6, len(joints))), time_s, position.copy())
+
+    def sample(self, time_s: float) -> Array:
+        """Position, velocity and acceleration at `time_s`, shape (3, joints)."""
+        if time_s > self.end_s or not self._starts_s:
+            state = np.zeros((3, len(self.joints)))
+            state[POSITION] = self._end_position
+            return state
+        i = max(0, bisect_right(self._starts_s, time_s) - 1)
+        t = max(0.0, time_s - self._starts_s[i])
+        t2 = t * t
+        t3 = t2 * t
+        basis = ((1.0, t, t2, t3, t2 * t2, t2 * t3),
+                 (0.0, 1.0, 2.0 * t, 3.0 * t2, 4.0 * t3, 5.0 * t2 * t2),
+                 (0.0, 0.0, 2.0, 6.0 * t, 12.0 * t2, 20.0 * t3))
+        sampled: Array = np.dot(basis, self._coefficients[i])
+        return sampled
+
+    def without(self, joints: Sequence[int]) -> Track | None:
+        """This track for its other joints; None when none is left."""
+        kept = [i for i, joint in enumerate(self.joints) if joint not in joints]
+        if not kept:
+            return None
+        return Track([self.joints[i] for i in kept], self._starts_s, self._coefficients[:, :, kept], self.end_s,
+                     self._end_position[kept])
+
+
+def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array,
+           continuous: Sequence[bool]) -> Track:
+    """Join a new trajectory to the motion so far: from `state` at `splice_s` to the first point after it, then on.
+
+    When a point lies exactly at `splice_s` and agrees with `state` in position and velocity, the trajectory is followed
+    as sent; otherwise a segment of the order of the next point leads over to it.
+
+    Args:
+        spline: the new trajectory; at least one of its points comes after `splice_s`.
+        joints: indices of its joints in the controller, in the order of its values.
+        origin_s: time of its time_from_start 0 [s].
+        splice_s: when it takes over [s].
+        state: desired state of its joints at `splice_s`, shape (3, joints).
+        continuous: which joints turn without end; they go the short way round.
+    """
+    first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
+    turns = np.round((state[POSITION] - spline.states[first, POSITION]) / (2.0 * math.pi))
+    offset = np.where(continuous, turns * (2.0 * math.pi), 0.0)
+    coefficients = spline.coefficients[max(0, first - 1):].copy()
+    coefficients[:, 0] += offset
+    if not (first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset)):
+        target = spline.states[first].copy()
+        target[POSITION] += offset
+        bridge = segment_coefficients(state, target, origin_s + spline.times_s[first] - splice_s, spline.orders[first])
+        coefficients = np.concatenate([bridge[np.newaxis], coefficients[1 if first > 0 else 0:]])
+    knots_s = [origin_s + float(time_s) for time_s in spline.times_s[first:]]
+    return Track(joints, [splice_s, *knots_s[:-1]], coefficients, knots_s[-1], spline.states[-1, POSITION] + offset)
+
+
+def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Array) -> bool:
+    """Whether `state` at `time_s` is where the trajectory's own segment from `point` begins."""
+    tolerance = 1e-6
+    if abs(spline.times_s[point] - time_s) > 1e-9:
+        return False
+    velocity = spline.states[point, VELOCITY]
+    return bool(np.all(np.abs(spline.states[point, POSITION] + offset - state[POSITION]) < tolerance)
+                and np.all(np.abs(velocity - state[VELOCITY]) < tolerance))
+
+
+def stop_ramp(joints: Sequence[int], state: Array, time_s: float, duration_s: float) -> Track:
+    """Come to rest from `state` within `duration_s`, on the way of an even deceleration; at once when it is 0.
+
+    Args:
+        joints: indices of the joints in the controller.
+        state: desired state at `time_s`, shape (3, joints).
+        time_s: beginning of the ramp [s].
+        duration_s: length of the ramp [s].
+    """
+    if duration_s <= 0.0:
+        return Track.hold(joints, state[POSITION], time_s)
+    end = np.zeros_like(state)
+    end[POSITION] = state[POSITION] + 0.5 * duration_s * state[VELOCITY]
+    coefficients = segment_coefficients(state, end, duration_s, 5)[np.newaxis]
+    return Track(joints, [time_s], coefficients, time_s + duration_s, end[POSITION])
