@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plans and executes arm motions through move_group, so that several states may share one commander.
+
+Every call carries its own start state and target; nothing is remembered between calls but the planner's settings.
+"""
+from __future__ import annotations
+
+import json
+import threading
+import uuid
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.msg import (
+    Constraints,
+    ExecuteTrajectoryAction,
+    ExecuteTrajectoryGoal,
+    MoveItErrorCodes,
+    RobotTrajectory,
+)
+from moveit_msgs.srv import (
+    GetMotionPlan,
+    GetMotionPlanRequest,
+    GetPositionIK,
+    GetPositionIKRequest,
+    GetStateValidity,
+    GetStateValidityRequest,
+)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from modular_framework_core.moveit_requests import (
+    StartState,
+    describe_pose,
+    error_name,
+    joint_goal,
+    joints_of,
+    pose_goal,
+    robot_state,
+)
+from modular_framework_core.robot_groups import Group, RobotModelError, read_group
+from modular_framework_core.ros_calls import (
+    CallError,
+    call_service,
+    wait_for_action,
+    wait_for_result,
+    wait_for_service,
+    wait_until,
+)
+
+EXECUTE_ACTION = "execute_trajectory"
+REPORT_TOPIC = "move_group/planning_report"
+REPORT_WAIT_S = 0.3
+REPORTS_KEPT = 64
+SERVICE_TIMEOUT_S = 10.0
+IK_TIMEOUT_S = 1.0
+
+
+class CommanderError(RuntimeError):
+    """The commander cannot work; the text names what is missing."""
+
+
+class PlanResult(NamedTuple):
+    """Outcome of planning; true only for a plan.
+
+    Attributes:
+        trajectory: The plan; without joint names when there is none.
+        success: True when ``trajectory`` leads to the target.
+        error_code: Value of moveit_msgs/MoveItErrorCodes.
+        reason: Why there is no plan; empty with one.
+    """
+
+    trajectory: RobotTrajectory
+    success: bool
+    error_code: int
+    reason: str
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+@dataclass(frozen=True, slots=True)
+class IkResult:
+    """Outcome of inverse kinematics; true only with a solution.
+
+    Attributes:
+        joints: {joint: position} of the group; empty without a solution.
+        error_code: Value of moveit_msgs/MoveItErrorCodes.
+        reason: Why there is no solution; empty with one.
+    """
+
+    joints: dict[str, float]
+    error_code: int
+    reason: str
+
+    def __bool__(self) -> bool:
+        return bool(self.joints)
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionResult:
+    """Outcome of a motion; true only when move_group reports success.
+
+    Attributes:
+        success: True when the trajectory was executed.
+        error_code: Value of moveit_msgs/MoveItErrorCodes.
+        reason: Why it was not; empty on success.
+    """
+
+    success: bool
+    error_code: int = MoveItErrorCodes.SUCCESS
+    reason: str = ""
+
+    def __bool__(self) -> bool:
+        return self.success
+
+
+class ArmCommander:
+    """Client of move_group for one planning group; safe to use from several threads.
+
+    Parameters read: ``robot_description``, ``robot_description_semantic``.
+    Subscribers: ``joint_states`` (sensor_msgs/JointState), ``move_group/planning_report`` (std_msgs/String, JSON).
+    Services called: ``plan_kinematic_path``, ``compute_ik``, ``check_state_validity``. Action: ``execute_trajectory``.
+
+    Args:
+        name: Planning group.
+        set_ground: Accepted for compatibility; the planning scene has its own supports, so True is refused.
+
+    Raises:
+        CommanderError: ``set_ground`` is True.
+    """
+
+    def __init__(self, name: str, set_ground: bool = False) -> None:
+        if set_ground:
+            raise CommanderError("set_ground=True is not supported; put the ground into the scene or the world file.")
+        self.group_name = name
+        self._velocity_scaling = 1.0
+        self._planner_id = ""
+        self._attempts = 1
+        self._planning_time_s = 5.0
+        self._connect_lock = threading.Lock()
+        self._execute_lock = threading.Lock()
+        self._stop_event = threading.Event()
+        self._group: Group | None = None
+        self._joints_lock = threading.Lock()
+        self._positions: dict[str, float] = {}
+        self._reports: OrderedDict[str, dict[str, object]] = OrderedDict()
+
+    def connect(self, timeout_s: float = 60.0) -> None:
+        """Reads the robot model and waits for move_group; does nothing when connected already.
+
+        Args:
+            timeout_s: Longest wait for each thing needed [s].
+
+        Raises:
+            CommanderError: Something needed is missing; the text names it.
+        """
+        with self._connect_lock:
+            if self._group is not None:
+                return
+            self._plan_service = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
+            self._ik_service = rospy.ServiceProxy("compute_ik", GetPositionIK)
+            self._validity_service = rospy.ServiceProxy("check_state_validity", GetStateValidity)
+            self._execute_client = actionlib.SimpleActionClient(EXECUTE_ACTION, ExecuteTrajectoryAction)
+            self._subscribers = [rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10),
+                                 rospy.Subscriber(REPORT_TOPIC, String, self._on_report, queue_size=10)]
+            try:
+                group = self._read_group()
+                for proxy in (self._plan_service, self._ik_service):
+                    wait_for_service(proxy, timeout_s)
+                wait_for_action(self._execute_client, EXECUTE_ACTION, timeout_s)
+            except (CallError, RobotModelError) as error:
+                raise CommanderError(f"Arm commander of group '{self.group_name}': {error}") from error
+            missing = self._missing_joints(group)
+            if not wait_until(lambda: not self._missing_joints(group), timeout_s):
+                raise CommanderError(f"Arm commander of group '{self.group_name}': topic "
+                                     f"'{rospy.resolve_name('joint_states')}' did not deliver the joints "
+                                     f"{list(missing)} within {timeout_s:.1f} s; start the joint state controller.")
+            self._group = group
+
+    @property
+    def group(self) -> Group:
+        """The planning group; connects when that was not done yet."""
+        self.connect()
+        if self._group is None:
+            raise CommanderError(f"Arm commander of group '{self.group_name}' is not connected.")
+        return self._group
+
+    def set_max_velocity_scaling_factor(self, factor: float) -> None:
+        """Sets the share of the joints' velocity and acceleration limits to use, in (0, 1].
+
+        Raises:
+            CommanderError: The factor is out of range.
+        """
+        if not 0.0 < float(factor) <= 1.0:
+            raise CommanderError(f"The velocity scaling factor is {factor}, allowed is 0 < factor <= 1.")
+        self._velocity_scaling = float(factor)
+
+    def set_planner_id(self, planner_id: str) -> None:
+        """Sets the planner by the name move_group knows it by; empty for the group's default."""
+        self._planner_id = str(planner_id)
+
+    def set_num_planning_attempts(self, attempts: int) -> None:
+        """Sets how often a plan is tried for.
+
+        Raises:
+            CommanderError: The number is below 1.
+        """
+        if int(attempts) < 1:
+            raise CommanderError(f"The number of planning attempts is {attempts}, allowed is 1 or more.")
+        self._attempts = int(attempts)
+
+    def set_planning_time(self, seconds: float) -> None:
+        """Sets the time a plan may take [s].
+
+        Raises:
+            CommanderError: The time is not positive.
+        """
+        if not float(seconds) > 0.0:
+            raise CommanderError(f"The planning time is {seconds} s, allowed is more than 0.")
+        self._planning_time_s = float(seconds)
+
+    def current_joints(self) -> dict[str, float]:
+        """Returns the latest positions of every joint heard of [rad or m]."""
+        self.connect()
+        with self._joints_lock:
+            return dict(self._positions)
+
+    def plan_to_pose_target(self, pose: PoseStamped, custom_start_state: StartState = None) -> PlanResult:
+        """Plans to a pose of the group's tip link.
+
+        Args:
+            pose: Target of the tip link.
+            custom_start_state: Where to start; None starts from the current state.
+
+        Returns:
+            The plan, or the reason why there is none.
+        """
+        return self._plan(lambda name: pose_goal(pose, self.group.tip_link, name), custom_start_state)
+
+    def plan_to_joint_value_target(self, joints: Mapping[str, float] | JointState,
+                                   custom_start_state: StartState = None) -> PlanResult:
+        """Plans to joint positions.
+
+        Args:
+            joints: {joint: position} [rad or m]; joints outside the group are left out.
+            custom_start_state: Where to start; None starts from the current state.
+
+        Returns:
+            The plan, or the reason why there is none.
+        """
+        values = dict(zip(joints.name, joints.position, strict=False)) if isinstance(joints, JointState) else joints
+        target = {name: values[name] for name in self.group.joint_names if name in values}
+        if not target:
+            return _no_plan(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS,
+                            f"the target names the joints {sorted(values)}, group '{self.group_name}' has "
+                            f"{list(self.group.joint_names)}; none of them is the same")
+        return self._plan(lambda name: joint_goal(target, name), custom_start_state)
+
+    def get_ik(self, pose: PoseStamped, seed: StartState = None) -> dict[str, float] | None:
+        """Returns joint positions that bring the tip link to a pose, None when there are none."""
+        return self.solve_ik(pose, seed).joints or None
+
+    def solve_ik(self, pose: PoseStamped, seed: StartState = None) -> IkResult:
+        """Finds collision-free joint positions that bring the tip link to a pose.
+
+        Args:
+            pose: Target of the tip link.
+            seed: Positions to stay near, and those of joints outside the group; None for the current state.
+
+        Returns:
+            The solution nearest to the seed, or the reason why there is none.
+        """
+        try:
+            result = self._ik(pose, seed, avoid_collisions=True)
+            if result:
+                return result
+            touching = self._ik(pose, seed, avoid_collisions=False)
+            what = f"link '{self.group.tip_link}' cannot get to {describe_pose(pose)}: "
+            if touching:
+                return IkResult({}, result.error_code, what + self._contacts(touching.joints, seed))
+            return IkResult({}, result.error_code, what + f"the pose is out of reach ({result.reason})")
+        except CallError as error:
+            return IkResult({}, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
+
+    def execute_plan(self, plan: RobotTrajectory | PlanResult,
+                     stop_requested: Callable[[], bool] = lambda: False) -> ExecutionResult:
+        """Executes a plan and waits for its end.
+
+        Args:
+            plan: What to execute.
+            stop_requested: Asked all the time; True stops the motion.
+
+        Returns:
+            Success, or the reason why the motion failed.
+        """
+        trajectory = plan.trajectory if isinstance(plan, PlanResult) else plan
+        points = trajectory.joint_trajectory.points
+        if not points:
+            return ExecutionResult(False, MoveItErrorCodes.INVALID_MOTION_PLAN, "the plan has no point")
+        self.connect()
+        timeout_s = 60.0 + 10.0 * points[-1].time_from_start.to_sec()
+        with self._execute_lock:
+            self._stop_event.clear()
+            try:
+                wait_for_action(self._execute_client, EXECUTE_ACTION, SERVICE_TIMEOUT_S)
+            except CallError as error:
+                return ExecutionResult(False, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
+            self._execute_client.send_goal(ExecuteTrajectoryGoal(trajectory=trajectory))
+            status = wait_for_result(self._execute_client, timeout_s,
+                                     lambda: self._stop_event.is_set() or stop_requested())
+            return self._execution_result(status, timeout_s)
+
+    def stop(self) -> None:
+        """Stops the motion under way, if any."""
+        self._stop_event.set()
+
+    def _execution_result(self, status: int, timeout_s: float) -> ExecutionResult:
+        if status == GoalStatus.PREEMPTED:
+            return ExecutionResult(False, MoveItErrorCodes.PREEMPTED, "the motion was stopped on request")
+        if status == GoalStatus.LOST:
+            reason = f"action '{rospy.resolve_name(EXECUTE_ACTION)}' did not end within {timeout_s:.1f} s"
+            return ExecutionResult(False, MoveItErrorCodes.TIMED_OUT, reason)
+        result = self._execute_client.get_result()
+        code = result.error_code.val if result is not None else MoveItErrorCodes.FAILURE
+        if status == GoalStatus.SUCCEEDED and code == MoveItErrorCodes.SUCCESS:
+            return ExecutionResult(True)
+        text = self._execute_client.get_goal_status_text()
+        return ExecutionResult(False, code, f"{error_name(code)}{': ' + text if text else ''}")
+
+    def _plan(self, goal: Callable[[str], Constraints], start: StartState) -> PlanResult:
+        name = f"plan_{uuid.uuid4().hex}"
+        self.connect()
+        request = GetMotionPlanRequest()
+        message = request.motion_plan_request
+        message.group_name = self.group_name
+        message.planner_id = self._planner_id
+        message.num_planning_attempts = self._attempts
+        message.allowed_planning_time = self._planning_time_s
+        message.max_velocity_scaling_factor = message.max_acceleration_scaling_factor = self._velocity_scaling
+        message.start_state = robot_state(start)
+        message.goal_constraints = [goal(name)]
+        timeout_s = SERVICE_TIMEOUT_S + 3.0 * self._attempts * self._planning_time_s
+        try:
+            proxy = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
+            response = call_service(proxy, request, timeout_s).motion_plan_response
+        except CallError as error:
+            return _no_plan(MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
+        code = response.error_code.val
+        if code == MoveItErrorCodes.SUCCESS and response.trajectory.joint_trajectory.points:
+            return PlanResult(response.trajectory, True, code, "")
+        return _no_plan(code, self._reported_reason(name, code))
+
+    def _reported_reason(self, name: str, code: int) -> str:
+        wait_until(lambda: name in self._reports, REPORT_WAIT_S)
+        reason = str(self._reports.get(name, {}).get("reason", ""))
+        return f"{error_name(code)}: {reason}" if reason else error_name(code)
+
+    def _ik(self, pose: PoseStamped, seed: StartState, avoid_collisions: bool) -> IkResult:
+        group = self.group
+        request = GetPositionIKRequest()
+        message = request.ik_request
+        message.group_name, message.ik_link_name = group.name, group.tip_link
+        message.robot_state, message.pose_stamped = robot_state(seed), pose
+        message.avoid_collisions = avoid_collisions
+        message.timeout = rospy.Duration.from_sec(IK_TIMEOUT_S)
+        proxy = rospy.ServiceProxy("compute_ik", GetPositionIK)
+        response = call_service(proxy, request, SERVICE_TIMEOUT_S + IK_TIMEOUT_S)
+        code = response.error_code.val
+        if code != MoveItErrorCodes.SUCCESS:
+            return IkResult({}, code, error_name(code))
+        joints = joints_of(response.solution.joint_state, group.joint_names)
+        missing = sorted(set(group.joint_names) - set(joints))
+        if missing:
+            return IkResult({}, MoveItErrorCodes.FAILURE, f"the solution of compute_ik lacks the joints {missing}")
+        return IkResult(joints, code, "")
+
+    def _contacts(self, joints: Mapping[str, float], seed: StartState) -> str:
+        request = GetStateValidityRequest(group_name=self.group_name)
+        state = robot_state(seed)
+        merged = dict(zip(state.joint_state.name, state.joint_state.position, strict=False)) | dict(joints)
+        request.robot_state = robot_state(merged)
+        proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
+        response = call_service(proxy, request, SERVICE_TIMEOUT_S)
+        pairs = sorted({f"'{contact.contact_body_1}' with '{contact.contact_body_2}'" for contact in response.contacts})
+        return f"in collision there ({', '.join(pairs[:3]) or 'no contact was reported'})"
+
+    def _read_group(self) -> Group:
+        urdf, srdf = rospy.get_param("robot_description", ""), rospy.get_param("robot_description_semantic", "")
+        for name, text in (("robot_description", urdf), ("robot_description_semantic", srdf)):
+            if not text:
+                raise RobotModelError(f"parameter '{rospy.resolve_name(name)}' is not set; load the robot first")
+        group = read_group(str(urdf), str(srdf), self.group_name)
+        if not group.joints or not group.tip_link:
+            raise RobotModelError(f"group '{self.group_name}' is no chain with active joints; choose one that is")
+        return group
+
+    def _missing_joints(self, group: Group) -> tuple[str, ...]:
+        with self._joints_lock:
+            return tuple(name for name in group.joint_names if name not in self._positions)
+
+    def _on_joint_states(self, message: JointState) -> None:
+        with self._joints_lock:
+            self._positions.update(zip(message.name, message.position, strict=False))
+
+    def _on_report(self, message: String) -> None:
+        try:
+            report = json.loads(message.data)
+            name = str(report["request_name"])
+        except (ValueError, KeyError, TypeError) as error:
+            rospy.logwarn_throttle(10.0, f"Topic '{rospy.resolve_name(REPORT_TOPIC)}': unreadable report ({error!r})")
+            return
+        self._reports[name] = report
+        while len(self._reports) > REPORTS_KEPT:
+            self._reports.popitem(last=False)
+
+
+def _no_plan(code: int, reason: str) -> PlanResult:
+    return PlanResult(RobotTrajectory(), False, code, reason)

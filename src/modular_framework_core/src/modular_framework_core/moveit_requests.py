@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Builds the messages move_group understands, and names its error codes."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import (
+    Constraints,
+    JointConstraint,
+    MoveItErrorCodes,
+    OrientationConstraint,
+    PositionConstraint,
+    RobotState,
+)
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+
+JOINT_TOLERANCE_RAD = 1e-4
+POSITION_TOLERANCE_M = 1e-4
+ORIENTATION_TOLERANCE_RAD = 1e-3
+
+StartState = RobotState | JointState | Mapping[str, float] | None
+
+
+def error_name(code: int) -> str:
+    """Returns the constant's name of an error code, or the number of an unknown one."""
+    for name, value in vars(MoveItErrorCodes).items():
+        if name.isupper() and isinstance(value, int) and value == code:
+            return name
+    return f"error code {code}"
+
+
+def robot_state(state: StartState) -> RobotState:
+    """Makes a robot state on top of the current one.
+
+    Args:
+        state: {joint: position}, a joint state or a robot state; None for the current state.
+
+    Returns:
+        A robot state that leaves every joint it does not name, and attached objects, as they are.
+    """
+    match state:
+        case None:
+            return RobotState(is_diff=True)
+        case RobotState():
+            return state
+        case JointState():
+            return RobotState(joint_state=state, is_diff=True)
+        case _:
+            joints = JointState(name=list(state), position=list(state.values()))
+            return RobotState(joint_state=joints, is_diff=True)
+
+
+def joint_goal(joints: Mapping[str, float], name: str = "") -> Constraints:
+    """Makes a goal in joint space [rad or m]."""
+    constraints = [JointConstraint(joint_name=joint, position=position, tolerance_above=JOINT_TOLERANCE_RAD,
+                                   tolerance_below=JOINT_TOLERANCE_RAD, weight=1.0)
+                   for joint, position in joints.items()]
+    return Constraints(name=name, joint_constraints=constraints)
+
+
+def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
+    """Makes a goal for the pose of a link."""
+    region = PositionConstraint(header=pose.header, link_name=link, weight=1.0)
+    region.constraint_region.primitives = [
+        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[POSITION_TOLERANCE_M])]
+    centre = Pose(position=pose.pose.position)
+    centre.orientation.w = 1.0
+    region.constraint_region.primitive_poses = [centre]
+    turn = OrientationConstraint(
+        header=pose.header, link_name=link, orientation=pose.pose.orientation, weight=1.0,
+        absolute_x_axis_tolerance=ORIENTATION_TOLERANCE_RAD, absolute_y_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
+        absolute_z_axis_tolerance=ORIENTATION_TOLERANCE_RAD)
+    return Constraints(name=name, position_constraints=[region], orientation_constraints=[turn])
+
+
+def joints_of(state: JointState, wanted: Sequence[str]) -> dict[str, float]:
+    """Picks joints out of a joint state; joints it lacks are left out."""
+    positions = dict(zip(state.name, state.position, strict=False))
+    return {name: positions[name] for name in wanted if name in positions}
+
+
+def describe_pose(pose: PoseStamped) -> str:
+    """Writes a pose for an error text."""
+    p = pose.pose.position
+    return f"({p.x:.3f}, {p.y:.3f}, {p.z:.3f}) m in frame '{pose.header.frame_id}'"

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calls services and actions of other nodes without ever waiting for ever.
+
+All limits are wall time: a simulation that is paused or has died stops the clock of ROS, and every wait on it.
+"""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+
+POLL_PERIOD_S = 0.01
+
+
+class CallError(RuntimeError):
+    """A service or an action did not answer; the text names it and the time waited."""
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float, period_s: float = POLL_PERIOD_S) -> bool:
+    """Waits for a condition [wall time]; False when it did not hold in time, or ROS shuts down."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        if rospy.is_shutdown() or time.monotonic() >= deadline:
+            return False
+        time.sleep(period_s)
+    return True
+
+
+def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
+    """Waits for a service to be advertised.
+
+    Raises:
+        CallError: It was not advertised in time.
+    """
+    end = time.monotonic() + timeout_s
+    while True:
+        try:
+            rospy.wait_for_service(proxy.resolved_name, max(0.05, min(1.0, end - time.monotonic())))
+            return
+        except rospy.ROSException as error:
+            if rospy.is_shutdown() or time.monotonic() >= end:
+                raise CallError(f"service '{proxy.resolved_name}' was not advertised within {timeout_s:.1f} s; "
+                                "start the node that offers it") from error
+
+
+def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> Any:
+    """Calls a service.
+
+    Args:
+        proxy: The service.
+        request: Its request.
+        timeout_s: Longest wait for the answer [s].
+
+    Returns:
+        The answer.
+
+    Raises:
+        CallError: The service is absent, refused the call, or did not answer in time.
+    """
+    answers: list[Any] = []
+    errors: list[Exception] = []
+
+    def call() -> None:
+        try:
+            answers.append(proxy(request))
+        except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=call, daemon=True, name=f"call {proxy.resolved_name}")
+    thread.start()
+    thread.join(timeout_s)
+    if answers:
+        return answers[0]
+    if errors:
+        raise CallError(f"service '{proxy.resolved_name}' failed: {errors[0]}")
+    raise CallError(f"service '{proxy.resolved_name}' did not answer within {timeout_s:.1f} s")
+
+
+def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: float) -> None:
+    """Waits until an action server listens to a client.
+
+    Raises:
+        CallError: No server was there in time.
+    """
+    inner = client.action_client
+
+    def connected() -> bool:
+        ends = (inner.pub_goal, inner.pub_cancel, inner.result_sub, inner.feedback_sub)
+        return inner.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
+
+    if not wait_until(connected, timeout_s):
+        raise CallError(f"action server '{rospy.resolve_name(name)}' was not there within {timeout_s:.1f} s; "
+                        "start the node that offers it")
+
+
+def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,
+                    stop_requested: Callable[[], bool] = lambda: False) -> int:
+    """Waits for the end of a goal; cancels it when asked to stop or out of time.
+
+    Args:
+        client: Client whose goal was sent.
+        timeout_s: Longest wait [s].
+        stop_requested: Asked all the time; True cancels the goal.
+
+    Returns:
+        The final goal status, PREEMPTED after a stop, LOST out of time.
+    """
+    ended = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.RECALLED,
+             GoalStatus.LOST)
+    stopped = False
+
+    def finished() -> bool:
+        nonlocal stopped
+        stopped = stopped or stop_requested()
+        return stopped or client.get_state() in ended
+
+    if wait_until(finished, timeout_s) and not stopped:
+        return int(client.get_state())
+    client.cancel_goal()
+    wait_until(lambda: client.get_state() in ended, 2.0)
+    return int(GoalStatus.PREEMPTED if stopped else GoalStatus.LOST)

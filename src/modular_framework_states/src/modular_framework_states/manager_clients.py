@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fetches messages from the managers and stores plans there, on behalf of the states."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+from moveit_msgs.msg import RobotTrajectory
+
+from modular_framework_core import srv
+from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+
+SERVICE_TIMEOUT_S = 10.0
+
+GRASP_STAGES = ("pregrasp", "grasp", "postgrasp")
+
+# kind of message: (service, type, field of the name, field of the message)
+_GET: dict[str, tuple[str, Any, str, str]] = {
+    "joint_state": ("get_joint_state", srv.GetJointState, "joint_state_name", "joint_state"),
+    "trajectory": ("get_trajectory", srv.GetJointTrajectory, "trajectory_name", "joint_trajectory"),
+    "plan": ("get_plan", srv.GetMoveitPlan, "plan_name", "moveit_plan"),
+    "pose": ("get_pose_stamped", srv.GetPoseStamped, "pose_name", "pose_stamped"),
+    "grasp": ("get_grasp", srv.GetStandardisedGrasp, "grasp_name", "grasp_message"),
+}
+
+
+class ManagerError(RuntimeError):
+    """A manager cannot be reached or has no such message; the text says which and what to do."""
+
+
+def kind_of(message_type: str) -> str:
+    """Returns the kind of message behind a type word: every stage of a grasp is kept in a grasp message."""
+    return "grasp" if message_type in GRASP_STAGES else message_type
+
+
+def fetch(kind: str, name: str) -> Any:
+    """Fetches a message.
+
+    Args:
+        kind: joint_state, trajectory, plan, pose or grasp.
+        name: Name of the message; empty takes the oldest anonymous one out of its queue.
+
+    Returns:
+        The message.
+
+    Raises:
+        ManagerError: The manager does not answer, or has no such message.
+    """
+    service, service_type, name_field, message_field = _GET[kind]
+    answer = _call(service, service_type, service_type._request_class(**{name_field: name}))
+    if not answer.success:
+        what = f"no {kind.replace('_', ' ')} named '{name}' is stored" if name else (
+            f"no anonymous {kind.replace('_', ' ')} is left")
+        raise ManagerError(f"{what} (service '{rospy.resolve_name(service)}')")
+    return getattr(answer, message_field)
+
+
+def store_plan(plan: RobotTrajectory, name: str) -> None:
+    """Stores a plan.
+
+    Raises:
+        ManagerError: The manager does not answer, or refuses the plan.
+    """
+    answer = _call("add_plan", srv.AddMoveitPlan, srv.AddMoveitPlanRequest(moveit_plan=plan, plan_name=name))
+    if not answer.success:
+        raise ManagerError(f"service '{rospy.resolve_name('add_plan')}' refused the plan '{name}'")
+
+
+def _call(service: str, service_type: Any, request: Any) -> Any:
+    proxy = rospy.ServiceProxy(service, service_type)
+    try:
+        wait_for_service(proxy, SERVICE_TIMEOUT_S)
+        return call_service(proxy, request, SERVICE_TIMEOUT_S)
+    except CallError as error:
+        raise ManagerError(str(error)) from error

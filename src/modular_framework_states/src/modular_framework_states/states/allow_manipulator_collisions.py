@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task say what the manipulator may touch while the next motions are planned."""
+from __future__ import annotations
+
+import rospy
+from moveit_msgs.msg import PlanningScene
+from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest
+
+MODIFICATIONS = {"": GetModifiedACMRequest.NOTHING,
+                 "self-collision": GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION,
+                 "object-collision": GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION}
+SERVICE_TIMEOUT_S = 10.0
+
+
+class AllowManipulatorCollisions(FrameworkState):
+    """Changes which collisions of the manipulator are allowed; positive once the planning scene has taken the change.
+
+    Args:
+        allow: True allows, False restores what the robot's description says.
+        collision_type: self-collision, object-collision, or nothing to apply the matrix as it stands.
+        objects: Names of the objects; none means all that were added.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, allow, collision_type="", objects=(), outcomes=("success", "fail"), input_keys=(),
+                 output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if collision_type not in MODIFICATIONS:
+            raise ValueError(f"AllowManipulatorCollisions: collision_type is '{collision_type}', allowed are "
+                             f"{list(MODIFICATIONS)}")
+        self._request = GetModifiedACMRequest(modification=MODIFICATIONS[collision_type], allow_collision=bool(allow),
+                                              objects=[objects] if isinstance(objects, str) else list(objects))
+
+    def execute(self, userdata):
+        """Fetches the changed matrix and applies it."""
+        get_matrix = rospy.ServiceProxy("get_modified_acm", GetModifiedACM)
+        apply_scene = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
+        try:
+            for proxy in (get_matrix, apply_scene):
+                wait_for_service(proxy, SERVICE_TIMEOUT_S)
+            answer = call_service(get_matrix, self._request, SERVICE_TIMEOUT_S)
+            if not answer.success:
+                return self.fail(f"service '{get_matrix.resolved_name}' refused the change; its node logged the reason")
+            scene = PlanningScene(is_diff=True, allowed_collision_matrix=answer.acm)
+            scene.robot_state.is_diff = True
+            applied = call_service(apply_scene, ApplyPlanningSceneRequest(scene=scene), SERVICE_TIMEOUT_S)
+        except CallError as error:
+            return self.fail(str(error))
+        if not applied.success:
+            return self.fail(f"service '{apply_scene.resolved_name}' did not take the collision matrix of "
+                             f"{len(answer.acm.entry_names)} entries; its node logged the reason")
+        return self.succeed()

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task execute a plan, and makes sure that the arm got where the plan ends."""
+from __future__ import annotations
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_states.manager_clients import ManagerError, fetch
+
+SETTLE_TIME_S = 2.0
+
+
+class Move(FrameworkState):
+    """Executes a plan; positive only when the joints are at its last point afterwards.
+
+    Args:
+        plan_name: Name of the plan; empty takes the oldest anonymous one. Userdata ``selected_plan`` is taken instead
+            when it is an input key.
+        start_tolerance: Greatest distance of a joint from the first point of the plan before the motion [rad or m].
+        goal_tolerance: Greatest distance of a joint from the last point afterwards [rad or m].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+    """
+
+    def __init__(self, plan_name="", start_tolerance=0.02, goal_tolerance=0.03, outcomes=("success", "fail"),
+                 input_keys=(), output_keys=(), io_keys=("arm_commander",)):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._plan_name = plan_name
+        self._start_tolerance, self._goal_tolerance = float(start_tolerance), float(goal_tolerance)
+
+    def execute(self, userdata):
+        """Executes the plan."""
+        commander = userdata.arm_commander
+        try:
+            plan = self._plan(userdata)
+        except ManagerError as error:
+            return self.fail(str(error))
+        trajectory = plan.joint_trajectory
+        if not trajectory.points:
+            return self.fail(f"plan '{self._plan_name}' has no point")
+        first, last = (dict(zip(trajectory.joint_names, trajectory.points[index].positions, strict=False))
+                       for index in (0, -1))
+        away = self._worst(commander, first)
+        if away[1] > self._start_tolerance:
+            return self.fail(f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
+                             f"its first point, allowed is {self._start_tolerance}; plan again from the current state")
+        result = commander.execute_plan(plan, stop_requested=self.preempt_requested)
+        if self.preempt_requested():
+            return self.stopped()
+        if not result:
+            return self.fail(f"plan '{self._plan_name}' was not executed: {result.reason}")
+        if not self.wait_until(lambda: self._worst(commander, last)[1] <= self._goal_tolerance, SETTLE_TIME_S):
+            if self.preempt_requested():
+                return self.stopped()
+            joint, distance = self._worst(commander, last)
+            return self.fail(f"plan '{self._plan_name}' was executed, but joint '{joint}' is {distance:.4f} away from "
+                             f"its last point, allowed is {self._goal_tolerance}")
+        return self.succeed()
+
+    def _plan(self, userdata):
+        if "selected_plan" not in self.get_registered_input_keys():
+            return fetch("plan", self._plan_name)
+        if userdata.selected_plan is None:
+            raise ManagerError("userdata 'selected_plan' is empty; select or make a plan first")
+        return userdata.selected_plan
+
+    @staticmethod
+    def _worst(commander, wanted):
+        """Returns the joint farthest from where it should be, and how far it is."""
+        current = commander.current_joints()
+        distances = {joint: abs(current.get(joint, float("inf")) - position) for joint, position in wanted.items()}
+        worst = max(distances, key=distances.__getitem__)
+        return worst, distances[worst]

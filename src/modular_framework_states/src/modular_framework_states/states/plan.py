@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task plan an arm motion now and execute it later."""
+from __future__ import annotations
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_states.grasp_stages import StageError, arrival_fingers, near_joints, stage_joints
+from modular_framework_states.manager_clients import GRASP_STAGES, ManagerError, fetch, kind_of, store_plan
+
+STATE_TYPES = ("pose", "joint_state", *GRASP_STAGES)
+FROM_USERDATA = "userdata"
+
+
+class Plan(FrameworkState):
+    """Plans from one state of the arm to another and stores the plan.
+
+    Targets that are poses are turned into joint positions first, always the solution nearest to where the plan starts,
+    so that plans made at the same time fit together (see ``grasp_stages``). A start at a stage of a grasp has the
+    fingers of the pregrasp posture.
+
+    Args:
+        target_state_type: pose, joint_state, grasp, pregrasp or postgrasp.
+        target_state_name: Name of the message; ``userdata`` takes ``selected_<type>``; empty the oldest anonymous one.
+        plan_name: Name to store the plan under; empty stores it anonymously.
+        starting_state_type: As the target's; empty starts from where the arm is.
+        starting_state_name: As the target's.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written; ``selected_plan`` receives the plan when it is listed.
+        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+    """
+
+    def __init__(self, target_state_type, target_state_name="", plan_name="", starting_state_type="",
+                 starting_state_name="", outcomes=("success", "fail"), input_keys=(), output_keys=(),
+                 io_keys=("arm_commander",)):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if target_state_type not in STATE_TYPES:
+            raise ValueError(f"Plan: target_state_type is '{target_state_type}', allowed are {list(STATE_TYPES)}")
+        if starting_state_type and starting_state_type not in STATE_TYPES:
+            raise ValueError(f"Plan: starting_state_type is '{starting_state_type}', allowed are {list(STATE_TYPES)} "
+                             "or nothing for the current state")
+        self._target_type, self._target_name = target_state_type, target_state_name
+        self._start_type, self._start_name = starting_state_type, starting_state_name
+        self._plan_name = plan_name
+
+    def execute(self, userdata):
+        """Plans and stores the plan."""
+        try:
+            commander = userdata.arm_commander
+            start = self._start(userdata, commander)
+            target = self._target(userdata, commander, start)
+            if self.preempt_requested():
+                return self.stopped()
+            result = commander.plan_to_joint_value_target(target, custom_start_state=start)
+            if not result.success:
+                return self.fail(f"{self._describe()}: {result.reason}")
+            if self.preempt_requested():
+                return self.stopped()
+            store_plan(result.trajectory, self._plan_name)
+        except (ManagerError, StageError) as error:
+            return self.fail(f"{self._describe()}: {error}")
+        if "selected_plan" in self.get_registered_output_keys():
+            userdata.selected_plan = result.trajectory
+        return self.succeed()
+
+    def _start(self, userdata, commander):
+        """Returns {joint: position} to start from, None for the current state."""
+        if not self._start_type:
+            return None
+        message = self._message(userdata, self._start_type, self._start_name)
+        match self._start_type:
+            case "joint_state":
+                return joint_values(message, self._start_name)
+            case "pose":
+                return pose_joints(commander, message, None)
+            case stage:
+                return stage_joints(commander, message, stage) | arrival_fingers(message)
+
+    def _target(self, userdata, commander, start):
+        """Returns {joint: position} to go to."""
+        message = self._message(userdata, self._target_type, self._target_name)
+        match self._target_type:
+            case "joint_state":
+                return joint_values(message, self._target_name)
+            case "pose":
+                return pose_joints(commander, message, start)
+            case stage if start is None and stage == "pregrasp":
+                return stage_joints(commander, message, stage)
+            case stage:
+                return near_joints(commander, message, stage, start or commander.current_joints())
+
+    def _message(self, userdata, state_type, name):
+        kind = kind_of(state_type)
+        if name != FROM_USERDATA:
+            return fetch(kind, name)
+        keys = [key for key in (f"selected_{state_type}", f"selected_{kind}")
+                if key in self.get_registered_input_keys()]
+        if not keys:
+            raise ManagerError(f"the {state_type} is to be taken from userdata, but 'selected_{kind}' is not among the "
+                               f"input keys {sorted(self.get_registered_input_keys())}")
+        message = getattr(userdata, keys[0])
+        if message is None:
+            raise ManagerError(f"userdata '{keys[0]}' is empty; select a message before planning with it")
+        return message
+
+    def _describe(self):
+        start = f"{self._start_type} {self._start_name}".strip() or "the current state"
+        return f"plan '{self._plan_name}' from {start} to {self._target_type} {self._target_name}".rstrip()
+
+
+def joint_values(message, name):
+    """Returns {joint: position} of a joint state message.
+
+    Raises:
+        ManagerError: The message has no positions, or not one for each name.
+    """
+    if not message.name or len(message.name) != len(message.position):
+        raise ManagerError(f"joint state '{name}' has {len(message.name)} names and {len(message.position)} positions; "
+                           "it needs as many of each, at least one")
+    return dict(zip(message.name, message.position, strict=True))
+
+
+def pose_joints(commander, pose, seed):
+    """Returns the joint positions of a pose that are nearest to a seed (None: to the current state).
+
+    Raises:
+        StageError: The pose cannot be reached.
+    """
+    result = commander.solve_ik(pose, seed)
+    if not result:
+        raise StageError(result.reason)
+    return dict(result.joints)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task choose the message its next states work with."""
+from __future__ import annotations
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_states.manager_clients import GRASP_STAGES, ManagerError, fetch, kind_of
+
+MESSAGE_TYPES = ("joint_state", "trajectory", "plan", "pose", *GRASP_STAGES)
+
+
+class Select(FrameworkState):
+    """Takes the next message from a manager and puts it into the userdata key ``selected_<type>``.
+
+    Every execution takes the next name of the list, or the oldest anonymous message when there is no list. When the
+    names are used up the outcome is negative, and the next execution begins with the first name again. All types of
+    grasp go to ``selected_grasp``.
+
+    Args:
+        message_type: joint_state, trajectory, plan, pose, grasp, pregrasp or postgrasp.
+        message_names: Names to take one after the other; None takes anonymous messages.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written; must hold ``selected_<type>``.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, message_type, message_names=None, outcomes=("success", "fail"), input_keys=(), output_keys=(),
+                 io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if message_type not in MESSAGE_TYPES:
+            raise ValueError(f"Select: message_type is '{message_type}', allowed are {list(MESSAGE_TYPES)}")
+        self._kind = kind_of(message_type)
+        self._key = f"selected_{self._kind}"
+        self._names = [message_names] if isinstance(message_names, str) else list(message_names or [""])
+        self._anonymous = not message_names
+        self._next = 0
+
+    def execute(self, userdata):
+        """Takes the next message."""
+        if self._key not in self.get_registered_output_keys():
+            return self.fail(f"the key '{self._key}' is not among the output keys {sorted(self._output_keys)}; add it, "
+                             "or the message goes nowhere")
+        if self._next >= len(self._names):
+            self._next = 0
+            return self.fail(f"all {len(self._names)} names were used: {', '.join(self._names)}")
+        try:
+            message = fetch(self._kind, self._names[self._next])
+        except ManagerError as error:
+            return self.fail(str(error))
+        if not self._anonymous:
+            self._next += 1
+        setattr(userdata, self._key, message)
+        return self.succeed()

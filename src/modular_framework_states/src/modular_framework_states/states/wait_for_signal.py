@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task wait until another component says that it has done its part."""
+from __future__ import annotations
+
+import threading
+
+import rospy
+from std_msgs.msg import Bool, String
+
+from modular_framework_core.framework_state import FrameworkState
+
+REASON_WAIT_S = 0.5
+
+
+class WaitForSignal(FrameworkState):
+    """Waits for one Bool on a topic; True is the positive outcome.
+
+    The topic is listened to from the moment the state is made: the latest signal that was not read yet counts, however
+    early it came. A component may explain a False by a text on ``<topic_name>/reason`` (std_msgs/String).
+
+    Args:
+        topic_name: Topic of the signal (std_msgs/Bool).
+        timeout: Longest wait [s]; None waits without limit, until stopped.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, topic_name, timeout=None, outcomes=("success", "fail"), input_keys=(), output_keys=(),
+                 io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if timeout is not None and not float(timeout) > 0.0:
+            raise ValueError(f"WaitForSignal: timeout is {timeout} s, allowed is more than 0, or none for no limit")
+        self._topic = str(topic_name)
+        self._timeout_s = None if timeout is None else float(timeout)
+        self._lock = threading.Lock()
+        self._signal: bool | None = None
+        self._explanation = ""
+        self._subscribers = [rospy.Subscriber(self._topic, Bool, self._on_signal, queue_size=10),
+                             rospy.Subscriber(f"{self._topic}/reason", String, self._on_reason, queue_size=10)]
+
+    def execute(self, userdata):
+        """Waits for a signal that was not read yet."""
+        if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
+            if self.preempt_requested():
+                return self.stopped()
+            publishers = self._subscribers[0].get_num_connections()
+            return self.fail(f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s "
+                             f"({publishers} publishers are connected)")
+        with self._lock:
+            signal, self._signal = self._signal, None
+        if signal:
+            return self.succeed()
+        self.wait_until(lambda: bool(self._explanation), REASON_WAIT_S)
+        because = f": {self._explanation}" if self._explanation else ""
+        return self.fail(f"topic '{rospy.resolve_name(self._topic)}' signalled failure{because}")
+
+    def _on_signal(self, message):
+        with self._lock:
+            self._signal = bool(message.data)
+
+    def _on_reason(self, message):
+        self._explanation = message.data
