@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+.PHONY: help build lint unit rostest system test bench requirements
+help:            ## list what can be made
+	@grep -E '^[a-z]+: *##' $(MAKEFILE_LIST) | sed 's/: *##/\t/' | expand -t 16
+build:           ## set up and build
+	./install.sh
+lint:            ## check style, types, manifests and scripts
+	./install.sh test lint
+unit:            ## run the tests that need no ROS master
+	./install.sh test unit
+rostest:         ## run the tests of nodes
+	./install.sh test rostest
+system:          ## run the tests of whole launches
+	./install.sh test system
+test:            ## run all tests
+	./install.sh test
+bench:           ## run every benchmark, quickly
+	@for benchmark in benchmarks/*; do [ -x $$benchmark ] && ./install.sh exec $$benchmark --quick || exit 1; done
+requirements:    ## compile requirements.txt from requirements.in
+	.venv/bin/pip install --quiet pip-tools
+	.venv/bin/pip-compile --quiet --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --strip-extras --no-header -o requirements.txt requirements.in

@@ -1,0 +1,230 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Sets the framework up on Debian 12 and runs it. See usage below.
+set -euo pipefail
+
+ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+VENV="$ROOT/.venv"
+LOG="$ROOT/logs/install.log"
+STAMPS="$ROOT/.venv/.stamps"
+
+usage() {
+  cat <<'TEXT'
+usage: ./install.sh [COMMAND]
+
+  (none)               set the framework up: Debian packages, Python environment, build
+  run [ARG:=VALUE..]   set up, then run the simulated pick; arguments are those of start_framework.launch
+  test [SUITE]         set up, then run the tests: lint, unit, rostest, system or all (the default)
+  shell                set up, then open a shell with everything sourced
+  help                 show this text
+
+Set-up may be repeated: what is done already is not done again.
+INSTALL_SPACE=1 builds and uses an install space instead of the devel space.
+TEXT
+}
+
+say() { printf '%s\n' "$*"; }
+
+fail() {  # message, what to do
+  printf '\nerror: %s\n' "$1" >&2
+  [ $# -lt 2 ] || printf '  what to do: %s\n' "$2" >&2
+  exit 1
+}
+
+# Runs a step with its output in the log; on failure shows the end of the log and what to do.
+step() {  # title, what to do on failure, command...
+  local title=$1 remedy=$2 start=$SECONDS
+  shift 2
+  printf '%s ... ' "$title"
+  printf '\n==== %s\n' "$title" >>"$LOG"
+  if "$@" >>"$LOG" 2>&1; then
+    printf 'done (%d s)\n' $((SECONDS - start))
+  else
+    printf 'FAILED\n'
+    tail -n 25 "$LOG" >&2
+    fail "$title failed; the whole output is in $LOG" "$remedy"
+  fi
+}
+
+check_system() {
+  local id="" version=""
+  if [ -r /etc/os-release ]; then
+    id=$(sed -n 's/^ID=//p' /etc/os-release | tr -d '"')
+    version=$(sed -n 's/^VERSION_ID=//p' /etc/os-release | tr -d '"')
+  fi
+  if [ "$id" != debian ] || [ "$version" != 12 ]; then
+    fail "this script sets up Debian 12 only; this system is '${id:-unknown} ${version:-}'" \
+      "use Docker on any other system: docker/deploy.sh container_name=mbf nvidia=false"
+  fi
+  command -v apt-get >/dev/null || fail "apt-get is missing" "use a complete Debian 12"
+}
+
+as_root() {
+  if [ "$(id -u)" = 0 ]; then
+    "$@"
+  elif command -v sudo >/dev/null; then
+    sudo "$@"
+  else
+    fail "installing Debian packages needs root, and sudo is missing" "run this script as root once, or install sudo"
+  fi
+}
+
+missing_debian_packages() {
+  local package
+  while read -r package; do
+    case $package in '' | '#'*) continue ;; esac
+    dpkg-query -W -f='${db:Status-Status}\n' "$package" 2>/dev/null | grep -q '^installed$' || printf '%s\n' "$package"
+  done <"$ROOT/packages-debian.txt"
+}
+
+install_debian_packages() {
+  local missing
+  mapfile -t missing < <(missing_debian_packages)
+  if [ ${#missing[@]} = 0 ]; then
+    say "[1/3] Debian packages: all there"
+    return
+  fi
+  step "[1/3] Debian packages: updating the package lists" "check the network and /etc/apt/sources.list" \
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get update
+  step "[1/3] Debian packages: installing ${#missing[@]} (some minutes on a bare system)" \
+    "read the messages above; 'apt-get -f install' repairs a broken package state" \
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
+}
+
+make_python_environment() {
+  local digest
+  digest=$(sha256sum "$ROOT/requirements.txt" | cut -d' ' -f1)
+  if [ -f "$STAMPS/$digest" ]; then
+    say "[2/3] Python environment: up to date"
+    return
+  fi
+  step "[2/3] Python environment: making .venv" "remove .venv and try again" \
+    /usr/bin/python3 -m venv --system-site-packages "$VENV"
+  step "[2/3] Python environment: installing requirements.txt (some minutes)" \
+    "check the network; then run this script again" \
+    "$VENV/bin/pip" install --disable-pip-version-check --progress-bar off -r "$ROOT/requirements.txt"
+  mkdir -p "$STAMPS"
+  touch "$STAMPS/$digest"
+}
+
+# An underlay's own message and tool packages win over ours: ours are then left out of the build.
+leave_out_packages_of_underlay() {
+  local folder name ignore
+  for folder in "$ROOT"/src/interfaces/*/ "$ROOT"/src/compat/*/; do
+    name=$(basename "$folder")
+    ignore="${folder}CATKIN_IGNORE"
+    if [ -n "${UNDERLAY:-}" ] && [ -d "$UNDERLAY/share/$name" ]; then
+      touch "$ignore"
+    else
+      rm -f "$ignore"
+    fi
+  done
+}
+
+# Everything whose change asks for a new build: definitions, build files, and which executables and launch files there are.
+build_fingerprint() {
+  {
+    find "$ROOT/src" "$ROOT/.catkin_tools" -type f \( -name CMakeLists.txt -o -name package.xml -o -name setup.py -o -name '*.msg' \
+      -o -name '*.srv' -o -name '*.action' -o -name '*.in' -o -name CATKIN_IGNORE -o -name config.yaml \) -print0 |
+      sort -z | xargs -0 sha256sum
+    find "$ROOT/src" -type f -perm -u+x | sort
+    if [ "${INSTALL_SPACE:-0}" = 1 ]; then
+      find "$ROOT/src" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum
+    fi
+    printf '%s %s\n' "${UNDERLAY:-none}" "${INSTALL_SPACE:-0}"
+  } | sha256sum | cut -d' ' -f1
+}
+
+build_workspace() {
+  local fingerprint stamp install=--no-install
+  leave_out_packages_of_underlay
+  fingerprint=$(build_fingerprint)
+  stamp="$ROOT/build/.fingerprint"
+  if [ "${INSTALL_SPACE:-0}" = 1 ]; then
+    install=--install
+    stamp="$ROOT/build_install/.fingerprint"
+  fi
+  if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$fingerprint" ]; then
+    say "[3/3] Workspace: built already"
+    return
+  fi
+  step "[3/3] Workspace: building" "read the messages above; 'catkin clean -y' removes what an earlier build left" \
+    run_catkin_build "$install"
+  printf '%s\n' "$fingerprint" >"$stamp"
+}
+
+run_catkin_build() {  # --install or --no-install
+  cd "$ROOT"
+  export PATH="$VENV/bin:$PATH" ROS_LANG_DISABLE=genlisp
+  # shellcheck disable=SC1091
+  [ -z "${UNDERLAY:-}" ] || . "$UNDERLAY/setup.sh"
+  # the profile is committed without an install space: a copy that has one is made beside it and not committed
+  local profile=default
+  if [ "$1" = --install ]; then
+    profile=install
+    mkdir -p .catkin_tools/profiles/install
+    sed 's/^install: false/install: true/; s/^\(build\|devel\|log\)_space: .*/&_install/' \
+      .catkin_tools/profiles/default/config.yaml >.catkin_tools/profiles/install/config.yaml
+  fi
+  catkin build --profile "$profile" --no-status --summarize --force-cmake \
+    --cmake-args -DCMAKE_BUILD_TYPE=Release "-DPYTHON_EXECUTABLE=$VENV/bin/python3"
+}
+
+find_underlay() {
+  UNDERLAY=""
+  if [ -f "/opt/ros/noetic/setup.sh" ]; then
+    UNDERLAY=/opt/ros/noetic
+  fi
+}
+
+set_up() {
+  check_system
+  mkdir -p "$ROOT/logs"
+  : >"$LOG"
+  find_underlay
+  install_debian_packages
+  make_python_environment
+  build_workspace
+}
+
+source_workspace() {
+  local space=devel
+  [ "${INSTALL_SPACE:-0}" = 1 ] && space=install
+  set +u
+  # shellcheck disable=SC1090,SC1091
+  . "$ROOT/$space/setup.bash"
+  set -u
+  export PATH="$VENV/bin:$PATH"
+}
+
+main() {
+  local command=${1:-setup}
+  [ $# = 0 ] || shift
+  case $command in
+    setup) set_up ;;
+    run)
+      set_up
+      source_workspace
+      exec rosrun modular_framework_api run_framework "$@"
+      ;;
+    test)
+      set_up
+      source_workspace
+      cd "$ROOT"
+      exec "$VENV/bin/python3" tests/run "$@"
+      ;;
+    shell)
+      set_up
+      source_workspace
+      say "The workspace is sourced; 'exit' leaves this shell."
+      exec bash -i
+      ;;
+    help | -h | --help) usage ;;
+    *)
+      usage >&2
+      fail "unknown command '$command'" "use one of: run, test, shell, help"
+      ;;
+  esac
+}
+
+main "$@"

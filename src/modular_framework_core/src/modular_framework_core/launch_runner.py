@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs a launch file to its end and says how it ended, which roslaunch itself does not.
+
+roslaunch always exits with 0. Whoever starts a task from a script needs the task's own exit code, and the name of the
+node when a node died instead.
+"""
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+
+import rosgraph
+import roslaunch
+import roslaunch.core
+import roslaunch.parent
+import roslaunch.pmon
+import roslaunch.rlutil
+import rospkg
+
+EXIT_NODE_DIED = 3
+EXIT_BAD_LAUNCH = 2
+
+
+@dataclass
+class EndWatcher(roslaunch.pmon.ProcessListener):
+    """Remembers the first process that ended badly, and how the task ended.
+
+    Attributes:
+        task_name: name of the node whose exit code is the launch's own.
+        task_exit_code: exit code of that node; None while it runs.
+        dead_node: name and exit code of the first other node that died; None if none did.
+    """
+
+    task_name: str
+    task_exit_code: int | None = None
+    dead_node: tuple[str, int | None] | None = None
+    parent: roslaunch.parent.ROSLaunchParent | None = field(default=None, repr=False)
+
+    def process_died(self, process_name: str, exit_code: int | None) -> None:
+        """Called by roslaunch's process monitor, with a name such as `move_group-5`."""
+        name = process_name.rpartition("-")[0] or process_name
+        if self.task_exit_code is not None or self.dead_node is not None:
+            return
+        if name == self.task_name and exit_code is not None and exit_code >= 0:
+            self.task_exit_code = exit_code
+        elif exit_code != 0 or self._is_required(name):
+            self.dead_node = (name, exit_code)
+            self._end_launch()
+
+    def _is_required(self, name: str) -> bool:
+        nodes = self.parent.config.nodes if self.parent is not None and self.parent.config is not None else []
+        return any(node.name == name and node.required for node in nodes)
+
+    def _end_launch(self) -> None:
+        if self.parent is not None and self.parent.pm is not None:
+            self.parent.pm.is_shutdown = True
+
+
+def run_launch_file(package: str, launch_file: str, arguments: list[str], task_name: str) -> int:
+    """Runs a launch file until its task or one of its nodes ends.
+
+    Args:
+        package: ROS package of the launch file.
+        launch_file: name of the file in the package's folder `launch`.
+        arguments: launch arguments, `name:=value`.
+        task_name: name of the node that runs the task.
+
+    Returns:
+        The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an
+        argument is wrong.
+    """
+    watcher = EndWatcher(task_name)
+    try:
+        path = roslaunch.rlutil.resolve_launch_arguments([package, launch_file])[0]
+        uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
+        roslaunch.configure_logging(uuid)
+        parent = roslaunch.parent.ROSLaunchParent(
+            uuid, [(path, arguments)], process_listeners=[watcher], port=_master_port(), show_summary=False
+        )
+        watcher.parent = parent
+        parent.start()
+        parent.spin()
+    except (roslaunch.core.RLException, rospkg.ResourceNotFound) as error:
+        print(f"run_framework: {error}", file=sys.stderr)
+        return EXIT_BAD_LAUNCH
+    return _verdict(watcher)
+
+
+def _master_port() -> int | None:
+    return rosgraph.network.parse_http_host_and_port(rosgraph.get_master_uri())[1]
+
+
+def _verdict(watcher: EndWatcher) -> int:
+    if watcher.dead_node is not None:
+        name, exit_code = watcher.dead_node
+        how = f"was killed by signal {-exit_code}" if exit_code is not None and exit_code < 0 else f"exited with {exit_code}"
+        print(f"run_framework: node '{name}' died ({how}); everything was stopped", file=sys.stderr)
+        return EXIT_NODE_DIED
+    if watcher.task_exit_code is None:
+        print("run_framework: stopped before the task ended", file=sys.stderr)
+        return 1
+    return watcher.task_exit_code
