@@ -16,6 +16,8 @@ usage: ./install.sh [COMMAND]
   run [ARG:=VALUE..]   set up, then run the simulated pick; arguments are those of start_framework.launch
   test [SUITE]         set up, then run the tests: lint, unit, rostest, system or all (the default)
   shell                set up, then open a shell with everything sourced
+  exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
+  packages             only install the Debian packages and the Python environment
   help                 show this text
 
 Set-up may be repeated: what is done already is not done again.
@@ -177,13 +179,17 @@ find_underlay() {
   fi
 }
 
-set_up() {
+set_up_packages() {
   check_system
   mkdir -p "$ROOT/logs"
   : >"$LOG"
-  find_underlay
   install_debian_packages
   make_python_environment
+}
+
+set_up() {
+  set_up_packages
+  find_underlay
   build_workspace
 }
 
@@ -202,6 +208,7 @@ main() {
   [ $# = 0 ] || shift
   case $command in
     setup) set_up ;;
+    packages) set_up_packages ;;
     run)
       set_up
       source_workspace
@@ -213,6 +220,11 @@ main() {
       cd "$ROOT"
       exec "$VENV/bin/python3" tests/run "$@"
       ;;
+    exec)
+      set_up
+      source_workspace
+      exec "$@"
+      ;;
     shell)
       set_up
       source_workspace
@@ -222,7 +234,7 @@ main() {
     help | -h | --help) usage ;;
     *)
       usage >&2
-      fail "unknown command '$command'" "use one of: run, test, shell, help"
+      fail "unknown command '$command'" "use one of: run, test, shell, exec, packages, help"
       ;;
   esac
 }
