@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Decides from the parameters which node drives the manipulator."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+PACKAGE_KEY = "package_manipulator_action_server"
+TYPE_KEY = "manipulator_controller_action_server_type"
+NAME_KEY = "manipulator_controller_node_name"
+
+
+class ExternalControllerError(ValueError):
+    """The parameters do not name a node; the text lists what is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerNode:
+    """A node to run.
+
+    Attributes:
+        package: ROS package of the executable.
+        node_type: Executable.
+        name: Name of the node.
+    """
+
+    package: str
+    node_type: str
+    name: str
+
+
+def controller_node(parameters: Mapping[str, object]) -> ControllerNode | None:
+    """Reads which node to run.
+
+    Args:
+        parameters: Values of the keys above that are set.
+
+    Returns:
+        The node; None when the package is empty, which says that the manipulator is driven by a ros_control plug-in.
+
+    Raises:
+        ExternalControllerError: A parameter is not set or empty.
+    """
+    if PACKAGE_KEY not in parameters:
+        raise ExternalControllerError(f"parameter '{PACKAGE_KEY}' is not set; set it to the package of the "
+                                      "manipulator's action server, or to an empty text when a ros_control plug-in drives it")
+    package = str(parameters[PACKAGE_KEY] or "")
+    if not package:
+        return None
+    missing = [key for key in (TYPE_KEY, NAME_KEY) if not parameters.get(key)]
+    if missing:
+        raise ExternalControllerError(f"the parameters {missing} are not set or empty; they name the executable and "
+                                      f"the node of package '{package}'")
+    return ControllerNode(package, str(parameters[TYPE_KEY]), str(parameters[NAME_KEY]))

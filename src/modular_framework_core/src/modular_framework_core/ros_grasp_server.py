@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Serves the Grasp action: moves the manipulator to the stages of a grasp and tells honestly how that ended."""
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import actionlib
+import rospy
+
+from modular_framework_core.grasp_server import (
+    GraspCommandError,
+    Outcome,
+    Stage,
+    Verdict,
+    closed_positions,
+    effort_limits,
+    judge,
+    posture_targets,
+)
+from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
+from modular_framework_core.robot_groups import Group, RobotModelError, read_group
+from modular_framework_core.ros_calls import CallError, wait_until
+from modular_framework_core.ros_manipulator_drivers import JointMonitor, ManipulatorDriver, Motion, make_driver
+
+FEEDBACK_PERIOD_S = 0.1
+MODEL_TIMEOUT_S = 60.0
+STAGE_FIELDS = {Stage.PREGRASP: ("pregrasp", "pregrasped"), Stage.GRASP: ("grasp", "grasped"),
+                Stage.POSTGRASP: ("postgrasp", "postgrasped")}
+
+
+class GraspServer:
+    """Action server of modular_framework_core/Grasp. A new goal replaces the one under way; a cancel stops the fingers.
+
+    Only ``posture`` of the commanded stage moves anything here: bringing the hand to ``pose`` is the arm's part.
+
+    Parameters:
+        ``manipulator_controller_action_server_name`` (moveit_grasp_action_server): name of the action.
+        ``manipulator_group_name``: planning group of the fingers.
+        ``robot_description``, ``robot_description_semantic``: the robot.
+        ``/move_group/controller_list`` or ``~controller_list``: controllers to drive the fingers with.
+        ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.
+        ``~position_tolerance`` (0.05 rad): distance that counts as reached.
+        ``~motion_timeout`` (30 s), ``~motion_duration`` (2 s, trajectory controllers only).
+
+    Subscribers: ``joint_states``. Actions called: the controller's own.
+    """
+
+    def __init__(self, group: Group, controllers: list[dict[str, Any]]) -> None:
+        """Stores the robot's side; the action is offered by :meth:`connect`."""
+        self._group, self._controllers = group, controllers
+        self._full_scale = float(rospy.get_param("~max_torque_full_scale", 800.0))
+        self._tolerance = float(rospy.get_param("~position_tolerance", 0.05))
+        self._timeout_s = float(rospy.get_param("~motion_timeout", 30.0))
+        self._duration_s = float(rospy.get_param("~motion_duration", 2.0))
+        self._monitor = JointMonitor()
+        self._lock = threading.Lock()
+        self._motion_lock = threading.Lock()
+        self._stops: dict[str, threading.Event] = {}
+        self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
+
+    def connect(self, action_name: str) -> None:
+        """Starts to listen to the joints and offers the action."""
+        self._monitor.connect()
+        self._server = actionlib.ActionServer(action_name, GraspAction, self._on_goal, self._on_cancel,
+                                              auto_start=False)
+        self._server.start()
+
+    def _on_goal(self, handle: Any) -> None:
+        stop = threading.Event()
+        with self._lock:
+            for other in self._stops.values():
+                other.set()
+            self._stops[handle.get_goal_id().id] = stop
+        handle.set_accepted()
+        threading.Thread(target=self._run, args=(handle, stop), daemon=True).start()
+
+    def _on_cancel(self, handle: Any) -> None:
+        with self._lock:
+            stop = self._stops.get(handle.get_goal_id().id)
+        if stop is not None:
+            stop.set()
+
+    def _run(self, handle: Any, stop: threading.Event) -> None:
+        result = GraspResult()
+        try:
+            with self._motion_lock:
+                stage, verdict = self._carry_out(handle, stop)
+            getattr(result, STAGE_FIELDS[stage][1]).data = verdict.reached
+            if stop.is_set():
+                handle.set_canceled(result, "stopped on request")
+            elif verdict.reached:
+                handle.set_succeeded(result, verdict.reason)
+            else:
+                handle.set_aborted(result, verdict.reason)
+            rospy.loginfo("%s: %s.", STAGE_FIELDS[stage][0], verdict.reason)
+        except (GraspCommandError, CallError, RobotModelError) as error:
+            if stop.is_set():
+                handle.set_canceled(GraspResult(), "stopped on request")
+            else:
+                rospy.logerr("Grasp command: %s", error)
+                handle.set_aborted(GraspResult(), str(error))
+        except Exception as error:  # noqa: BLE001 - a client must never wait for a goal whose thread died
+            rospy.logerr("Grasp command: unexpected %r", error)
+            handle.set_aborted(GraspResult(), f"internal error: {error!r}")
+        finally:
+            with self._lock:
+                self._stops.pop(handle.get_goal_id().id, None)
+
+    def _carry_out(self, handle: Any, stop: threading.Event) -> tuple[Stage, Verdict]:
+        command: GraspCommand = handle.get_goal().grasp_command
+        stage = Stage.of(command.grasp_state)
+        posture = getattr(command.grasp, STAGE_FIELDS[stage][0]).posture
+        targets = posture_targets(posture.name, posture.position, self._group)
+        torque = command.grasp.torque_intensity
+        intensities = dict(zip(torque.joint_names, torque.torque_intensity, strict=False))
+        share = min(1.0, command.max_torque / self._full_scale)
+        motion = Motion(targets, effort_limits(targets, intensities, self._group, share), self._timeout_s, stop.is_set)
+        outcome = self._move(handle, motion)
+        return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)
+
+    def _move(self, handle: Any, motion: Motion) -> Outcome:
+        key = tuple(sorted(motion.targets))
+        if key not in self._drivers:
+            self._drivers[key] = make_driver(self._controllers, motion.targets, self._duration_s)
+        ended = threading.Event()
+
+        def publish() -> None:
+            while not ended.wait(FEEDBACK_PERIOD_S):
+                handle.publish_feedback(GraspFeedback(current_joint_state=self._monitor.message(motion.targets)))
+
+        threading.Thread(target=publish, daemon=True).start()
+        try:
+            return self._drivers[key].move(motion, self._monitor)
+        finally:
+            ended.set()
+
+
+def read_manipulator() -> Group:
+    """Reads the manipulator's planning group from the parameter server.
+
+    Raises:
+        RobotModelError: A parameter is not set, or the group has no active joint.
+    """
+    names = ("manipulator_group_name", "robot_description", "robot_description_semantic")
+    wait_until(lambda: all(rospy.has_param(name) for name in names), MODEL_TIMEOUT_S, 0.1)
+    missing = [rospy.resolve_name(name) for name in names if not rospy.has_param(name)]
+    if missing:
+        raise RobotModelError(f"the parameters {missing} were not set within {MODEL_TIMEOUT_S} s; "
+                              "load the robot and manipulator_controller_parameters.yaml first")
+    name, urdf, srdf = (str(rospy.get_param(parameter)) for parameter in names)
+    group = read_group(urdf, srdf, name)
+    if not group.joints:
+        raise RobotModelError(f"planning group '{name}' has no active joint; name the fingers' group")
+    return group
+
+
+def read_controllers() -> list[dict[str, Any]]:
+    """Reads the controllers from ``~controller_list`` or ``/move_group/controller_list``.
+
+    Raises:
+        RobotModelError: Neither is set.
+    """
+    names = ("~controller_list", "/move_group/controller_list", "controller_list")
+    wait_until(lambda: any(rospy.has_param(name) for name in names), MODEL_TIMEOUT_S, 0.1)
+    for name in names:
+        if rospy.has_param(name):
+            return list(rospy.get_param(name))
+    raise RobotModelError(f"none of the parameters {[rospy.resolve_name(name) for name in names]} was set within "
+                          f"{MODEL_TIMEOUT_S} s; load the controllers.yaml of the MoveIt config package")
+
+
+def main() -> int:
+    """Runs the node ``moveit_grasp_action_server``; returns 1 when the robot's side is incomplete."""
+    rospy.init_node("moveit_grasp_action_server")
+    try:
+        server = GraspServer(read_manipulator(), read_controllers())
+    except RobotModelError as error:
+        rospy.logfatal("moveit_grasp_action_server: %s", error)
+        return 1
+    name = str(rospy.get_param("manipulator_controller_action_server_name", "moveit_grasp_action_server"))
+    server.connect(name)
+    rospy.loginfo("The manipulator listens to action '%s'.", rospy.resolve_name(name))
+    rospy.spin()
+    return 0

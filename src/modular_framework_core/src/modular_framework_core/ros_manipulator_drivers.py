@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Moves the manipulator through its own controller, whichever of the two kinds of action it offers."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryGoal,
+    GripperCommandAction,
+    GripperCommandGoal,
+)
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_core.grasp_server import GraspCommandError, Outcome
+from modular_framework_core.ros_calls import wait_for_action, wait_for_result, wait_until
+
+REST_SPEED = 0.02
+REST_TIME_S = 0.5
+
+
+class JointMonitor:
+    """Remembers the latest joint positions and speeds.
+
+    Subscribers: ``joint_states`` (sensor_msgs/JointState).
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._positions: dict[str, float] = {}
+        self._velocities: dict[str, float] = {}
+        self._subscriber: rospy.Subscriber | None = None
+
+    def connect(self) -> None:
+        """Starts listening."""
+        self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10)
+
+    def positions(self, names: Mapping[str, float] | list[str]) -> dict[str, float]:
+        """Returns the positions of the joints that were heard of."""
+        with self._lock:
+            return {name: self._positions[name] for name in names if name in self._positions}
+
+    def at_rest(self, names: Mapping[str, float]) -> bool:
+        """Returns whether every joint is slower than a crawl; a joint without a speed counts as resting."""
+        with self._lock:
+            return all(abs(self._velocities.get(name, 0.0)) < REST_SPEED for name in names)
+
+    def message(self, names: Mapping[str, float]) -> JointState:
+        """Makes a joint state message of some joints."""
+        positions = self.positions(names)
+        state = JointState(name=list(positions), position=list(positions.values()))
+        state.header.stamp = rospy.Time.now()
+        return state
+
+    def _on_joint_states(self, message: JointState) -> None:
+        with self._lock:
+            self._positions.update(zip(message.name, message.position, strict=False))
+            self._velocities.update(zip(message.name, message.velocity, strict=False))
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One motion of the fingers.
+
+    Attributes:
+        targets: {joint: position} [rad or m].
+        efforts: {joint: greatest effort} [N m or N]; 0 leaves the limit to the controller.
+        timeout_s: Longest time the motion may take [s, wall time].
+        stop_requested: Asked all the time; True stops the fingers.
+    """
+
+    targets: dict[str, float]
+    efforts: dict[str, float]
+    timeout_s: float
+    stop_requested: Callable[[], bool]
+
+
+class ManipulatorDriver(Protocol):
+    """One kind of controller."""
+
+    def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
+        """Moves the fingers and waits for the end."""
+
+
+class GripperDriver:
+    """Drives a controller with one joint through control_msgs/GripperCommand.
+
+    Args:
+        action: Name of the action.
+    """
+
+    def __init__(self, action: str) -> None:
+        self._action = action
+        self._client = actionlib.SimpleActionClient(action, GripperCommandAction)
+
+    def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
+        """Moves the joint; a stall is an outcome, not an error.
+
+        Raises:
+            CallError: The controller is not there.
+            GraspCommandError: There is more than one joint, or the controller neither reached the target nor stalled.
+        """
+        if len(motion.targets) != 1:
+            raise GraspCommandError(f"controller action '{self._action}' moves one joint, the posture has "
+                                    f"{sorted(motion.targets)}")
+        (name, position), = motion.targets.items()
+        wait_for_action(self._client, self._action, 10.0)
+        goal = GripperCommandGoal()
+        goal.command.position, goal.command.max_effort = position, motion.efforts.get(name, 0.0)
+        self._client.send_goal(goal)
+        status = wait_for_result(self._client, motion.timeout_s, motion.stop_requested)
+        result = self._client.get_result()
+        _refuse_unfinished(status, self._action, motion)
+        if result is None or not (result.stalled or result.reached_goal):
+            raise GraspCommandError(f"controller action '{self._action}' gave up: "
+                                    f"{self._client.get_goal_status_text() or 'no reason given'}")
+        positions = monitor.positions(motion.targets) or {name: result.position}
+        return Outcome(positions, bool(result.stalled), f"the controller stopped at {result.position:.4f}")
+
+
+class TrajectoryDriver:
+    """Drives a controller through control_msgs/FollowJointTrajectory.
+
+    Args:
+        action: Name of the action.
+        duration_s: Time given to the fingers for a motion [s].
+    """
+
+    def __init__(self, action: str, duration_s: float) -> None:
+        self._action, self._duration_s = action, duration_s
+        self._client = actionlib.SimpleActionClient(action, FollowJointTrajectoryAction)
+
+    def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
+        """Moves the joints; fingers that rest short of their targets are stalled.
+
+        Raises:
+            CallError: The controller is not there.
+            GraspCommandError: The controller refused the motion or did not end it.
+        """
+        wait_for_action(self._client, self._action, 10.0)
+        goal = FollowJointTrajectoryGoal()
+        goal.trajectory.joint_names = list(motion.targets)
+        goal.trajectory.points = [JointTrajectoryPoint(positions=list(motion.targets.values()),
+                                                       time_from_start=rospy.Duration.from_sec(self._duration_s))]
+        self._client.send_goal(goal)
+        status = wait_for_result(self._client, motion.timeout_s, motion.stop_requested)
+        result = self._client.get_result()
+        _refuse_unfinished(status, self._action, motion)
+        if status == GoalStatus.REJECTED:
+            raise GraspCommandError(f"controller action '{self._action}' rejected the posture: "
+                                    f"{result.error_string if result else self._client.get_goal_status_text()}")
+        wait_until(lambda: monitor.at_rest(motion.targets), REST_TIME_S)
+        return Outcome(monitor.positions(motion.targets), status != GoalStatus.SUCCEEDED and
+                       monitor.at_rest(motion.targets), result.error_string if result else "")
+
+
+def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], duration_s: float) -> ManipulatorDriver:
+    """Chooses the controller that has all joints of a posture.
+
+    Args:
+        controllers: Entries of ``controller_list``: name, action_ns, type, joints.
+        joints: Joints to move.
+        duration_s: Time given to a motion of a trajectory controller [s].
+
+    Returns:
+        A driver of that controller.
+
+    Raises:
+        GraspCommandError: No controller has all the joints, or its type is unknown.
+    """
+    known = {str(entry.get("name")): list(entry.get("joints", [])) for entry in controllers}
+    for entry in controllers:
+        if set(joints) <= set(entry.get("joints", [])):
+            action = "/".join(part for part in (str(entry.get("name", "")), str(entry.get("action_ns", ""))) if part)
+            match entry.get("type"):
+                case "GripperCommand":
+                    return GripperDriver(action)
+                case "FollowJointTrajectory":
+                    return TrajectoryDriver(action, duration_s)
+                case other:
+                    raise GraspCommandError(f"controller '{entry.get('name')}' has the type '{other}', allowed are "
+                                            "GripperCommand and FollowJointTrajectory")
+    raise GraspCommandError(f"no controller has all the joints {sorted(joints)}; controller_list has {known}")
+
+
+def _refuse_unfinished(status: int, action: str, motion: Motion) -> None:
+    if motion.stop_requested():
+        raise GraspCommandError("stopped on request")
+    if status == GoalStatus.LOST:
+        raise GraspCommandError(f"controller action '{action}' did not end within {motion.timeout_s:.1f} s")
