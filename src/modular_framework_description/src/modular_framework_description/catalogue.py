@@ -48,7 +48,7 @@ FURNITURE = (
         *(Part("box", (0.05, 0.05, _TABLE_HEIGHT - _TABLE_TOP), (x, y, (_TABLE_HEIGHT - _TABLE_TOP) / 2.0))
           for x in (-0.56, 0.56) for y in (-0.36, 0.36)),
     ), colour=(0.80, 0.74, 0.64)),
-    Body("robot_pedestal", "The stand of the arm, 0.855 m high: its top stays 2 mm clear of the arm's base.", 0.0, (
-        Part("box", (0.24, 0.24, 0.855), (0.0, 0.0, 0.4275)),
+    Body("robot_pedestal", "The stand of the arm, 0.85 m high: its top stays 7 mm clear of the arm's base.", 0.0, (
+        Part("box", (0.24, 0.24, 0.85), (0.0, 0.0, 0.425)),
     ), colour=(0.30, 0.31, 0.33)),
 )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Expansion of xacro files whose ``$(find pkg)`` must be answered by rospkg."""
 
-import os
+import difflib
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,16 +18,16 @@ class PackageNotFoundError(substitution_args.SubstitutionException):
 
     Attributes:
         package: the name that was looked for.
-        search_path: the folders that were searched, in order.
+        similar: names of packages that exist and look like it.
     """
 
-    def __init__(self, package: str, search_path: Sequence[str]) -> None:
+    def __init__(self, package: str, similar: Sequence[str]) -> None:
         self.package = package
-        self.search_path = tuple(search_path)
-        folders = ", ".join(self.search_path) or "(ROS_PACKAGE_PATH is empty)"
+        self.similar = tuple(similar)
+        hint = f"did you mean {' or '.join(self.similar)}?" if similar else "nothing there has a similar name."
         super().__init__(
-            f"$(find {package}): no ROS package '{package}' under {folders}. "
-            "Check the spelling, or source the setup.bash of the workspace that has the package."
+            f"$(find {package}): no ROS package '{package}' on ROS_PACKAGE_PATH; {hint} "
+            "If the name is right, source the setup.bash of the workspace that has the package."
         )
 
 
@@ -40,23 +40,21 @@ def find_package(package: str) -> str:
     Raises:
         PackageNotFoundError: when the package is not on ROS_PACKAGE_PATH.
     """
+    packages = rospkg.RosPack()
     try:
-        return str(rospkg.RosPack().get_path(package))
+        return str(packages.get_path(package))
     except rospkg.ResourceNotFound as error:
-        search_path = [path for path in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if path]
-        raise PackageNotFoundError(package, search_path) from error
+        raise PackageNotFoundError(package, difflib.get_close_matches(package, packages.list())) from error
 
 
 def use_rospkg() -> None:
-    """Make the xacro module answer ``$(find pkg)`` and ``$(eval find(...))`` through rospkg."""
-    for attribute in ("_eval_find", "_eval_dict"):
-        if not hasattr(substitution_args, attribute):
-            raise RuntimeError(
-                f"xacro.substitution_args has no '{attribute}': this version of the PyPI package xacro is not "
-                "supported. Install the version pinned in requirements.txt."
-            )
+    """Make the xacro module answer ``$(find pkg)`` through rospkg."""
+    if not hasattr(substitution_args, "_eval_find"):
+        raise RuntimeError(
+            "xacro.substitution_args has no '_eval_find': this version of the PyPI package xacro is not supported. "
+            "Install the version pinned in requirements.txt."
+        )
     substitution_args._eval_find = find_package
-    substitution_args._eval_dict["find"] = find_package
 
 
 def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
@@ -71,7 +69,12 @@ def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
         xacro.XacroException: when the file is not valid xacro.
     """
     use_rospkg()
-    document = xacro.process_file(str(path), mappings={key: str(value) for key, value in (mappings or {}).items()})
+    try:
+        document = xacro.process_file(str(path), mappings={key: str(value) for key, value in (mappings or {}).items()})
+    except xacro.XacroException as error:
+        if isinstance(error.exc, PackageNotFoundError):
+            raise error.exc from error
+        raise
     return str(document.toprettyxml(indent="  "))
 
 
