@@ -60,6 +60,10 @@ class Launch:
                 self.process.wait(STOP_TIMEOUT_S)
 
 
+def _launch_arguments(args: Mapping[str, object]) -> list[str]:
+    return [f"{name}:={value}" for name, value in args.items()]
+
+
 class RosSession:
     """A private master; `launch` starts launch files on it.
 
@@ -100,8 +104,19 @@ class RosSession:
         path = Path(launch_xml) if isinstance(launch_xml, Path) else self.folder / f"launch_{number}.launch"
         if isinstance(launch_xml, str):
             path.write_text(launch_xml)
-        command = ["roslaunch", "--wait", str(path), *(f"{name}:={value}" for name, value in args.items())]
-        started = Launch(command, self.env, self.folder / f"launch_{number}.txt")
+        return self._start(["roslaunch", "--wait", str(path), *_launch_arguments(args)])
+
+    def launch_package(self, package: str, launch_file: str, **args: object) -> Launch:
+        """Starts roslaunch as a user would, master included: `roslaunch PACKAGE FILE name:=value ...`."""
+        command = ["roslaunch", "-p", str(self.port), package, launch_file, *_launch_arguments(args)]
+        return self._start(command)
+
+    def run_framework(self, **args: object) -> Launch:
+        """Starts the framework so that it ends with the task: `rosrun modular_framework_api run_framework ...`."""
+        return self._start(["rosrun", "modular_framework_api", "run_framework", *_launch_arguments(args)])
+
+    def _start(self, command: list[str]) -> Launch:
+        started = Launch(command, self.env, self.folder / f"launch_{len(self._launches)}.txt")
         self._launches.append(started)
         return started
 
