@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a controller file asks for: which controllers, with which parameters, and what is still to do for them."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+class ControllerFileError(Exception):
+    """A controller file cannot be used; the message lists everything that is wrong with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerFile:
+    """A controller file, read and checked.
+
+    Attributes:
+        path: where it was read from.
+        parameters: the whole mapping, for the parameter server.
+        controllers: names of the controllers, in the order of the file: the keys whose mapping has a `type`.
+    """
+
+    path: Path
+    parameters: dict[str, Any]
+    controllers: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SpawnPlan:
+    """What is to do so that all controllers run.
+
+    Attributes:
+        load: controllers the manager does not know yet.
+        start: controllers that do not run yet.
+    """
+
+    load: tuple[str, ...]
+    start: tuple[str, ...]
+
+
+def read_controller_file(path: Path) -> ControllerFile:
+    """Read `<robot package>/controllers/<file>`.
+
+    Raises:
+        ControllerFileError: no such file, not YAML, not a mapping, or no controller in it.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        present = ", ".join(sorted(file.name for file in path.parent.glob("*.yaml"))) or "none"
+        raise ControllerFileError(f"controller file {path}: {error.strerror}; controller files beside it: "
+                                  f"{present}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ControllerFileError(f"controller file {path}: not valid YAML: {error}") from error
+    if not isinstance(content, dict) or not content:
+        raise ControllerFileError(f"controller file {path}: got {type(content).__name__}; expected a mapping of "
+                                  "controller names to their parameters")
+    faults = [f"key {name!r} is not a name" for name in content if not isinstance(name, str)]
+    faults += [f"'{name}/type' is {entry['type']!r}; expected package/Class" for name, entry in content.items()
+               if isinstance(entry, dict) and "type" in entry and not _is_type(entry["type"])]
+    names = tuple(name for name, entry in content.items() if isinstance(entry, dict) and "type" in entry)
+    if not names:
+        faults.append(f"none of its keys ({', '.join(map(str, content))}) has a 'type': there is no controller in it")
+    if faults:
+        raise ControllerFileError(f"controller file {path}: {'; '.join(faults)}")
+    return ControllerFile(path, content, names)
+
+
+def _is_type(value: object) -> bool:
+    return isinstance(value, str) and value.count("/") == 1 and not value.startswith("/") and not value.endswith("/")
+
+
+def plan_spawn(wanted: Sequence[str], states: Mapping[str, str]) -> SpawnPlan:
+    """What is to do for the controllers `wanted`, given the state of those the manager has loaded.
+
+    Args:
+        wanted: controller names.
+        states: state by name, as list_controllers reports them.
+    """
+    return SpawnPlan(load=tuple(name for name in wanted if name not in states),
+                     start=tuple(name for name in wanted if states.get(name) != "running"))
+
+
+def ready_topics(robot_hardware: object, topic_of: Mapping[str, object]) -> dict[str, str]:
+    """Which topic to wait for on behalf of which hardware.
+
+    Args:
+        robot_hardware: parameter of that name: a list of hardware names, or None.
+        topic_of: `topic_to_wait_for` of each hardware that has one.
+
+    Returns:
+        Topic by hardware name, for every hardware that names one.
+
+    Raises:
+        ControllerFileError: `robot_hardware` is not a list of names, or a topic is not a name.
+    """
+    if robot_hardware is None:
+        return {}
+    if not isinstance(robot_hardware, list) or not all(isinstance(name, str) and name for name in robot_hardware):
+        raise ControllerFileError(f"parameter /robot_hardware: got {robot_hardware!r}; expected a list of names")
+    topics: dict[str, str] = {}
+    for name in robot_hardware:
+        topic = topic_of.get(name)
+        if topic in (None, ""):
+            continue
+        if not isinstance(topic, str):
+            raise ControllerFileError(f"parameter /{name}/topic_to_wait_for: got {topic!r}; expected a topic name")
+        topics[name] = topic
+    return topics

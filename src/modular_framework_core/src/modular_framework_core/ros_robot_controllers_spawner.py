@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loads and starts the controllers of a robot as soon as its hardware says that it is ready."""
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rospkg
+import rospy
+from controller_manager_msgs.srv import (
+    ListControllers,
+    LoadController,
+    SwitchController,
+    SwitchControllerRequest,
+)
+from std_msgs.msg import Bool
+
+from modular_framework_core.robot_controllers_spawner import (
+    ControllerFileError,
+    SpawnPlan,
+    plan_spawn,
+    read_controller_file,
+    ready_topics,
+)
+
+
+class SpawnError(Exception):
+    """The controllers could not be spawned; the message names the cause."""
+
+
+class RobotControllersSpawner:
+    """Node `custom_controller_spawner`.
+
+    Parameters: `~timeout` [s] 10: how long to wait before each warning about what is missing; `~give_up_after` [s] 120:
+    how long to wait for the hardware and for the controller manager; `~stay_alive` false: keep the node alive after
+    success (for launch files that require it). Read besides: `/robot_hardware`, `/<hardware>/topic_to_wait_for`.
+    Subscribes those topics (std_msgs/Bool). Calls `controller_manager/{list_controllers, load_controller,
+    switch_controller}`. Uploads the controller file to the parameter server's root.
+
+    Args:
+        robot_package: ROS package with a folder `controllers`.
+        controller_file: file in that folder.
+    """
+
+    def __init__(self, robot_package: str, controller_file: str) -> None:
+        self._warn_after_s = _seconds("~timeout", 10.0)
+        self._give_up_after_s = _seconds("~give_up_after", 120.0)
+        try:
+            folder = Path(rospkg.RosPack().get_path(robot_package))
+        except rospkg.ResourceNotFound as error:
+            raise SpawnError(f"robot package '{robot_package}' is not found on ROS_PACKAGE_PATH") from error
+        try:
+            self._file = read_controller_file(folder / "controllers" / controller_file)
+        except ControllerFileError as error:
+            raise SpawnError(str(error)) from error
+
+    def run(self) -> None:
+        """Upload the parameters, wait for the hardware, load and start the controllers, check that they run.
+
+        Raises:
+            SpawnError: something is missing or refused.
+        """
+        for name, value in self._file.parameters.items():
+            rospy.set_param(f"/{name}", value)
+        self._wait_for_hardware()
+        plan = plan_spawn(self._file.controllers, self._states())
+        self._carry_out(plan)
+        states = self._states()
+        idle = [f"'{name}' is {states.get(name, 'not loaded')}" for name in self._file.controllers
+                if states.get(name) != "running"]
+        if idle:
+            raise SpawnError(f"controllers of {self._file.path} do not run: {', '.join(idle)}; the log of the "
+                             "controller manager says why")
+        rospy.loginfo("controllers running: %s (loaded now: %s)", ", ".join(self._file.controllers),
+                      ", ".join(plan.load) or "none")
+
+    def _carry_out(self, plan: SpawnPlan) -> None:
+        for name in plan.load:
+            if not self._call("load_controller", LoadController, name).ok:
+                raise SpawnError(f"controller '{name}' of {self._file.path} could not be loaded; the log of the "
+                                 "controller manager says why")
+        if plan.start:
+            self._call("switch_controller", SwitchController, list(plan.start), [],
+                       SwitchControllerRequest.BEST_EFFORT, False, 0.0)
+
+    def _states(self) -> dict[str, str]:
+        return {entry.name: entry.state for entry in self._call("list_controllers", ListControllers).controller}
+
+    def _call(self, name: str, kind: Any, *arguments: Any) -> Any:
+        service = rospy.resolve_name(f"controller_manager/{name}")
+        proxy = rospy.ServiceProxy(service, kind)
+        self._wait(lambda: self._available(proxy), lambda: f"service {service}",
+                   "is the simulation or the node robot_hw running?")
+        try:
+            return proxy(*arguments)
+        except rospy.ServiceException as error:
+            raise SpawnError(f"service {service} failed: {error}") from error
+
+    @staticmethod
+    def _available(proxy: rospy.ServiceProxy) -> bool:
+        try:
+            proxy.wait_for_service(timeout=0.2)
+        except rospy.ROSException:
+            return False
+        return True
+
+    def _wait_for_hardware(self) -> None:
+        names = rospy.get_param("/robot_hardware", None)
+        listed = [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
+        try:
+            topics = ready_topics(names, {name: rospy.get_param(f"/{name}/topic_to_wait_for", None) for name in listed})
+        except ControllerFileError as error:
+            raise SpawnError(str(error)) from error
+        ready = {hardware: threading.Event() for hardware in topics}
+        subscribers = [rospy.Subscriber(topic, Bool, _set_when_true, ready[hardware])
+                       for hardware, topic in topics.items()]
+
+        def missing() -> str:
+            return ", ".join(f"topic {rospy.resolve_name(topics[name])} of hardware '{name}' to say True"
+                             for name, event in ready.items() if not event.is_set())
+
+        self._wait(lambda: not missing(), missing, "is the hardware connected and its driver running?")
+        for subscriber in subscribers:
+            subscriber.unregister()
+
+    def _wait(self, done: Callable[[], bool], what: Callable[[], str], advice: str) -> None:
+        """Poll `done` in real time; warn every `~timeout`, give up after `~give_up_after`."""
+        started = warned = time.monotonic()
+        while not done():
+            now = time.monotonic()
+            if rospy.is_shutdown():
+                raise SpawnError(f"shut down while waiting for {what()}")
+            if now - started > self._give_up_after_s:
+                raise SpawnError(f"waited {now - started:.0f} s for {what()} in vain; {advice}")
+            if now - warned > self._warn_after_s:
+                warned = now
+                rospy.logwarn("still waiting for %s after %.0f s; %s", what(), now - started, advice)
+            time.sleep(0.05)
+
+
+def _seconds(name: str, default: float) -> float:
+    value = rospy.get_param(name, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0.0:
+        raise SpawnError(f"parameter {rospy.resolve_name(name)}: got {value!r}; expected seconds above 0")
+    return float(value)
+
+
+def _set_when_true(message: Bool, event: threading.Event) -> None:
+    if message.data:
+        event.set()
+
+
+def main() -> int:
+    """Run the node: 0 when all controllers run, 1 when not, 2 for a wrong call."""
+    rospy.init_node("custom_controller_spawner")
+    arguments = rospy.myargv(sys.argv)[1:]
+    if len(arguments) != 2:
+        rospy.logfatal("usage: robot_controllers_spawner ROBOT_PACKAGE CONTROLLER_FILE; got %s", arguments)
+        return 2
+    try:
+        RobotControllersSpawner(*arguments).run()
+    except SpawnError as error:
+        rospy.logfatal("controllers not spawned: %s", error)
+        return 1
+    if rospy.get_param("~stay_alive", False):
+        rospy.spin()
+    return 0
