@@ -105,6 +105,7 @@ class RobotBody:
         self._indices = [self.body.joint_indices[name] for name in self.joint_names]
         self._rank = {joint_name: rank for rank, joint_name in enumerate(self.joint_names)}
         self.readings = [JointReading(0.0, 0.0, 0.0)] * len(self._indices)
+        self.fingers = self._fingers()
         self.starting_positions = self._complete(positions)
         self._limit_self_collisions()
         self._set_surfaces()
@@ -118,15 +119,38 @@ class RobotBody:
         leaders = {joint.mimic.leader for joint in self._joints if joint.mimic is not None}
         return [joint for joint in self._joints if joint.mimic is not None or joint.name in leaders]
 
-    @property
-    def fingers(self) -> list[list[int]]:
-        """The engine's link numbers of each finger: a chain of links below one palm."""
+    def _fingers(self) -> list[list[int]]:
+        """Returns the engine's link numbers of each finger: a chain of links below one palm."""
         chains: dict[str, list[int]] = {}
         for joint in self.gripper_joints:
             chains.setdefault(_chain_root(joint, self.gripper_joints), []).append(
                 self.body.link_indices[joint.child_link]
             )
         return list(chains.values())
+
+    @property
+    def gripper_links(self) -> list[str]:
+        """Names of the links that may touch a held object: the palm and everything fastened below it."""
+        parents, palm = self.description.parents, self.palm_link
+        if not self.gripper_joints:
+            return []
+
+        def below_palm(link: str) -> bool:
+            while link:
+                if link == palm:
+                    return True
+                link = parents.get(link, "")
+            return False
+
+        return [link for link in self.description.links if below_palm(link)]
+
+    @property
+    def palm_link(self) -> str:
+        """Name of the link the fingers are fastened to; the root link for a robot without a gripper."""
+        gripper = self.gripper_joints
+        below = {joint.child_link for joint in gripper}
+        roots = [joint.parent_link for joint in gripper if joint.parent_link not in below]
+        return roots[0] if roots else self.description.links[0]
 
     def reset(self) -> None:
         """Puts the joints at their starting positions, at rest."""

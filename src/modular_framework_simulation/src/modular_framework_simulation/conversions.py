@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns this package's values into ROS messages and back."""
+
+from __future__ import annotations
+
+import math
+
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Pose as PoseMsg
+from geometry_msgs.msg import Twist as TwistMsg
+from moveit_msgs.msg import AttachedCollisionObject, CollisionObject
+from shape_msgs.msg import Mesh as MeshMsg
+from shape_msgs.msg import MeshTriangle, SolidPrimitive
+from shape_msgs.msg import Plane as PlaneMsg
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.mesh_files import TriangleMesh, load_mesh
+from modular_framework_simulation.poses import Pose, normalised_quaternion
+from modular_framework_simulation.simulated_body import BodyState, Twist
+
+
+def pose_to_msg(pose: Pose) -> PoseMsg:
+    """Returns a geometry_msgs/Pose."""
+    return PoseMsg(Point(*pose.position), Quaternion(*pose.quaternion))
+
+
+def pose_from_msg(message: PoseMsg) -> Pose:
+    """Returns the pose of a message; an orientation of four zeros is the identity.
+
+    Raises:
+        ValueError: A number is not finite, or the quaternion is far from unit length.
+    """
+    p, q = message.position, message.orientation
+    position = (p.x, p.y, p.z)
+    if not all(math.isfinite(value) for value in position):
+        raise ValueError(f"position {list(position)} is not finite; give finite numbers [m]")
+    return Pose(position, normalised_quaternion((q.x, q.y, q.z, q.w)))
+
+
+def twist_to_msg(twist: Twist) -> TwistMsg:
+    """Returns a geometry_msgs/Twist."""
+    return TwistMsg(Vector3(*twist.linear), Vector3(*twist.angular))
+
+
+def twist_from_msg(message: TwistMsg) -> Twist:
+    """Returns the twist of a message.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    linear = (message.linear.x, message.linear.y, message.linear.z)
+    angular = (message.angular.x, message.angular.y, message.angular.z)
+    if not all(math.isfinite(value) for value in linear + angular):
+        raise ValueError(f"twist {list(linear + angular)} is not finite; give finite numbers")
+    return Twist(linear, angular)
+
+
+def state_from_msgs(pose: PoseMsg, twist: TwistMsg) -> BodyState:
+    """Returns the state two messages describe.
+
+    Raises:
+        ValueError: A number is not finite, or the quaternion is far from unit length.
+    """
+    return BodyState(pose_from_msg(pose), twist_from_msg(twist))
+
+
+def collision_object_id(model: str, link: str) -> str:
+    """Returns the name a simulated link has in the planning scene."""
+    return f"{model}__{link}"
+
+
+def link_to_collision_object(model: str, link: specs.Link, frame: str, pose: Pose) -> CollisionObject:
+    """Returns a link's collision shapes as they are: meshes triangle for triangle, primitives as primitives.
+
+    Args:
+        model: Instance name of the model.
+        link: The link.
+        frame: Frame the pose is given in.
+        pose: Of the link.
+
+    Raises:
+        DescriptionError: A mesh cannot be read any more.
+    """
+    message = CollisionObject()
+    message.header.frame_id = frame
+    message.id = collision_object_id(model, link.name)
+    message.operation = CollisionObject.ADD
+    message.pose = pose_to_msg(pose)
+    for collision in link.collisions:
+        shape_pose = pose_to_msg(collision.pose)
+        match collision.geometry:
+            case specs.Box(size=size):
+                message.primitives.append(SolidPrimitive(SolidPrimitive.BOX, list(size)))
+                message.primitive_poses.append(shape_pose)
+            case specs.Cylinder(radius=radius, length=length):
+                message.primitives.append(SolidPrimitive(SolidPrimitive.CYLINDER, [length, radius]))
+                message.primitive_poses.append(shape_pose)
+            case specs.Sphere(radius=radius):
+                message.primitives.append(SolidPrimitive(SolidPrimitive.SPHERE, [radius]))
+                message.primitive_poses.append(shape_pose)
+            case specs.Plane(normal=(x, y, z)):
+                message.planes.append(PlaneMsg([x, y, z, 0.0]))
+                message.plane_poses.append(shape_pose)
+            case specs.Mesh() as mesh:
+                message.meshes.append(mesh_to_msg(load_mesh(mesh)))
+                message.mesh_poses.append(shape_pose)
+    return message
+
+
+def mesh_to_msg(mesh: TriangleMesh) -> MeshMsg:
+    """Returns a shape_msgs/Mesh."""
+    return MeshMsg(
+        [MeshTriangle([int(a), int(b), int(c)]) for a, b, c in mesh.triangles],
+        [Point(float(x), float(y), float(z)) for x, y, z in mesh.vertices],
+    )
+
+
+def attached_object(item: CollisionObject, link: str, touch_links: list[str]) -> AttachedCollisionObject:
+    """Returns an object fastened to a robot link.
+
+    Args:
+        item: The object, its pose in the frame of the link.
+        link: Name of the link.
+        touch_links: Links that may touch it.
+    """
+    message = AttachedCollisionObject()
+    message.link_name = link
+    message.object = item
+    message.touch_links = touch_links
+    return message

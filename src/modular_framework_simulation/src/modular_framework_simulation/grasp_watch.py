@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Decides from contacts which object a gripper holds.
+
+An object counts as held once it has touched two fingers for a while, and as let go once it has lost one of them for a
+while: single contacts come and go while an object settles between the pads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+
+class GraspWatch:
+    """Follows the contacts of the fingers of one gripper.
+
+    Args:
+        hold_after_s: How long both fingers must touch an object until it is held [s of simulated time].
+        release_after_s: How long one of them must miss it until it is let go [s].
+    """
+
+    def __init__(self, hold_after_s: float = 0.2, release_after_s: float = 0.3) -> None:
+        self._hold_after_s = hold_after_s
+        self._release_after_s = release_after_s
+        self._touched_since: dict[str, float] = {}
+        self._missed_since: float | None = None
+        self.held: str | None = None
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        self._touched_since.clear()
+        self._missed_since = None
+        self.held = None
+
+    def update(self, time_s: float, touched_by_finger: Sequence[Collection[str]]) -> str | None:
+        """Takes one look at the contacts.
+
+        Args:
+            time_s: Simulated time [s].
+            touched_by_finger: For each finger the movable objects it touches.
+
+        Returns:
+            The name of the object that is held, None if there is none.
+        """
+        counts: dict[str, int] = {}
+        for touched in touched_by_finger:
+            for name in set(touched):
+                counts[name] = counts.get(name, 0) + 1
+        grasped = {name for name, count in counts.items() if count >= 2}
+        self._touched_since = {name: self._touched_since.get(name, time_s) for name in grasped}
+        if self.held is not None:
+            self._update_held(time_s, grasped)
+        if self.held is None:
+            self._look_for_new(time_s)
+        return self.held
+
+    def _update_held(self, time_s: float, grasped: Collection[str]) -> None:
+        if self.held in grasped:
+            self._missed_since = None
+        elif self._missed_since is None:
+            self._missed_since = time_s
+        elif time_s - self._missed_since >= self._release_after_s:
+            self.held = None
+            self._missed_since = None
+
+    def _look_for_new(self, time_s: float) -> None:
+        ripe = [(since, name) for name, since in self._touched_since.items() if time_s - since >= self._hold_after_s]
+        if ripe:
+            self.held = min(ripe)[1]
+            self._missed_since = None

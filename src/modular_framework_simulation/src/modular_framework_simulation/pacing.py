@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps simulated time in step with real time, and measures how well that works."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+_LARGEST_DEBT_S = 1.0
+"""How much lost real time is made good afterwards [s]; a longer stall (a suspended machine) is forgiven."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaceReport:
+    """What a stretch of the simulation cost.
+
+    Attributes:
+        factor: Simulated time over real time.
+        busy_share: Share of the real time that the loop did not sleep.
+        step_cost_s: Mean real time a step took, sleep left out [s].
+    """
+
+    factor: float
+    busy_share: float
+    step_cost_s: float
+
+
+class Pacer:
+    """Sleeps as long as simulated time is ahead of real time.
+
+    A loop that fell behind runs without sleep until it has caught up, so that the average keeps the asked factor.
+
+    Args:
+        real_time_factor: Simulated over real time; 0 is as fast as possible.
+        clock: Real time [s].
+        sleep: Waits [s].
+    """
+
+    def __init__(
+        self,
+        real_time_factor: float,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        if real_time_factor < 0:
+            raise ValueError(f"real_time_factor is {real_time_factor:g}; allowed: 0 (as fast as possible) or greater")
+        self._factor = real_time_factor
+        self._clock = clock
+        self._sleep = sleep
+        self._start_real_s = 0.0
+        self._start_simulated_s = 0.0
+        self._report_real_s = 0.0
+        self._report_simulated_s = 0.0
+        self._slept_s = 0.0
+        self._steps = 0
+        self.start(0.0)
+
+    def start(self, simulated_s: float) -> None:
+        """Begins anew, after a pause or a reset of time.
+
+        Args:
+            simulated_s: Present simulated time [s].
+        """
+        now = self._clock()
+        self._start_real_s = self._report_real_s = now
+        self._start_simulated_s = self._report_simulated_s = simulated_s
+        self._slept_s = 0.0
+        self._steps = 0
+
+    def keep(self, simulated_s: float) -> None:
+        """Waits until real time has come as far as simulated time [s]."""
+        self._steps += 1
+        if self._factor == 0.0:
+            return
+        due = self._start_real_s + (simulated_s - self._start_simulated_s) / self._factor
+        now = self._clock()
+        ahead = due - now
+        if ahead > 0:
+            self._sleep(ahead)
+            self._slept_s += self._clock() - now
+        elif ahead < -_LARGEST_DEBT_S:
+            self._start_real_s -= ahead + _LARGEST_DEBT_S
+
+    def report(self, simulated_s: float) -> PaceReport:
+        """Returns how the time since the last report went, and begins the next stretch."""
+        now = self._clock()
+        real = max(now - self._report_real_s, 1e-9)
+        busy = max(real - self._slept_s, 0.0)
+        report = PaceReport((simulated_s - self._report_simulated_s) / real, busy / real, busy / max(self._steps, 1))
+        self._report_real_s, self._report_simulated_s = now, simulated_s
+        self._slept_s = 0.0
+        self._steps = 0
+        return report

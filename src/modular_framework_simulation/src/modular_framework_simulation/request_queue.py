@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hands work from any thread to the simulation loop: the physics engine must be used from one thread only."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from modular_framework_simulation.errors import LoopTimeoutError
+
+T = TypeVar("T")
+
+
+class _Request:
+    def __init__(self, work: Callable[[], Any]) -> None:
+        self.work = work
+        self.done = threading.Event()
+        self.result: Any = None
+        self.error: Exception | None = None
+        self.lock = threading.Lock()
+        self.abandoned = False
+        self.started = False
+
+    def run(self) -> None:
+        with self.lock:
+            if self.abandoned:
+                return
+            self.started = True
+        try:
+            self.result = self.work()
+        except Exception as error:  # belongs to whoever asked, who gets it raised in its own thread
+            self.error = error
+        self.done.set()
+
+
+class RequestQueue:
+    """Requests of other threads, carried out between physics steps in the order they came."""
+
+    def __init__(self) -> None:
+        self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
+        self._arrived = threading.Event()
+
+    def call(self, what: str, work: Callable[[], T], timeout_s: float) -> T:
+        """Has the loop do something and waits for the result.
+
+        Args:
+            what: Named in the error, for example "spawn_sdf_model".
+            work: Called in the loop's thread.
+            timeout_s: Longest wait for the loop to get to it [s of real time].
+
+        Raises:
+            LoopTimeoutError: The loop did not get to it; the work is then not done later either.
+            Exception: Whatever the work raised.
+        """
+        request = _Request(work)
+        self._requests.put(request)
+        self._arrived.set()
+        if not request.done.wait(timeout_s):
+            with request.lock:
+                request.abandoned = not request.started
+            if request.abandoned:
+                raise LoopTimeoutError(f"'{what}' waited {timeout_s:g} s for the simulation loop, in vain")
+            # Work that has begun will end: half a spawn cannot be taken back.
+            request.done.wait(timeout_s)
+        if request.error is not None:
+            raise request.error
+        if not request.done.is_set():
+            raise LoopTimeoutError(f"'{what}' was begun by the simulation loop, but not ended in {2 * timeout_s:g} s")
+        return request.result  # type: ignore[no-any-return]
+
+    def post(self, work: Callable[[], Any]) -> None:
+        """Has the loop do something without waiting; the work must not raise."""
+        self._requests.put(_Request(work))
+        self._arrived.set()
+
+    def run_pending(self) -> None:
+        """Carries out what has arrived; called by the loop's thread between steps."""
+        if not self._arrived.is_set():
+            return
+        self._arrived.clear()
+        while True:
+            try:
+                request = self._requests.get_nowait()
+            except queue.Empty:
+                return
+            request.run()
+
+    def wait(self, timeout_s: float) -> None:
+        """Waits until something has arrived, at most that long [s]."""
+        self._arrived.wait(timeout_s)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the parameters of the simulation node, and checks them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import rospy
+
+from modular_framework_control.node_handle import ParameterError
+from modular_framework_simulation.starting_pose import parse_starting_pose
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationParameters:
+    """What to simulate and how.
+
+    Attributes:
+        robot_description: `robot_description`: URDF; empty for a world without a robot.
+        model_path: `gazebo_model_path`: folder with one folder a model.
+        world_file: `~world_file`: path of a .world file; empty for an empty world.
+        starting_positions: `~starting_pose`: "-J joint value ..." [rad or m].
+        robot_name: `~robot_name`: instance name; empty for the name in the description.
+        gui: `~gui`: whether to open a window (false).
+        paused: `~paused`: whether to start with time standing still (false).
+        real_time_factor: `~real_time_factor`: simulated over real time (1.0; 0 = as fast as possible).
+    """
+
+    robot_description: str
+    model_path: str
+    world_file: str
+    starting_positions: dict[str, float]
+    robot_name: str
+    gui: bool
+    paused: bool
+    real_time_factor: float
+
+
+def read_parameters() -> SimulationParameters:
+    """Reads them from the parameter server.
+
+    Raises:
+        ParameterError: One has a wrong type or value.
+        DescriptionError: The starting pose cannot be read.
+    """
+    factor = _read("~real_time_factor", 1.0, (int, float))
+    if factor < 0:
+        raise ParameterError(f"parameter ~real_time_factor: got {factor}; allowed: 0 (as fast as possible) or greater")
+    return SimulationParameters(
+        robot_description=_read("/robot_description", "", (str,)),
+        model_path=_read("/gazebo_model_path", "", (str,)),
+        world_file=_read("~world_file", "", (str,)),
+        starting_positions=parse_starting_pose(_read("~starting_pose", "", (str,))),
+        robot_name=_read("~robot_name", "", (str,)),
+        gui=_read("~gui", False, (bool,)),
+        paused=_read("~paused", False, (bool,)),
+        real_time_factor=float(factor),
+    )
+
+
+def _read(name: str, default: Any, kinds: tuple[type, ...]) -> Any:
+    value = rospy.get_param(name, default)
+    if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+        allowed = " or ".join(kind.__name__ for kind in kinds)
+        raise ParameterError(f"parameter {rospy.resolve_name(name)}: got {value!r}; expected {allowed}")
+    return value

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The simulation as a ROS node: world, robot, controllers and clock in one process."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from pathlib import Path
+
+import rospkg
+import rospy
+
+from modular_framework_control.hardware_interface import HardwareInterfaceError
+from modular_framework_control.node_handle import ParameterError
+from modular_framework_control.ros_controller_manager import RosControllerManager
+from modular_framework_control.ros_node_handle import RosNodeHandle
+from modular_framework_simulation import ros_names, sdf_specs
+from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.pacing import Pacer
+from modular_framework_simulation.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.request_queue import RequestQueue
+from modular_framework_simulation.robot_body import RobotBody
+from modular_framework_simulation.robot_description import read_robot
+from modular_framework_simulation.ros_gazebo_services import GazeboServices
+from modular_framework_simulation.ros_parameters import SimulationParameters, read_parameters
+from modular_framework_simulation.ros_planning_scene import PlanningScenePublisher
+from modular_framework_simulation.ros_world_topics import WorldTopics
+from modular_framework_simulation.sdf_reader import STANDARD_GRAVITY, read_world
+from modular_framework_simulation.sdf_resources import Resources
+from modular_framework_simulation.simulation_loop import Actors, Hook, SimulationLoop
+from modular_framework_simulation.snapshots import take_snapshot
+
+_CLOCK_RATE_HZ = 100
+_STATES_RATE_HZ = 40
+_GRASP_RATE_HZ = 50
+_SNAPSHOT_RATE_HZ = 20
+_PACE_REPORT_S = 30
+_SWITCH_INTERVAL_S = 0.0005
+
+
+class SimulationNode:
+    """Builds the world from parameters and runs it.
+
+    Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `GazeboServices`,
+    `PlanningScenePublisher` and, for the controllers, `RosControllerManager`.
+
+    Args:
+        parameters: What to simulate and how.
+
+    Raises:
+        SimulationError: The world or the robot cannot be built.
+        HardwareInterfaceError: A transmission of the robot names an unknown interface.
+        ParameterError: A joint limit parameter has a wrong type.
+    """
+
+    def __init__(self, parameters: SimulationParameters) -> None:
+        folders = (Path(parameters.model_path),) if parameters.model_path else ()
+        self._resources = Resources(folders, rospkg.RosPack().get_path)
+        self._settings = PhysicsSettings()
+        self._parts = ConvexParts(default_cache_folder())
+        self._world = self._build_world(parameters)
+        self._controllers: RosControllerManager | None = None
+        actors = self._build_robot(parameters)
+        self._topics = WorldTopics(self._world)
+        self._loop = SimulationLoop(
+            self._world, Pacer(parameters.real_time_factor), RequestQueue(), actors, self._topics.publish_clock
+        )
+        if parameters.paused:
+            self._loop.pause()
+        self._services = GazeboServices(self._loop, self._resources)
+        touch_links = actors.robot.gripper_links if actors else []
+        self._scene = PlanningScenePublisher(touch_links)
+        self._add_hooks()
+        self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
+        self._failed = False
+
+    def _build_world(self, parameters: SimulationParameters) -> PhysicsWorld:
+        spec = sdf_specs.World("empty", STANDARD_GRAVITY, (), ())
+        if parameters.world_file:
+            spec = read_world(Path(parameters.world_file), self._resources)
+            rospy.logdebug("world elements without meaning here: %s", ", ".join(spec.ignored))
+        world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn)
+        for model in spec.models:
+            world.spawn(model)
+        rospy.loginfo("world '%s' with %d models: %s", spec.name, len(spec.models), ", ".join(world.names()) or "none")
+        return world
+
+    def _build_robot(self, parameters: SimulationParameters) -> Actors | None:
+        if not parameters.robot_description:
+            rospy.logwarn("no parameter robot_description: the world has no robot")
+            return None
+        description = read_robot(
+            parameters.robot_description, self._resources.find_package, self._parts, self._world.engine.has_window
+        )
+        name = parameters.robot_name or description.name
+        robot = RobotBody(self._world, description, name, Pose(), parameters.starting_positions)
+        hardware = PyBulletRobotHW(robot)
+        handle = RosNodeHandle("/")
+        hardware.init(handle, handle)
+        self._controllers = RosControllerManager(hardware)
+        return Actors(robot, hardware, self._controllers)
+
+    def _add_hooks(self) -> None:
+        step_ns = self._settings.time_step_ns
+
+        def every(rate_hz: float) -> int:
+            return max(1, round(1e9 / rate_hz / step_ns))
+
+        self._loop.add_hook(Hook(every(_CLOCK_RATE_HZ), self._topics.publish_clock))
+        self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
+        self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
+        self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasp))
+        self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
+        self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
+
+    def _watch_grasp(self) -> None:
+        before = self._loop.grasp_watch.held
+        self._loop.watch_grasp()
+        held = self._loop.grasp_watch.held
+        if held != before:
+            rospy.loginfo("the gripper %s", f"holds '{held}'" if held else f"let go of '{before}'")
+            self._topics.publish_grasped(held or "")
+            self._show_snapshot()
+
+    def _show_snapshot(self) -> None:
+        self._scene.show(take_snapshot(self._world, self._loop.held_object()))
+
+    def _report_pace(self) -> None:
+        pace = self._loop.pacer.report(self._world.time_ns * 1e-9)
+        text = "real time factor %.3f, %.0f us a step, busy %.0f %% of the time"
+        rospy.loginfo(text, pace.factor, pace.step_cost_s * 1e6, pace.busy_share * 100)
+
+    def _run_loop(self) -> None:
+        try:
+            self._loop.run()
+        except Exception as error:  # whatever ends the loop ends the node, and says why
+            rospy.logfatal("the simulation loop ended with %s: %s", type(error).__name__, error)
+            self._failed = True
+            rospy.signal_shutdown("the simulation loop failed")
+
+    def run(self) -> int:
+        """Runs until ROS shuts down.
+
+        Returns:
+            Exit code of the process: 0 after an ordinary shutdown, 1 when the loop failed.
+        """
+        # Threads that serve messages hand the interpreter back to the loop within this time.
+        sys.setswitchinterval(_SWITCH_INTERVAL_S)
+        self._topics.publish_clock()
+        self._thread.start()
+        if self._controllers is not None:
+            self._controllers.connect()
+        self._services.connect()
+        self._scene.connect()
+        rospy.loginfo("simulation is running%s", " (paused)" if self._loop.paused else "")
+        rospy.spin()
+        self.close()
+        return 1 if self._failed else 0
+
+    def close(self) -> None:
+        """Ends the loop and gives everything back; may be called twice."""
+        self._services.close()
+        self._scene.close()
+        self._loop.stop()
+        self._thread.join(timeout=5.0)
+        if self._controllers is not None:
+            self._controllers.close()
+            self._controllers = None
+        if not self._thread.is_alive():
+            self._world.close()
+
+
+def main() -> int:
+    """Runs the node.
+
+    Returns:
+        Exit code: 0 after an ordinary shutdown, 1 when the world could not be built or the loop failed.
+    """
+    rospy.init_node(ros_names.NODE)
+    try:
+        node = SimulationNode(read_parameters())
+    except (SimulationError, HardwareInterfaceError, ParameterError, ValueError) as error:
+        rospy.logfatal("the simulation cannot start: %s", error)
+        return 1
+    return node.run()

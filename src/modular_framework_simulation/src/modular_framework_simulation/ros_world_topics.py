@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Publishes what the world is doing: the clock, the states of models and links, and what the gripper holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+from gazebo_msgs.msg import LinkStates, ModelStates
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+
+from modular_framework_simulation import conversions, ros_names
+from modular_framework_simulation.physics_world import SCOPE, PhysicsWorld
+from modular_framework_simulation.simulated_body import BodyState
+
+
+class WorldTopics:
+    """Publishers of the simulation; all methods are called by the loop's thread.
+
+    Publishes: /clock (rosgraph_msgs/Clock), /gazebo/model_states, /gazebo/link_states, and /gazebo/grasped_object
+    (std_msgs/String, latched; empty while nothing is held).
+
+    Args:
+        world: What is published.
+    """
+
+    def __init__(self, world: PhysicsWorld) -> None:
+        self._world = world
+        self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
+        self._models = rospy.Publisher(ros_names.MODEL_STATES, ModelStates, queue_size=1)
+        self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
+        self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
+        self._last_grasped: str | None = None
+        self.publish_grasped("")
+
+    def publish_clock(self) -> None:
+        """Publishes simulated time."""
+        self._clock.publish(Clock(rospy.Time(*divmod(self._world.time_ns, 1_000_000_000))))
+
+    def publish_models(self) -> None:
+        """Publishes the states of all models, if somebody listens."""
+        if self._models.get_num_connections():
+            states = [(name, self._world.body(name).state()) for name in self._world.names()]
+            self._models.publish(_filled(ModelStates(), states))
+
+    def publish_links(self) -> None:
+        """Publishes the states of all links, if somebody listens."""
+        if self._links.get_num_connections():
+            bodies = [(name, self._world.body(name)) for name in self._world.names()]
+            links = [(name, body, link) for name, body in bodies for link in body.link_names()]
+            states = [(f"{name}{SCOPE}{link}", body.link_state(link)) for name, body, link in links]
+            self._links.publish(_filled(LinkStates(), states))
+
+    def publish_grasped(self, name: str) -> None:
+        """Publishes the name of the held object when it changed; "" for none."""
+        if name != self._last_grasped:
+            self._last_grasped = name
+            self._grasped.publish(String(name))
+
+
+def _filled(message: Any, states: list[tuple[str, BodyState]]) -> Any:
+    message.name = [name for name, _ in states]
+    message.pose = [conversions.pose_to_msg(state.pose) for _, state in states]
+    message.twist = [conversions.twist_to_msg(state.twist) for _, state in states]
+    return message

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The loop: controllers, physics and simulated time advance together, one step after the other, in one thread."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from modular_framework_simulation.grasp_watch import GraspWatch
+from modular_framework_simulation.pacing import Pacer
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.request_queue import RequestQueue
+from modular_framework_simulation.robot_body import RobotBody
+from modular_framework_simulation.snapshots import HeldObject
+
+_PAUSED_TICK_S = 0.05
+
+
+class Controllers(Protocol):
+    """What the loop needs of a controller manager."""
+
+    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
+        """Runs one control cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hook:
+    """Something done every so often, in the loop's thread, while time advances.
+
+    Attributes:
+        every_steps: Physics steps from one call to the next.
+        action: What to do; must be quick.
+    """
+
+    every_steps: int
+    action: Callable[[], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Actors:
+    """The robot in the world and what drives it; a world without a robot has none."""
+
+    robot: RobotBody
+    hardware: PyBulletRobotHW
+    controllers: Controllers
+
+
+class SimulationLoop:
+    """Advances the world.
+
+    Args:
+        world: What to advance.
+        pacer: Ties simulated to real time.
+        requests: Work of other threads.
+        actors: The robot; None for a world without one.
+        on_paused_tick: Called about 20 times a second while paused, so that the clock stays visible.
+    """
+
+    def __init__(
+        self,
+        world: PhysicsWorld,
+        pacer: Pacer,
+        requests: RequestQueue,
+        actors: Actors | None,
+        on_paused_tick: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.world = world
+        self.pacer = pacer
+        self.requests = requests
+        self.grasp_watch = GraspWatch()
+        self._actors = actors
+        self._hooks: list[Hook] = []
+        self._on_paused_tick = on_paused_tick
+        self._paused = False
+        self._stop = threading.Event()
+        self._reset_controllers = False
+
+    @property
+    def paused(self) -> bool:
+        """Whether time stands still."""
+        return self._paused
+
+    def add_hook(self, hook: Hook) -> None:
+        """Has something done every so often; to be called before `run`."""
+        self._hooks.append(hook)
+
+    def pause(self) -> None:
+        """Stops time; requests are still carried out."""
+        self._paused = True
+
+    def unpause(self) -> None:
+        """Lets time go on."""
+        self._paused = False
+        self.pacer.start(self._time_s())
+
+    def reset_poses(self) -> None:
+        """Puts models and robot where they started, at rest; time goes on."""
+        self.world.reset_poses()
+        self.grasp_watch.reset()
+        if self._actors is not None:
+            self._actors.robot.reset()
+            self._actors.hardware.read(self._time_s(), 0.0)
+            self._actors.hardware.hold()
+        self._reset_controllers = True
+
+    def reset_all(self) -> None:
+        """Puts models and robot where they started and simulated time to 0."""
+        self.world.reset_time()
+        self.reset_poses()
+        self.pacer.start(0.0)
+
+    def stop(self) -> None:
+        """Makes `run` return; may be called from any thread."""
+        self._stop.set()
+
+    def run(self) -> None:
+        """Advances the world until `stop` is called."""
+        self.pacer.start(self._time_s())
+        while not self._stop.is_set():
+            self.requests.run_pending()
+            if self._paused:
+                self._on_paused_tick()
+                if self._actors is not None:
+                    # Controllers can be loaded and started while time stands still.
+                    self._actors.controllers.update(self._time_s(), 0.0)
+                self.requests.wait(_PAUSED_TICK_S)
+                continue
+            self.step()
+            self.pacer.keep(self._time_s())
+
+    def step(self) -> None:
+        """Advances the world by one physics step: measure, control, actuate, move."""
+        period_s = self.world.settings.time_step_s
+        if self._actors is not None:
+            now_s = self._time_s()
+            self._actors.hardware.read(now_s, period_s)
+            reset, self._reset_controllers = self._reset_controllers, False
+            self._actors.controllers.update(now_s, period_s, reset)
+            self._actors.hardware.write(now_s, period_s)
+        self.world.step()
+        steps = self.world.steps
+        for hook in self._hooks:
+            if steps % hook.every_steps == 0:
+                hook.action()
+
+    def watch_grasp(self) -> None:
+        """Looks at the contacts of the fingers; a hook."""
+        if self._actors is None:
+            return
+        robot = self._actors.robot
+        touched = []
+        for finger in robot.fingers:
+            contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
+            touched.append({each.model for each in contacts if not self.world.body(each.model).static})
+        self.grasp_watch.update(self._time_s(), touched)
+
+    def held_object(self) -> HeldObject | None:
+        """Returns what the gripper holds now."""
+        name = self.grasp_watch.held
+        if name is None or self._actors is None or name not in self.world.names():
+            return None
+        robot = self._actors.robot
+        pose: Pose = robot.body.link_state(robot.palm_link).pose
+        return HeldObject(name, robot.palm_link, pose)
+
+    def _time_s(self) -> float:
+        return self.world.time_ns * 1e-9

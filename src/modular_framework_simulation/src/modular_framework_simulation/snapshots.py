@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the loop shows to the rest of the process: values that never change once they are made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.simulated_body import BodyState
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSnapshot:
+    """A link with collision shapes, and where it is in the world frame."""
+
+    spec: specs.Link
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSnapshot:
+    """A model that is not a robot.
+
+    Attributes:
+        name: Instance name.
+        instance: Number that no other model of this run has: a model that was deleted and spawned again differs.
+        static: Never moves.
+        links: Those with collision shapes.
+    """
+
+    name: str
+    instance: int
+    static: bool
+    links: tuple[LinkSnapshot, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HeldObject:
+    """An object in the gripper.
+
+    Attributes:
+        model: Its instance name.
+        carrier_link: Link of the robot it is carried by.
+        carrier_pose: Where that link is in the world frame.
+    """
+
+    model: str
+    carrier_link: str
+    carrier_pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class WorldSnapshot:
+    """Models and grasp at one moment.
+
+    Attributes:
+        time_s: Simulated time [s].
+        models: All models but robots.
+        held: What the gripper holds, None if nothing.
+    """
+
+    time_s: float
+    models: tuple[ModelSnapshot, ...]
+    held: HeldObject | None
+
+
+def take_snapshot(world: PhysicsWorld, held: HeldObject | None) -> WorldSnapshot:
+    """Looks at the world; to be called from the loop's thread."""
+    models = []
+    for name in world.names():
+        body = world.body(name)
+        if body.spec is None:
+            continue
+        links = tuple(
+            LinkSnapshot(link, body.link_state(link.name).pose) for link in body.spec.links if link.collisions
+        )
+        models.append(ModelSnapshot(name, body.number, body.static, links))
+    return WorldSnapshot(world.time_ns * 1e-9, tuple(models), held)
+
+
+def model_states(world: PhysicsWorld) -> list[tuple[str, BodyState]]:
+    """Returns name and state of every model; to be called from the loop's thread."""
+    return [(name, world.body(name).state()) for name in world.names()]

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the joint positions a simulated robot starts with, written the way spawn_model takes them."""
+
+from __future__ import annotations
+
+import math
+
+from modular_framework_simulation.errors import DescriptionError
+
+
+def parse_starting_pose(text: str) -> dict[str, float]:
+    """Reads "-J joint value -J joint value ...".
+
+    Args:
+        text: The words; empty for no positions at all.
+
+    Returns:
+        Position of each named joint [rad or m].
+
+    Raises:
+        DescriptionError: The words do not come in threes of -J, name and finite number, or a joint comes twice.
+    """
+    words = text.split()
+    positions: dict[str, float] = {}
+    for start in range(0, len(words), 3):
+        triple = words[start : start + 3]
+        where = f"starting pose, word {start + 1}"
+        if len(triple) != 3 or triple[0] != "-J":
+            raise DescriptionError(where, f"got '{' '.join(triple)}'", "expected '-J <joint> <value>' again and again")
+        try:
+            value = float(triple[2])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise DescriptionError(where, f"got the value '{triple[2]}'", "expected a finite number [rad or m]")
+        if triple[1] in positions:
+            raise DescriptionError(where, f"names joint '{triple[1]}' again", "give each joint once")
+        positions[triple[1]] = value
+    return positions
