@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fixtures of the tests that start the whole framework, each on a master of its own."""
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from ros_session import RosSession  # noqa: E402
+
+
+@pytest.fixture
+def session() -> Iterator[RosSession]:
+    """A session whose master is started by the launch, headless."""
+    started = RosSession()
+    started.env.pop("DISPLAY", None)
+    try:
+        yield started
+    finally:
+        started.stop()

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A task that cannot succeed says so and why; a node that dies ends the launch and is named."""
+from __future__ import annotations
+
+import subprocess
+import time
+
+import pytest
+from ros_session import RosSession
+
+TASK_TIMEOUT_S = 180.0
+STOP_TIMEOUT_S = 45.0
+NODES = (
+    "gazebo",
+    "robot_state_publisher",
+    "move_group",
+    "managers",
+    "sensors_tf2_broadcaster",
+    "moveit_grasp_action_server",
+    "top_down_grasp_generator",
+    "task",
+)
+
+
+def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosSession) -> None:
+    launch = session.run_framework(gui="false", rviz="false", world_file="ur5_table.world")
+    _wait_for_text(launch, "first state running", 60.0)
+    subprocess.run(
+        ["roslaunch", "modular_framework_api", "manage_object.launch", "object_type:=cube", "object_name:=far_cube",
+         "object_position:=0.2 0.88 0.865"],
+        env=session.env, check=True, timeout=60, stdout=subprocess.DEVNULL,
+    )
+    assert launch.wait(TASK_TIMEOUT_S) == 1, launch.log()
+    log = launch.log()
+    assert "Task 'simulation_pick' ended with outcome 'quit_pipeline': FAILED" in log
+    assert "no grasp" in log.lower()
+    assert "reach" in log.lower()
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str) -> None:
+    launch = session.run_framework(gui="false", rviz="false")
+    _wait_for_text(launch, "first state running", 60.0)
+    pid = _pid_of(session, node)
+    subprocess.run(["kill", "-KILL", str(pid)], check=True)
+    killed = time.monotonic()
+    assert launch.wait(STOP_TIMEOUT_S) == 3, launch.log()
+    assert time.monotonic() - killed < STOP_TIMEOUT_S
+    assert f"'{node}'" in launch.log().splitlines()[-1] or f"node '{node}' died" in launch.log(), launch.log()
+
+
+def _wait_for_text(launch: object, text: str, timeout_s: float) -> None:
+    end = time.monotonic() + timeout_s
+    while text not in launch.log():  # type: ignore[attr-defined]
+        assert time.monotonic() < end, f"'{text}' was not printed in {timeout_s} s:\n{launch.log()}"  # type: ignore[attr-defined]
+        assert launch.alive(), launch.log()  # type: ignore[attr-defined]
+        time.sleep(0.1)
+
+
+def _pid_of(session: RosSession, node: str) -> int:
+    """The process of a node, as the node itself tells it through its slave interface."""
+    import rosgraph
+    from xmlrpc.client import ServerProxy
+
+    uri = rosgraph.Master("/test", master_uri=session.env["ROS_MASTER_URI"]).lookupNode("/" + node)
+    return int(ServerProxy(uri).getPid("/test")[2])

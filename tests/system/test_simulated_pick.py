@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The main job: one command, a simulated robot, a picked object."""
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+from ros_session import RosSession
+
+TASK_TIMEOUT_S = 180.0
+LIFTED_M = 0.10
+
+# Runs as a node of its own beside the launch and prints how high each model was at first and at last.
+WATCHER = """
+import json, sys, time
+import rosgraph, rospy
+from gazebo_msgs.msg import ModelStates
+while not rosgraph.is_master_online():
+    time.sleep(0.05)
+rospy.init_node("watcher", anonymous=True, disable_signals=True)
+heights = {}
+def remember(message):
+    for name, pose in zip(message.name, message.pose):
+        heights.setdefault(name, [pose.position.z] * 2)[1] = pose.position.z
+rospy.Subscriber("/gazebo/model_states", ModelStates, remember)
+sys.stdin.read()
+print(json.dumps(heights))
+"""
+
+
+def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSession) -> None:
+    watcher = subprocess.Popen(
+        [sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        launch = session.run_framework(gui="false", rviz="false")
+        exit_code = launch.wait(TASK_TIMEOUT_S)
+        heights = json.loads(watcher.communicate(timeout=20)[0].splitlines()[-1])
+    finally:
+        watcher.kill()
+    assert exit_code == 0, launch.log()
+    assert "Task 'simulation_pick' ended with outcome 'successful_pipeline': SUCCEEDED" in launch.log()
+    lifted = {name: last - first for name, (first, last) in heights.items()}
+    assert max(lifted.values()) > LIFTED_M, lifted
+    assert sum(height > LIFTED_M for height in lifted.values()) == 1, lifted
+
+
+def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None:
+    launch = session.run_framework(robot_packag="ur5_ezgripper_robot")
+    assert launch.wait(30.0) == 2
+    assert "robot_packag" in launch.log()
