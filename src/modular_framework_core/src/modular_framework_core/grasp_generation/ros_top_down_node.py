@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Watches the planning scene, generates top-down grasps for what stands there, and hands them to the grasp manager."""
+from __future__ import annotations
+
+import time
+from collections import Counter
+from typing import Any
+
+import rospy
+from moveit_msgs.msg import PlanningSceneComponents
+from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
+from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger, TriggerResponse
+
+from modular_framework_core.arm_commander import ArmCommander, CommanderError
+from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
+from modular_framework_core.grasp_generation.planning_scene_objects import (
+    CropBox,
+    SceneObject,
+    SceneObjectError,
+    is_named,
+    scene_object,
+)
+from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings, read_settings
+from modular_framework_core.grasp_generation.top_down import TopDownGrasp, top_down_grasps
+from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.msg import StandardisedGrasp
+from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_core.srv import AddStandardisedGrasp, AddStandardisedGraspRequest
+
+SIGNAL_TOPIC = "grasp_generated"
+SERVICE_TIMEOUT_S = 10.0
+START_TIMEOUT_S = 60.0
+SCENE_PERIOD_S = 0.25
+
+
+class NoGraspError(RuntimeError):
+    """No grasp can be offered; the text says why."""
+
+
+class TopDownGraspGenerator:
+    """Generates grasps when an object appears in the crop box, or on demand.
+
+    Parameters: see :mod:`ros_generator_settings`; they are read again for every generation.
+    Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched).
+    Services: ``~generate`` (std_srvs/Trigger). Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``.
+    """
+
+    def __init__(self) -> None:
+        """Stores nothing but names; :meth:`connect` talks to the other nodes."""
+        self._seen: set[str] = set()
+
+    def connect(self, timeout_s: float = START_TIMEOUT_S) -> None:
+        """Measures the gripper and waits for the nodes it needs.
+
+        Raises:
+            NoGraspError: Something needed is missing; the text names it.
+        """
+        self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
+        self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
+        self._scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
+        self._add_grasp = rospy.ServiceProxy("add_grasp", AddStandardisedGrasp)
+        settings = read_settings()
+        self._commander = ArmCommander(settings.arm_group)
+        try:
+            self._commander.connect(timeout_s)
+            for proxy in (self._scene, self._add_grasp):
+                wait_for_service(proxy, timeout_s)
+            tip = self._commander.group.tip_link
+            self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
+        except (CommanderError, CallError, GripperGeometryError) as error:
+            raise NoGraspError(str(error)) from error
+        self._service = rospy.Service("~generate", Trigger, self._on_demand)
+
+    def watch(self) -> None:
+        """Generates once for each object that appears, until ROS shuts down."""
+        deadline = time.monotonic() + read_settings().scene_timeout_s
+        before: set[str] = set()
+        told = False
+        while not rospy.is_shutdown():
+            settings = read_settings()
+            try:
+                names = {found.name for found in self._candidates(settings)}
+                new = names - self._seen
+                if new and names == before:
+                    self._seen |= names
+                    self._generate_and_signal(settings)
+                before, told = names, told or bool(new)
+            except NoGraspError as error:
+                before = set()
+                if not told and time.monotonic() > deadline:
+                    self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s)")
+                    told = True
+            rospy.rostime.wallsleep(SCENE_PERIOD_S)
+
+    def _on_demand(self, request: Any) -> TriggerResponse:
+        success, text = self._generate_and_signal(read_settings())
+        return TriggerResponse(success, text)
+
+    def _generate_and_signal(self, settings: GeneratorSettings) -> tuple[bool, str]:
+        try:
+            grasps = self._generate(settings)
+            for number, grasp in enumerate(grasps, start=1):
+                self._store(grasp, f"{settings.name_prefix}{number}" if settings.name_prefix else "")
+            text = f"{len(grasps)} grasps of {sorted({grasp.object_id for grasp in grasps})} were stored"
+            self._publish(True, text)
+            return True, text
+        except (NoGraspError, CallError, CommanderError) as error:
+            self._publish(False, str(error))
+            return False, str(error)
+
+    def _publish(self, success: bool, text: str) -> None:
+        (rospy.loginfo if success else rospy.logerr)("top_down_grasp_generator: %s.", text)
+        self._reason.publish(text)
+        self._signal.publish(success)
+
+    def _generate(self, settings: GeneratorSettings) -> list[StandardisedGrasp]:
+        objects = self._candidates(settings)
+        ranked: list[tuple[SceneObject, TopDownGrasp]] = []
+        for found in objects:
+            support = max(found.bottom, settings.crop.low[2]) if settings.crop.holds(found.centre) else found.bottom
+            ranked += [(found, grasp)
+                       for grasp in top_down_grasps(found.surface, support, self._gripper, settings.top_down)]
+        if not ranked:
+            sizes = "; ".join(f"'{found.name}' with the sides " + " x ".join(
+                f"{side:.3f}" for side in found.surface.points.max(axis=0) - found.surface.points.min(axis=0)) + " m"
+                for found in objects)
+            raise NoGraspError(f"no part of {sizes} can be grasped from above: the gripper opens to "
+                               f"{self._gripper.max_opening:.3f} m and needs flat or round sides")
+        ranked.sort(key=lambda pair: -pair[1].quality)
+        return self._reachable(ranked, settings)
+
+    def _reachable(self, ranked: list[tuple[SceneObject, TopDownGrasp]],
+                   settings: GeneratorSettings) -> list[StandardisedGrasp]:
+        chosen: list[StandardisedGrasp] = []
+        reasons: Counter[str] = Counter()
+        tried = ranked[:settings.max_checks]
+        for found, grasp in tried:
+            message = self._message(found, grasp, settings)
+            reason = self._why_unreachable(message) if settings.check_reachability else ""
+            if reason:
+                reasons[reason] += 1
+                continue
+            chosen.append(message)
+            if len(chosen) >= settings.max_grasps:
+                break
+        if not chosen:
+            names = sorted({found.name for found, _ in tried})
+            raise NoGraspError(f"no grasp of {names} is reachable: all {len(tried)} that were tried fail, for example "
+                               f"because {reasons.most_common(1)[0][0]}")
+        return chosen
+
+    def _why_unreachable(self, grasp: StandardisedGrasp) -> str:
+        posture = grasp.pregrasp.posture
+        seed = self._commander.current_joints() | dict(zip(posture.name, posture.position, strict=True))
+        for stage in ("pregrasp", "grasp", "postgrasp"):
+            result = self._commander.solve_ik(getattr(grasp, stage).pose, seed)
+            if not result:
+                return f"at the {stage} pose, {result.reason}"
+            seed = seed | result.joints
+        return ""
+
+    def _message(self, found: SceneObject, grasp: TopDownGrasp, settings: GeneratorSettings) -> StandardisedGrasp:
+        x, y, z = grasp.position
+        heights = (z + settings.top_down.approach_distance_m, z, z + settings.top_down.lift_distance_m)
+        poses = [generate_pose_stamped_message(settings.frame, (x, y, height), grasp.quaternion_xyzw)
+                 for height in heights]
+        closed = [self._gripper.closed_position]
+        return get_standardised_grasp([self._gripper.joint], [grasp.pregrasp_joint], closed, closed, [settings.torque],
+                                      *poses, grasp_quality=grasp.quality, hand_id=settings.hand_id,
+                                      object_id=found.name)
+
+    def _store(self, grasp: StandardisedGrasp, name: str) -> None:
+        request = AddStandardisedGraspRequest(grasp_message=grasp, grasp_name=name)
+        if not call_service(self._add_grasp, request, SERVICE_TIMEOUT_S).success:
+            raise NoGraspError(f"service '{self._add_grasp.resolved_name}' refused a grasp")
+
+    def _candidates(self, settings: GeneratorSettings) -> list[SceneObject]:
+        """Objects to grasp: the named one, or all in the crop box.
+
+        Raises:
+            NoGraspError: There is none.
+        """
+        objects = self._scene_objects()
+        if settings.object_name:
+            named = [found for found in objects if is_named(found.name, settings.object_name)]
+            if not named:
+                raise NoGraspError(f"the planning scene has no object '{settings.object_name}'; "
+                                   f"it has {sorted(found.name for found in objects)}")
+            return named
+        inside = [found for found in objects if settings.crop.holds(found.centre)]
+        if not inside:
+            raise NoGraspError(f"no object of the planning scene is in the crop box {_describe(settings.crop)} of frame "
+                               f"'{settings.frame}'; there are {[_place(found) for found in objects] or 'no objects'}")
+        return inside
+
+    def _scene_objects(self) -> list[SceneObject]:
+        components = PlanningSceneComponents(components=PlanningSceneComponents.WORLD_OBJECT_NAMES |
+                                             PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+        try:
+            answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
+        except CallError as error:
+            raise NoGraspError(str(error)) from error
+        objects = []
+        for message in answer.scene.world.collision_objects:
+            try:
+                found = scene_object(message)
+            except (SceneObjectError, ValueError) as error:
+                rospy.logwarn_throttle(30.0, f"top_down_grasp_generator: {error}; this object is left out.")
+                continue
+            objects += [found] if found is not None else []
+        return objects
+
+
+def _describe(crop: CropBox) -> str:
+    return ", ".join(f"{axis} {low} to {high}" for axis, low, high in zip("xyz", crop.low, crop.high, strict=True))
+
+
+def _place(found: SceneObject) -> str:
+    x, y, z = found.centre
+    return f"{found.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+
+
+def main() -> int:
+    """Runs the node ``top_down_grasp_generator``; returns 1 when something it needs is missing."""
+    rospy.init_node("top_down_grasp_generator")
+    generator = TopDownGraspGenerator()
+    try:
+        generator.connect()
+    except NoGraspError as error:
+        rospy.logfatal("top_down_grasp_generator: %s", error)
+        return 1
+    generator.watch()
+    return 0
