@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The planning configuration names what the robot has, and the launch files put it where planners look."""
+
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import ompl.geometric
+import pytest
+import rospkg
+import yaml
+from urdf_parser_py.urdf import URDF
+
+ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
+KNUCKLE = "ezgripper_knuckle_palm_L1_1"
+
+
+def config(package: Path, name: str):
+    with open(package / "config" / name, encoding="utf-8") as file:
+        return yaml.safe_load(file)
+
+
+@pytest.fixture(scope="module")
+def parameters() -> dict:
+    result = subprocess.run(["roslaunch", "--dump-params", "ur5_ezgripper_moveit_config", "move_group.launch",
+                             "load_robot_description:=true"], capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    return yaml.safe_load(result.stdout)
+
+
+def test_the_groups_and_the_end_effector_of_the_original_exist(srdf: ElementTree.Element) -> None:
+    groups = {element.get("name") for element in srdf.findall("group")}
+    assert groups == {"arm", "end_effector", "manipulator", "arm_and_manipulator", "ezgripper_finger_1", "ezgripper"}
+    chain = srdf.find("group[@name='arm_and_manipulator']/chain")
+    assert chain is not None
+    assert (chain.get("base_link"), chain.get("tip_link")) == ("base_link", "eg_manipulator")
+    effector = srdf.find("end_effector")
+    assert effector is not None
+    assert (effector.get("name"), effector.get("group")) == ("ezgripper_finger_1_ee", "ezgripper")
+    states = {(e.get("group"), e.get("name")) for e in srdf.iter("group_state")}
+    assert {("ezgripper", "open"), ("ezgripper", "closed")} <= states
+
+
+def test_every_name_of_the_srdf_is_one_of_the_robot(srdf: ElementTree.Element, urdf: str) -> None:
+    robot = URDF.from_xml_string(urdf)
+    links, joints = set(robot.link_map), set(robot.joint_map)
+    for element in srdf.iter("disable_collisions"):
+        assert {element.get("link1"), element.get("link2")} <= links
+    for element in srdf.iter("chain"):
+        assert {element.get("base_link"), element.get("tip_link")} <= links
+    for tag in ("joint", "passive_joint"):
+        assert {element.get("name") for element in srdf.iter(tag)} <= joints
+    assert srdf.get("name") == robot.name
+
+
+def test_every_arm_joint_has_velocity_and_acceleration_limits_within_the_urdf(package: Path, urdf: str) -> None:
+    joints = URDF.from_xml_string(urdf).joint_map
+    limits = config(package, "joint_limits.yaml")["joint_limits"]
+    assert set(limits) == {*ARM, KNUCKLE}
+    for name, limit in limits.items():
+        assert limit["has_velocity_limits"] and limit["has_acceleration_limits"]
+        assert 0 < limit["max_velocity"] <= joints[name].limit.velocity
+        assert limit["max_acceleration"] > 0
+
+
+def test_controllers_are_those_of_the_robot_package_with_the_same_joints(package: Path) -> None:
+    robot = rospkg.RosPack().get_path("ur5_ezgripper_robot")
+    with open(f"{robot}/controllers/ur5_ezgripper_controller_simulation.yaml", encoding="utf-8") as file:
+        loaded = yaml.safe_load(file)
+    listed = {entry["name"]: entry for entry in config(package, "controllers.yaml")["controller_list"]}
+    assert listed["arm_trajectory_controller"]["joints"] == loaded["arm_trajectory_controller"]["joints"] == ARM
+    assert listed["ezgripper_controller"]["joints"] == [loaded["ezgripper_controller"]["joint"]] == [KNUCKLE]
+    kinds = {name: (entry["type"], entry["action_ns"]) for name, entry in listed.items()}
+    assert kinds == {"arm_trajectory_controller": ("FollowJointTrajectory", "follow_joint_trajectory"),
+                     "ezgripper_controller": ("GripperCommand", "gripper_cmd")}
+
+
+@pytest.mark.parametrize("group", ["arm", "arm_and_manipulator"])
+def test_a_group_plans_with_rrtconnect_unless_told_otherwise(package: Path, group: str) -> None:
+    planning = config(package, "ompl_planning.yaml")
+    assert planning[group]["default_planner_config"] == "RRTConnect"
+    assert set(planning[group]["planner_configs"]) == set(planning["planner_configs"])
+    assert 0 < planning[group]["longest_valid_segment_fraction"] < 0.001
+
+
+def test_every_planner_is_one_ompl_has(package: Path) -> None:
+    for name, values in config(package, "ompl_planning.yaml")["planner_configs"].items():
+        assert values["type"] == f"geometric::{name}"
+        assert hasattr(ompl.geometric, name) or hasattr(ompl.geometric, f"{name}1")
+        assert all(isinstance(value, int | float) for key, value in values.items() if key != "type")
+
+
+def test_move_group_finds_its_parameters_in_the_noetic_layout(parameters: dict) -> None:
+    assert "<robot" in parameters["/robot_description"]
+    assert "<robot" in parameters["/robot_description_semantic"]
+    assert parameters["/robot_description_planning/joint_limits/elbow_joint/max_velocity"] == 3.15
+    for group in ("arm", "arm_and_manipulator"):
+        assert f"/robot_description_kinematics/{group}/kinematics_solver" in parameters
+        assert parameters[f"/move_group/planning_pipelines/ompl/{group}/default_planner_config"] == "RRTConnect"
+    assert parameters["/move_group/default_planning_pipeline"] == "ompl"
+    adapters = parameters["/move_group/planning_pipelines/ompl/request_adapters"].split()
+    assert adapters[0] == "default_planner_request_adapters/AddTimeOptimalParameterization"
+    execution = "/move_group/trajectory_execution/"
+    assert parameters[execution + "allowed_start_tolerance"] == 0.01
+    assert parameters[execution + "allowed_execution_duration_scaling"] == 1.2
+    assert [entry["name"] for entry in parameters["/move_group/controller_list"]] == [
+        "arm_trajectory_controller", "ezgripper_controller"]
+    assert parameters["/move_group/sensors"] == []
+
+
+def test_every_argument_of_every_launch_file_is_explained(package: Path) -> None:
+    files = sorted((package / "launch").glob("*.launch*"))
+    assert len(files) == 8
+    for path in files:
+        for argument in ElementTree.parse(path).getroot().findall("arg"):
+            assert argument.get("doc"), f"{path.name}: argument {argument.get('name')} has no doc"
+
+
+def test_the_launch_ends_when_move_group_does(package: Path) -> None:
+    node = ElementTree.parse(package / "launch" / "move_group.launch").getroot().find("node")
+    assert node is not None
+    expected = {"pkg": "moveit_ros_move_group", "type": "move_group", "name": "move_group", "required": "true"}
+    assert expected.items() <= node.attrib.items()
+
+
+def test_rviz_shows_robot_frames_scene_and_motion_with_its_own_displays(package: Path) -> None:
+    with open(package / "launch" / "moveit.rviz", encoding="utf-8") as file:
+        view = yaml.safe_load(file)["Visualization Manager"]
+    plugins = ElementTree.parse(f"{rospkg.RosPack().get_path('rviz')}/plugin_description.xml")
+    available = {element.get("name") for element in plugins.iter("class")}
+    assert {display["Class"] for display in view["Displays"]} <= available
+    assert {display.get("Marker Topic") for display in view["Displays"]} >= {
+        "/move_group/planning_scene_markers", "/move_group/display_planned_path_markers"}
+    assert view["Global Options"]["Fixed Frame"] == "world"
+
+
+def test_the_setup_assistant_would_find_robot_and_semantics(package: Path) -> None:
+    with open(package / ".setup_assistant", encoding="utf-8") as file:
+        settings = yaml.safe_load(file)["moveit_setup_assistant_config"]
+    robot = Path(rospkg.RosPack().get_path(settings["URDF"]["package"]))
+    assert (robot / settings["URDF"]["relative_path"]).is_file()
+    assert (package / settings["SRDF"]["relative_path"]).is_file()
