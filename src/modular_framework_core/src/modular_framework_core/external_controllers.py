@@ -43,7 +43,8 @@ def controller_node(parameters: Mapping[str, object]) -> ControllerNode | None:
     """
     if PACKAGE_KEY not in parameters:
         raise ExternalControllerError(f"parameter '{PACKAGE_KEY}' is not set; set it to the package of the "
-                                      "manipulator's action server, or to an empty text when a ros_control plug-in drives it")
+                                      "manipulator's action server, or to an empty text when a ros_control plug-in "
+                                      "drives it")
     package = str(parameters[PACKAGE_KEY] or "")
     if not package:
         return None

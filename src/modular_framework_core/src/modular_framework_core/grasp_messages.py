@@ -47,8 +47,8 @@ def generate_pose_stamped_message(reference_frame_name: str, position: Sequence[
         ValueError: The position has not three values, or the orientation neither three nor four.
     """
     if len(position) != 3 or len(orientation) not in (3, 4):
-        raise ValueError(f"a pose needs 3 values of position and 3 (roll, pitch, yaw) or 4 (x, y, z, w) of orientation, "
-                         f"got {len(position)} and {len(orientation)}")
+        raise ValueError("a pose needs 3 values of position and 3 (roll, pitch, yaw) or 4 (x, y, z, w) of "
+                         f"orientation, got {len(position)} and {len(orientation)}")
     quaternion = tuple(orientation) if len(orientation) == 4 else quaternion_from_rpy(*orientation)
     message = PoseStamped()
     message.header.stamp, message.header.frame_id = rospy.Time.now(), reference_frame_name

@@ -81,7 +81,7 @@ def read_settings() -> GeneratorSettings:
 def _number(name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
     value = rospy.get_param(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        rospy.logerr_throttle(10.0, f"Parameter '{rospy.resolve_name(name)}' is {value!r}, allowed is a number from {low} "
-                                    f"to {high}; {default} is used instead.")
+        rospy.logerr_throttle(10.0, f"Parameter '{rospy.resolve_name(name)}' is {value!r}, allowed is a number from "
+                                    f"{low} to {high}; {default} is used instead.")
         return float(default)
     return float(value)

@@ -190,8 +190,9 @@ class TopDownGraspGenerator:
             return named
         inside = [found for found in objects if settings.crop.holds(found.centre)]
         if not inside:
-            raise NoGraspError(f"no object of the planning scene is in the crop box {_describe(settings.crop)} of frame "
-                               f"'{settings.frame}'; there are {[_place(found) for found in objects] or 'no objects'}")
+            raise NoGraspError(f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
+                               f"frame '{settings.frame}'; there are "
+                               f"{[_place(found) for found in objects] or 'no objects'}")
         return inside
 
     def _scene_objects(self) -> list[SceneObject]:

@@ -2,9 +2,10 @@
 """Finds and ranks ways to grasp an object from above with a two-finger gripper.
 
 The hand points straight down. For several closing directions and places along the object, the part of the object
-between the pads is measured: it must fit the opening with room to spare, its sides must face the pads, and the fingertips
-must stay above the support. What remains is ranked by how squarely the sides face the pads, how near the grasp is to the
-centre of mass, how much room there is, how much of the pads touches, and how comfortable the place is for the arm.
+between the pads is measured: it must fit the opening with room to spare, its sides must face the pads, and the
+fingertips must stay above the support. What remains is ranked by how squarely the sides face the pads, how near the
+grasp is to the centre of mass, how much room there is, how much of the pads touches, and how comfortable the place is
+for the arm.
 """
 from __future__ import annotations
 

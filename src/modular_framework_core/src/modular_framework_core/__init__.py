@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Managers, task constructor, sensor frames and spawners of the framework."""

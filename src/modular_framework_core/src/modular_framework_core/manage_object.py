@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Understands what a user asks for on the command line when an object is to enter or leave the simulation."""
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+MODEL_FILE = "model.sdf"
+_NUMBERS = re.compile(r"[-+0-9.eE,\s]+")
+
+
+class ObjectRequestError(ValueError):
+    """The request cannot be served; the text says what is missing or wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectRequest:
+    """What to do with which object.
+
+    Attributes:
+        delete: True to delete the object, False to spawn it.
+        name: Name of the object in the simulation.
+        object_type: Model's folder, or the path of the SDF file.
+        sdf_file: SDF file to spawn; None when deleting.
+        position_m: x, y, z in the reference frame [m].
+        rpy_rad: Roll, pitch, yaw in the reference frame [rad].
+        reference_frame: Frame of the pose.
+    """
+
+    delete: bool
+    name: str
+    object_type: str
+    sdf_file: Path | None
+    position_m: tuple[float, float, float]
+    rpy_rad: tuple[float, float, float]
+    reference_frame: str
+
+
+def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
+    """Turns command line arguments into a request.
+
+    Args:
+        arguments: Arguments without the program's name; triplets may be separated by spaces or commas.
+        model_path: Folder of the models; needed only to spawn by type.
+
+    Returns:
+        The request.
+
+    Raises:
+        ObjectRequestError: Something is missing or wrong.
+    """
+    options = _parser().parse_args(_split_triplets(arguments))
+    delete = options.delete.lower() == "true"
+    file = Path(options.file).expanduser() if options.file else None
+    name = options.name or (options.type if not file else options.type or file.resolve().parent.name)
+    if not name:
+        raise ObjectRequestError("neither a name (-n), a type (-t) nor a file (-f) is given; "
+                                 f"{'give the name of the object to delete' if delete else 'give a type or a file'}")
+    sdf_file = None
+    if not delete:
+        sdf_file = file or _model_file(options.type, model_path)
+        if not sdf_file.is_file():
+            raise ObjectRequestError(f"there is no file '{sdf_file}'; give the path of an SDF file (-f) or a type (-t) "
+                                     f"that is a folder of '{model_path or 'gazebo_model_path'}' with a {MODEL_FILE}")
+    return ObjectRequest(delete, name, str(file) if file else options.type or name, sdf_file,
+                         _triplet("position", options.position), _triplet("orientation", options.orientation),
+                         options.reference)
+
+
+def _model_file(object_type: str, model_path: str) -> Path:
+    if not object_type:
+        raise ObjectRequestError("neither a type (-t) nor a file (-f) is given; one of them says what to spawn")
+    if not model_path:
+        raise ObjectRequestError("parameter 'gazebo_model_path' is not set, so the type cannot be found; set it to the "
+                                 "folder of the models, or give a file (-f)")
+    return Path(model_path) / object_type / MODEL_FILE
+
+
+def _split_triplets(arguments: Sequence[str]) -> list[str]:
+    """Splits every argument of several numbers into one argument a number; drops empty ones after options."""
+    result: list[str] = []
+    for argument in arguments:
+        if argument and _NUMBERS.fullmatch(argument):
+            result.extend(part for part in re.split(r"[,\s]+", argument) if part)
+        else:
+            result.append(argument)
+    return result
+
+
+def _triplet(what: str, values: Sequence[str]) -> tuple[float, float, float]:
+    try:
+        numbers = [float(value) for value in values]
+    except ValueError as error:
+        raise ObjectRequestError(f"the {what} is {list(values)}, expected three numbers: {error}") from error
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise ObjectRequestError(f"the {what} has the values {numbers}, expected three finite numbers separated by "
+                                 "spaces or commas")
+    return (numbers[0], numbers[1], numbers[2])
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="manage_object", description="Spawns or deletes an object of the simulation.")
+    parser.add_argument("-d", "--delete", nargs="?", const="true", default="false",
+                        choices=["False", "false", "True", "true"], help="delete the object instead of spawning it")
+    parser.add_argument("-n", "--name", nargs="?", const="", default="", help="name; default: the type")
+    parser.add_argument("-t", "--type", nargs="?", const="", default="", help="folder of the model")
+    parser.add_argument("-p", "--position", nargs="*", default=["0", "0", "0"], help="x y z [m]")
+    parser.add_argument("-o", "--orientation", nargs="*", default=["0", "0", "0"], help="roll pitch yaw [rad]")
+    parser.add_argument("-r", "--reference", nargs="?", const="world", default="world", help="frame of the pose")
+    parser.add_argument("-f", "--file", nargs="?", const="", default="", help="SDF file; overrides the type")
+    return parser

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Brings an object into the simulation or takes it out, everywhere or nowhere.
+
+The simulation, the map of object types and the collision matrix must agree on which objects exist. When one of them
+refuses, what was done before is taken back, and the exit code says so.
+"""
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import rospy
+from gazebo_msgs.srv import DeleteModel, DeleteModelRequest, SpawnModel, SpawnModelRequest
+from geometry_msgs.msg import Point, Pose, Quaternion
+
+from modular_framework_core import srv
+from modular_framework_core.manage_object import ObjectRequest, ObjectRequestError, parse_request
+from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_core.sensor_frames import quaternion_from_rpy
+
+SERVICE_TIMEOUT_S = 15.0
+
+
+class RefusedError(RuntimeError):
+    """A service said no; the text says which and why."""
+
+
+def call(name: str, service_type: Any, request: Any) -> Any:
+    """Calls a service.
+
+    Raises:
+        RefusedError: It is absent, fails, or answers without success.
+    """
+    proxy = rospy.ServiceProxy(name, service_type)
+    try:
+        wait_for_service(proxy, SERVICE_TIMEOUT_S)
+        answer = call_service(proxy, request, SERVICE_TIMEOUT_S)
+    except CallError as error:
+        raise RefusedError(str(error)) from error
+    if not answer.success:
+        text = getattr(answer, "status_message", "") or "its node logged the reason"
+        raise RefusedError(f"service '{proxy.resolved_name}' refused: {text}")
+    return answer
+
+
+def spawn(request: ObjectRequest) -> None:
+    """Spawns an object, or leaves everything as it was.
+
+    Raises:
+        RefusedError: A service said no, or the file cannot be read.
+    """
+    if request.sdf_file is None:
+        raise RefusedError(f"no SDF file is known for '{request.name}'")
+    try:
+        xml = request.sdf_file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RefusedError(f"'{request.sdf_file}' cannot be read: {error}") from error
+    pose = Pose(Point(*request.position_m), Quaternion(*quaternion_from_rpy(*request.rpy_rad)))
+    call("add_gazebo_mapping", srv.AddGazeboMapping,
+         srv.AddGazeboMappingRequest(object_name=request.name, object_type=request.object_type))
+    try:
+        call("gazebo/spawn_sdf_model", SpawnModel,
+             SpawnModelRequest(model_name=request.name, model_xml=xml, initial_pose=pose,
+                               reference_frame=request.reference_frame))
+        try:
+            call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.ADD_ENTRY, request.name))
+        except RefusedError:
+            _take_back("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
+            raise
+    except RefusedError:
+        _take_back("delete_gazebo_mapping", srv.DeleteGazeboMapping,
+                   srv.DeleteGazeboMappingRequest(object_name=request.name))
+        raise
+
+
+def delete(request: ObjectRequest) -> None:
+    """Deletes an object, or leaves everything as it was.
+
+    Raises:
+        RefusedError: A service said no.
+    """
+    object_type = call("get_object_type", srv.GetGazeboType,
+                       srv.GetGazeboTypeRequest(object_name=request.name)).object_type
+    call("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
+    try:
+        call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
+    except RefusedError:
+        _take_back("add_gazebo_mapping", srv.AddGazeboMapping,
+                   srv.AddGazeboMappingRequest(object_name=request.name, object_type=object_type))
+        raise
+    call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.DELETE_ENTRY, request.name))
+
+
+def _acm(action: int, name: str) -> srv.UpdateACMEntryRequest:
+    return srv.UpdateACMEntryRequest(action=action, entry_name=name)
+
+
+def _take_back(name: str, service_type: Any, request: Any) -> None:
+    try:
+        call(name, service_type, request)
+    except RefusedError as error:
+        rospy.logerr("manage_object: could not take back what was done: %s", error)
+
+
+def main() -> int:
+    """Runs once.
+
+    Parameters: ``gazebo_model_path``. Services called: ``add_gazebo_mapping``, ``get_object_type``,
+    ``delete_gazebo_mapping``, ``gazebo/spawn_sdf_model``, ``gazebo/delete_model``, ``update_acm_entry``.
+
+    Returns:
+        0 when done, 1 when a service refused, 2 when the arguments make no sense.
+    """
+    rospy.init_node("manage_object", anonymous=True)
+    try:
+        request = parse_request(rospy.myargv(sys.argv)[1:], str(rospy.get_param("gazebo_model_path", "")))
+        (delete if request.delete else spawn)(request)
+    except ObjectRequestError as error:
+        rospy.logfatal("manage_object: %s", error)
+        return 2
+    except RefusedError as error:
+        rospy.logfatal("manage_object: %s", error)
+        return 1
+    rospy.loginfo("Object '%s' was %s.", request.name, "deleted" if request.delete else "spawned")
+    return 0
