@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fills the userdata of a framework state machine: what the framework's states expect to find there.
+
+Keys: ``selected_grasp``, ``selected_joint_state``, ``selected_trajectory``, ``selected_pose``, ``selected_plan`` (None
+until a state selects something), ``arm_commander`` (ArmCommander), ``manipulator_controller_client``
+(actionlib.SimpleActionClient of the Grasp action) and ``max_torque``; the last two are None when the task has no
+manipulator (parameter ``manipulator_prefix`` empty).
+
+Parameters: ``manipulator_prefix``; from motion_planner_config.yaml ``planner_name``, ``robot_speed_factor``,
+``arm_group_name``, ``number_plan_attempt``, ``planning_max_time``; from manipulator_controller_parameters.yaml
+``manipulator_controller_action_server_name``, ``max_torque``. Written: ``manipulator_links_indices``.
+Services called: ``get_planning_scene``, ``set_init_acm``.
+"""
+from __future__ import annotations
+
+from typing import Any
+
+import actionlib
+import rospy
+from moveit_msgs.msg import PlanningSceneComponents
+from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
+
+from modular_framework_core.arm_commander import ArmCommander
+from modular_framework_core.msg import GraspAction
+from modular_framework_core.ros_calls import call_service, wait_for_service
+from modular_framework_core.srv import SetInitACM, SetInitACMRequest
+from modular_framework_core.userdata_parameters import UserdataParameters, manipulator_links, read_parameters
+
+START_TIMEOUT_S = 60.0
+SERVICE_TIMEOUT_S = 10.0
+SELECTED_KEYS = ("selected_grasp", "selected_joint_state", "selected_trajectory", "selected_pose", "selected_plan")
+
+
+class UserdataError(RuntimeError):
+    """The userdata cannot be filled; the text says what is missing."""
+
+
+def initialise_userdata(userdata: Any) -> None:
+    """Put the framework's keys into a userdata.
+
+    Raises:
+        UserdataParameterError: parameters are missing or wrong; names all of them and their files.
+        UserdataError, CallError, CommanderError: move_group or a manager is missing or refused.
+    """
+    parameters = read_parameters(lambda name: rospy.get_param(f"/{name}", None))
+    for key in SELECTED_KEYS:
+        userdata[key] = None
+    initialise_acm(parameters.manipulator_prefix)
+    userdata.arm_commander = make_arm_commander(parameters)
+    userdata.manipulator_controller_client = None
+    userdata.max_torque = parameters.max_torque
+    if parameters.manipulator_action:
+        userdata.manipulator_controller_client = actionlib.SimpleActionClient(
+            parameters.manipulator_action, GraspAction
+        )
+
+
+def initialise_acm(manipulator_prefix: str) -> None:
+    """Hand move_group's allowed collision matrix to the ACM manager and note which links are the manipulator's.
+
+    Args:
+        manipulator_prefix: text in the name of every link of the manipulator; "" = there is no manipulator.
+
+    Raises:
+        UserdataError: no link has that text in its name, or the ACM manager refused the matrix.
+        CallError: a service is missing or did not answer.
+    """
+    get_scene = rospy.ServiceProxy("/get_planning_scene", GetPlanningScene)
+    set_acm = rospy.ServiceProxy("set_init_acm", SetInitACM)
+    for proxy in (get_scene, set_acm):
+        wait_for_service(proxy, START_TIMEOUT_S)
+    wanted = PlanningSceneComponents.ALLOWED_COLLISION_MATRIX | PlanningSceneComponents.SCENE_SETTINGS
+    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=wanted))
+    acm = call_service(get_scene, request, SERVICE_TIMEOUT_S).scene.allowed_collision_matrix
+    indices = manipulator_links(list(acm.entry_names), manipulator_prefix)
+    if manipulator_prefix and not indices:
+        raise UserdataError(
+            f"manipulator_prefix is '{manipulator_prefix}', but no link has that in its name; the links are: "
+            f"{', '.join(acm.entry_names)}; correct it in the launch file, or leave it empty for a task without gripper"
+        )
+    rospy.set_param("manipulator_links_indices", indices)
+    if not call_service(set_acm, SetInitACMRequest(acm=acm), SERVICE_TIMEOUT_S).success:
+        raise UserdataError(
+            f"the ACM manager refused move_group's allowed collision matrix of {len(acm.entry_names)} entries; "
+            "its node logged the reason"
+        )
+
+
+def make_arm_commander(parameters: UserdataParameters) -> ArmCommander:
+    """Return a connected commander for the planning group of the parameters, with their planner settings."""
+    commander = ArmCommander(name=parameters.arm_group_name, set_ground=False)
+    commander.set_max_velocity_scaling_factor(parameters.robot_speed_factor)
+    commander.set_planner_id(parameters.planner_name)
+    commander.set_num_planning_attempts(parameters.number_plan_attempt)
+    commander.set_planning_time(parameters.planning_max_time)
+    commander.connect(timeout_s=START_TIMEOUT_S)
+    return commander

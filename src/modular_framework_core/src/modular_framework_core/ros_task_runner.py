@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node that runs a task: makes its state machine, runs it, tells what it does, and exits as the task ended.
+
+Node ``run_task``. Arguments: optionally the path of a task script (``.yaml``) or of a state machine (``.py``).
+Parameters (used where there is no argument):
+    ``~task_constructor_script``: path of the task script.
+    ``~state_machine_to_load``: path of an existing state machine, or its name in the folder of generated ones; when it
+        is not empty, nothing is generated.
+    ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list).
+    ``/run_id``: written by roslaunch; tells when the launch began.
+Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched).
+Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
+"""
+from __future__ import annotations
+
+import importlib.util
+import json
+import signal
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rospkg
+import rospy
+from std_msgs.msg import String
+
+import smach
+from modular_framework_core.task_constructor import generator, loading, pipeline
+from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.task_record import StateRecord, TaskRecorder
+from modular_framework_core.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
+
+STOP_GRACE_S = 1.5
+"""How long running states have to stop [s] before the node gives up on them."""
+
+PUBLISH_TIME_S = 0.2
+"""Time for the last messages to leave the process [s]."""
+
+_PROCESS_START = time.time()
+_UUID_EPOCH_S = 12219292800
+"""Seconds from the start of UUID time (1582-10-15) to that of Unix time."""
+
+
+class TaskNotRun(Exception):
+    """The task cannot be run; the text says why."""
+
+
+def launch_time() -> float:
+    """Return when the launch began [s since 1970]: the time in roslaunch's run id, else the start of this process."""
+    try:
+        run_id = uuid.UUID(str(rospy.get_param("/run_id")))
+    except (KeyError, ValueError):
+        return _PROCESS_START
+    return run_id.time / 1e7 - _UUID_EPOCH_S if run_id.version == 1 else _PROCESS_START
+
+
+class TaskReporter:
+    """Tells other nodes and the log what the task does."""
+
+    def __init__(self, name: str) -> None:
+        """Advertise the topics."""
+        self._name = name
+        self._lock = threading.Lock()
+        self._first_seen = False
+        self._started = time.monotonic()
+        self._status = rospy.Publisher("task_status", String, queue_size=100, latch=True)
+        self._outcome = rospy.Publisher("task_outcome", String, queue_size=1, latch=True)
+
+    def on_state(self, record: StateRecord, active: tuple[str, ...]) -> None:
+        """Publish the start or end of a state; log the first start."""
+        with self._lock:
+            first, self._first_seen = not self._first_seen, True
+        if first:
+            begun = launch_time()
+            clock = time.strftime("%H:%M:%S", time.localtime(begun))
+            rospy.loginfo(f"first state running: {record.path} after {time.time() - begun:.1f} s since {clock}")
+        ended = record.ended_s is not None
+        self._publish(
+            {
+                "task": self._name,
+                "event": "end" if ended else "start",
+                "state": record.path,
+                "active": list(active),
+                "elapsed_s": round(time.monotonic() - self._started, 3),
+                "state_elapsed_s": round((record.ended_s or record.started_s) - record.started_s, 3),
+                "outcome": record.outcome,
+                "reason": record.reason,
+            }
+        )
+        if ended:
+            rospy.loginfo(f"state {record.path} ended with '{record.outcome}'")
+
+    def _publish(self, status: dict[str, Any]) -> None:
+        self._status.publish(String(json.dumps(status)))
+
+    def on_end(self, result: TaskResult) -> None:
+        """Publish and print how the task ended."""
+        self._outcome.publish(String(result.outcome))
+        self._publish(
+            {
+                "task": self._name,
+                "event": "task_end",
+                "state": "",
+                "active": [],
+                "elapsed_s": round(time.monotonic() - self._started, 3),
+                "outcome": result.outcome,
+                "succeeded": result.succeeded,
+                "reason": "; ".join([*map(str, result.failures), *([result.error] if result.error else [])]),
+            }
+        )
+        print("\n".join(result.lines()), flush=True)
+
+
+def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:
+    """Run a task to its end, or until SIGINT, SIGTERM or the shutdown of ROS; return the exit code.
+
+    Args:
+        name: name of the task.
+        factory: makes its state machine; called in the task's thread.
+    """
+    asked_by: list[str] = []
+    previous = {
+        number: signal.signal(number, lambda received, frame: asked_by.append(signal.Signals(received).name))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    reporter = TaskReporter(name)
+    run = TaskRun(name, factory, TaskRecorder(reporter.on_state))
+    run.start()
+    try:
+        _wait(run, asked_by)
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+    result = run.result()
+    reporter.on_end(result)
+    time.sleep(PUBLISH_TIME_S)
+    return result.exit_code
+
+
+def _wait(run: TaskRun, asked_by: list[str]) -> None:
+    """Wait for the end of a run; pass a request to stop on to it, and give up a little later."""
+    give_up: float | None = None
+    while not run.wait(0.02):
+        if give_up is None and (asked_by or rospy.is_shutdown()):
+            run.request_stop(asked_by[0] if asked_by else "the shutdown of ROS")
+            give_up = time.monotonic() + STOP_GRACE_S
+        if give_up is not None and time.monotonic() > give_up:
+            return
+
+
+def _start_node(name: str) -> None:
+    rospy.init_node(name, disable_signals=True)
+    smach.set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)
+
+
+def _finish(exit_code: int) -> int:
+    rospy.signal_shutdown("the task has ended")
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return exit_code
+
+
+def run_as_node(node_name: str, task_name: str, factory: Callable[[], smach.Container]) -> int:
+    """Run one state machine as a ROS node: the main block of generated modules; return the exit code."""
+    _start_node(node_name)
+    return _finish(run_machine(task_name, factory))
+
+
+def main() -> int:
+    """Body of the node ``run_task``."""
+    _start_node("run_task")
+    try:
+        name, factory = prepare(rospy.myargv()[1:])
+    except TaskNotRun as error:
+        print(f"The task could not be run: {error}", file=sys.stderr, flush=True)
+        return _finish(EXIT_NOT_RUN)
+    return _finish(run_machine(name, factory))
+
+
+def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
+    """Find out what is to be run, from the arguments or the parameters.
+
+    Returns:
+        The name of the task, and the function that makes its state machine.
+
+    Raises:
+        TaskNotRun: there is nothing to run, or it is faulty.
+    """
+    given = Path(arguments[0]) if arguments else None
+    machine = str(rospy.get_param("~state_machine_to_load", "") or "").strip() if given is None else ""
+    if given is None:
+        given = Path(machine or str(rospy.get_param("~task_constructor_script", "") or ""))
+    if not given.name:
+        raise TaskNotRun(
+            "nothing to run was given; give a task script or a state machine as argument, or as parameter "
+            "~task_constructor_script or ~state_machine_to_load"
+        )
+    if machine or given.suffix == ".py":
+        return _prepare_machine(given)
+    return _prepare_task(given)
+
+
+def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:
+    if not path.is_absolute() and not path.is_file():
+        path = generator.default_output_directory() / path
+    try:
+        module = loading.load_module(path)
+        factory = loading.machine_factory(module)
+    except loading.LoadingError as error:
+        raise TaskNotRun(str(error)) from error
+    return str(getattr(module, "TASK_NAME", path.stem)), factory
+
+
+def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
+    states = _directories("states_directory", _default_states)
+    templates = _directories("templates_directory", _default_templates)
+    try:
+        task, path = pipeline.construct_task(script, states, templates, generator.default_output_directory())
+    except (TaskFault, generator.GenerationError, FileNotFoundError, OSError) as error:
+        raise TaskNotRun(str(error)) from error
+    rospy.loginfo(f"state machine of task '{task.name}' written to {path}")
+    return _prepare_machine(path)
+
+
+def _directories(parameter: str, default: Callable[[], Path]) -> list[Path]:
+    value = rospy.get_param(f"~{parameter}", "")
+    given = [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))
+    return given or [default()]
+
+
+def _package(name: str) -> Path:
+    try:
+        return Path(rospkg.RosPack().get_path(name))
+    except rospkg.ResourceNotFound as error:
+        raise TaskNotRun(f"the package {name} is not in ROS_PACKAGE_PATH; source the workspace") from error
+
+
+def _default_templates() -> Path:
+    return _package("modular_framework_core") / "templates"
+
+
+def _default_states() -> Path:
+    """Return the folder of the framework's states, wherever the package is on the Python path."""
+    found = importlib.util.find_spec("modular_framework_states.states")
+    if found is None or not found.submodule_search_locations:
+        raise TaskNotRun("the package modular_framework_states is not on the Python path; source the workspace")
+    return Path(list(found.submodule_search_locations)[0])

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of a task file: collected while it is checked, raised together, each saying where it is and what to do."""
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Place:
+    """A position in a file.
+
+    Attributes:
+        file: path of the file as the user gave it.
+        line: line number, from 1.
+        column: column number, from 1.
+    """
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Fault:
+    """One thing that is wrong in a task file."""
+
+    place: Place
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}"
+
+
+class TaskFault(Exception):
+    """A task file cannot be used. Carries every fault that was found in it."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        """Sort the faults by place and drop repetitions."""
+        self.faults: tuple[Fault, ...] = tuple(sorted(set(faults)))
+        lines = "\n".join(f"  {fault}" for fault in self.faults)
+        count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
+        super().__init__(f"{count} in the task:\n{lines}")
+
+
+class FaultList:
+    """Collects the faults of one task file."""
+
+    def __init__(self) -> None:
+        self._faults: list[Fault] = []
+
+    def add(self, place: Place, message: str) -> None:
+        """Note a fault."""
+        self._faults.append(Fault(place, message))
+
+    def add_unknown(self, place: Place, what: str, found: str, allowed: Iterable[str]) -> None:
+        """Note a name that is none of those allowed, with the nearest one where there is one near."""
+        self.add(place, f"{what} '{found}' is unknown; {listing(allowed)}{nearest(found, allowed)}")
+
+    def __len__(self) -> int:
+        return len(self._faults)
+
+    def raise_if_any(self) -> None:
+        """Raise ``TaskFault`` with all faults noted so far, if there are any."""
+        if self._faults:
+            raise TaskFault(self._faults)
+
+
+def listing(allowed: Iterable[str]) -> str:
+    """Say which names are allowed: ``allowed: a, b``."""
+    names = list(allowed)
+    return f"allowed: {', '.join(names)}" if names else "none is allowed here"
+
+
+def nearest(found: str, allowed: Iterable[str]) -> str:
+    """Return ``; did you mean 'x'?`` for the allowed name closest to the one found, or nothing."""
+    names = [str(name) for name in allowed]
+    by_lower = {name.lower(): name for name in names}
+    matches = difflib.get_close_matches(str(found).lower(), list(by_lower), n=1, cutoff=0.6)
+    return f"; did you mean '{by_lower[matches[0]]}'?" if matches else ""

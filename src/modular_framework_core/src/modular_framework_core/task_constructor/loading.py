@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loads Python files by path: states that are in no importable package, and state machine modules."""
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import smach
+
+
+class LoadingError(Exception):
+    """A file cannot be loaded, or does not define what is looked for in it."""
+
+
+def load_module(file: str | Path) -> ModuleType:
+    """Import a Python file by its path, once: a second call returns the same module.
+
+    Raises:
+        LoadingError: the file is not there, or raises while it is imported.
+    """
+    path = Path(file).resolve()
+    name = f"modular_framework_loaded_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    found = importlib.util.spec_from_file_location(name, path)
+    if found is None or found.loader is None or not path.is_file():
+        raise LoadingError(f"{path} is not a Python file that can be loaded")
+    module = importlib.util.module_from_spec(found)
+    sys.modules[name] = module
+    try:
+        found.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise LoadingError(f"{path} raised {type(error).__name__} while it was imported: {error}") from error
+    return module
+
+
+def load_state_class(file: str, class_name: str) -> Any:
+    """Return a state class out of a file."""
+    module = load_module(file)
+    if not hasattr(module, class_name):
+        raise LoadingError(f"{file} does not define the class {class_name}")
+    return getattr(module, class_name)
+
+
+def machine_factory(module: ModuleType) -> Callable[[], smach.Container]:
+    """Return the function that makes the state machine a module is about.
+
+    That is ``create_state_machine``; in a module without it, the last container class the module defines.
+
+    Raises:
+        LoadingError: the module has neither.
+    """
+    factory = getattr(module, "create_state_machine", None)
+    if callable(factory):
+        return factory  # type: ignore[no-any-return]
+    classes = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, smach.Container) and value.__module__ == module.__name__
+    ]
+    if not classes:
+        raise LoadingError(
+            f"{module.__file__} defines neither a function create_state_machine() nor a class derived from "
+            "smach.StateMachine or smach.Concurrence"
+        )
+    return classes[-1]

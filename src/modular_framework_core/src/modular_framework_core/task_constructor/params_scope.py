@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``params``: values written once in the header of a machine (or in a state) and used as ``params.<key>`` below it.
+
+The params of a machine are seen by everything inside it, at any depth. A ``params`` further inside hides the outer
+one key by key. A reference is a text that is exactly ``params.<key>``; it may stand wherever a value may: as an
+option, in a list, in a mapping, in the header of a nested machine.
+"""
+from __future__ import annotations
+
+from modular_framework_core.task_constructor.faults import FaultList, listing, nearest
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+
+PREFIX = "params."
+
+
+class ParamsScope:
+    """The params that can be seen from one place of a task."""
+
+    def __init__(self, visible: dict[str, Node] | None = None) -> None:
+        self._visible = dict(visible or {})
+        self.used: set[str] = set()
+
+    def inner(self, params: Mapping | None, faults: FaultList) -> ParamsScope:
+        """Return the scope inside a machine or state that declares ``params``; its values may refer to outer ones."""
+        own = {} if params is None else {key: self.resolve(value, faults) for key, value in params.entries.items()}
+        return ParamsScope({**self._visible, **own})
+
+    def resolve(self, node: Node, faults: FaultList) -> Node:
+        """Replace every reference in a value; a reference to nothing is noted as a fault and left as it is."""
+        match node:
+            case Mapping():
+                entries = {key: self.resolve(value, faults) for key, value in node.entries.items()}
+                return Mapping(entries, node.keys, node.place)
+            case Sequence():
+                return Sequence(tuple(self.resolve(item, faults) for item in node.items), node.place)
+            case Scalar(value=str(text)) if text.startswith(PREFIX):
+                return self._look_up(node, text.removeprefix(PREFIX), faults)
+        return node
+
+    def _look_up(self, node: Scalar, key: str, faults: FaultList) -> Node:
+        found = self._visible.get(key)
+        if found is None:
+            faults.add(
+                node.place,
+                f"'{PREFIX}{key}' refers to nothing: no params around it has the key '{key}'; "
+                f"{listing(self._visible)}{nearest(key, self._visible)}",
+            )
+            return node
+        self.used.add(key)
+        return _moved(found, node)
+
+
+def _moved(found: Node, reference: Node) -> Node:
+    """Return a value with the place of the reference to it, which is where a user looks for a mistake."""
+    match found:
+        case Scalar():
+            return Scalar(found.value, reference.place)
+        case Sequence():
+            return Sequence(found.items, reference.place)
+        case Mapping():
+            return Mapping(found.entries, found.keys, reference.place)
+
+
+def params_of(node: Node | None, faults: FaultList) -> Mapping | None:
+    """Return a ``params`` value when it is a mapping; note a fault when it is something else."""
+    if node is None or isinstance(node, Mapping):
+        return node
+    faults.add(node.place, f"params must be a mapping such as {{outcomes: [success, fail]}}, found {kind_of(node)}")
+    return None

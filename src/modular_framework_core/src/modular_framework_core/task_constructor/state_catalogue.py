@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds the states a task may use and reads their options from their source, without running any of it."""
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+STATE_KEYS = ("outcomes", "input_keys", "output_keys", "io_keys")
+"""Options every state has."""
+
+BASE_DEFAULTS: dict[str, tuple[str, ...]] = {
+    "FrameworkState": ("success", "fail"),
+    "State": (),
+}
+"""Default outcomes of the base classes a state may leave its constructor to."""
+
+
+class StateSourceError(Exception):
+    """A state file is not usable as a state; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class StateOption:
+    """An option of a state: a keyword argument of its constructor.
+
+    Attributes:
+        name: spelling, the same in the task script.
+        required: whether it has no default.
+        default: the default when it is written as a literal, else None.
+        default_known: whether ``default`` is the real default.
+    """
+
+    name: str
+    required: bool
+    default: Any
+    default_known: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StateSource:
+    """A state class that was found in a file.
+
+    Attributes:
+        name: name of the file without ``.py``: what ``source`` says in a task.
+        file: absolute path.
+        class_name: name of the class.
+        options: what its constructor takes, by name.
+        takes_any_option: whether its constructor takes further keyword arguments (or is not known).
+        doc: docstring of the class.
+    """
+
+    name: str
+    file: Path
+    class_name: str
+    options: dict[str, StateOption]
+    takes_any_option: bool
+    doc: str
+
+    def default_names(self, key: str) -> tuple[str, ...] | None:
+        """Return the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
+        option = self.options.get(key)
+        if option is None:
+            return None if self.takes_any_option else ()
+        if not option.default_known:
+            return None
+        if isinstance(option.default, (list, tuple)) and all(isinstance(name, str) for name in option.default):
+            return tuple(option.default)
+        return () if option.default is None else None
+
+
+def class_name_of(source_name: str) -> str:
+    """Return the class name that belongs to a file name: ``wait_for_signal`` -> ``WaitForSignal``."""
+    return "".join(word.capitalize() for word in source_name.split("_"))
+
+
+class StateCatalogue:
+    """The states in one or several directories; a name found twice is taken from the first directory that has it."""
+
+    def __init__(self, directories: Iterable[Path]) -> None:
+        """List the directories.
+
+        Args:
+            directories: where to look, in order.
+
+        Raises:
+            FileNotFoundError: a directory is not there.
+        """
+        self._files: dict[str, Path] = {}
+        self._read: dict[str, StateSource | StateSourceError] = {}
+        for directory in directories:
+            if not directory.is_dir():
+                raise FileNotFoundError(f"states directory {directory} is not a directory")
+            for file in sorted(directory.glob("*.py")):
+                if not file.stem.startswith("_"):
+                    self._files.setdefault(file.stem, file.resolve())
+
+    def names(self) -> list[str]:
+        """Return the names ``source`` may have, sorted."""
+        return sorted(self._files)
+
+    def resolve(self, name: str) -> str | None:
+        """Return the catalogue's spelling of a name: itself, or without the prefix ``state_``; None if unknown."""
+        if name in self._files:
+            return name
+        short = name.removeprefix("state_")
+        return short if short in self._files else None
+
+    def get(self, name: str) -> StateSource:
+        """Read a state.
+
+        Args:
+            name: a name out of ``names()``.
+
+        Raises:
+            StateSourceError: the file does not define a usable state class.
+        """
+        if name not in self._read:
+            try:
+                self._read[name] = _read_state(name, self._files[name])
+            except StateSourceError as error:
+                self._read[name] = error
+        found = self._read[name]
+        if isinstance(found, StateSourceError):
+            raise found
+        return found
+
+
+def _read_state(name: str, file: Path) -> StateSource:
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise StateSourceError(f"{file} cannot be read as Python: {error}") from error
+    classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    wanted = class_name_of(name)
+    if wanted not in classes:
+        raise StateSourceError(
+            f"{file} must define the class {wanted} (the file name in camel case); it defines: "
+            f"{', '.join(classes) or 'no class'}"
+        )
+    options, takes_any = _constructor_options(classes[wanted], classes)
+    return StateSource(name, file, wanted, options, takes_any, ast.get_docstring(classes[wanted]) or "")
+
+
+def _constructor_options(
+    node: ast.ClassDef, classes: dict[str, ast.ClassDef]
+) -> tuple[dict[str, StateOption], bool]:
+    """Return the options of a class and whether it takes others: its own constructor's, or that of its base."""
+    for item in node.body:
+        if isinstance(item, ast.FunctionDef) and item.name == "__init__":
+            return _arguments(item.args)
+    for base in node.bases:
+        base_name = base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "")
+        if base_name in classes and base_name != node.name:
+            return _constructor_options(classes[base_name], classes)
+        if base_name in BASE_DEFAULTS:
+            defaults: dict[str, tuple[str, ...]] = {"outcomes": BASE_DEFAULTS[base_name]}
+            return {key: StateOption(key, False, defaults.get(key, ()), True) for key in STATE_KEYS}, False
+    return {}, True
+
+
+def _arguments(arguments: ast.arguments) -> tuple[dict[str, StateOption], bool]:
+    positional = [*arguments.posonlyargs, *arguments.args]
+    padding: list[ast.expr | None] = [None] * (len(positional) - len(arguments.defaults))
+    pairs = list(zip(positional, [*padding, *arguments.defaults], strict=True))[1:]
+    pairs += list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
+    options = {argument.arg: _option(argument.arg, default) for argument, default in pairs}
+    return options, arguments.kwarg is not None
+
+
+def _option(name: str, default: ast.expr | None) -> StateOption:
+    if default is None:
+        return StateOption(name, True, None, False)
+    try:
+        return StateOption(name, False, ast.literal_eval(default), True)
+    except (ValueError, TypeError, SyntaxError):
+        return StateOption(name, False, None, False)

@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns the YAML of a task into a ``TaskSpec``; finds everything that is wrong with it before anything is generated."""
+from __future__ import annotations
+
+import builtins
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from modular_framework_core.task_constructor import header_fields, located_yaml, machine_checks
+from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+from modular_framework_core.task_constructor.machine_checks import ChildLinks
+from modular_framework_core.task_constructor.params_scope import ParamsScope, params_of
+from modular_framework_core.task_constructor.state_catalogue import (
+    STATE_KEYS,
+    StateCatalogue,
+    StateSource,
+    StateSourceError,
+    class_name_of,
+)
+from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, StateSpec, TaskSpec
+from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
+
+DEFAULT_OUTCOMES = ("success", "fail")
+SHARED_USERDATA = "self.userdata"
+_MACHINE_KEYS = ("source", "outcomes", "params", "states", "default_outcome", "outcome_map")
+_ROOT_KEYS = ("name", "node_name", *_MACHINE_KEYS)
+_NESTED_KEYS = ("name", "userdata", "transitions", "input_keys", "output_keys", *_MACHINE_KEYS)
+_STATE_RESERVED = ("source", "params", "transitions")
+
+
+def load_task(script: Path, states: StateCatalogue, templates: TemplateCatalogue) -> TaskSpec:
+    """Read and check a task.
+
+    Args:
+        script: the YAML file.
+        states: the states it may use.
+        templates: the templates its machines may be written with.
+
+    Raises:
+        TaskFault: something is wrong with it; carries all faults.
+    """
+    return TaskBuilder(states, templates).build(located_yaml.load(script), str(script))
+
+
+class TaskBuilder:
+    """Walks through the YAML of one task, outermost machine first."""
+
+    def __init__(self, states: StateCatalogue, templates: TemplateCatalogue) -> None:
+        """Use these states and templates."""
+        self._states = states
+        self._templates = templates
+        self._faults = FaultList()
+        self._taken = {class_name_of(name) for name in states.names()} | set(dir(builtins))
+
+    def build(self, document: Node, script: str) -> TaskSpec:
+        """Return the task; raise ``TaskFault`` with everything that is wrong."""
+        if not isinstance(document, Mapping):
+            self._faults.add(document.place, f"a task must be a mapping with {listing(_ROOT_KEYS)}, "
+                                             f"found {kind_of(document)}")
+            self._faults.raise_if_any()
+        assert isinstance(document, Mapping)
+        scope = ParamsScope().inner(params_of(document.entries.get("params"), self._faults), self._faults)
+        header = self._resolved_header(document, scope)
+        self._require(header, ("name", "source", "outcomes", "states"), "the task")
+        name = "task"
+        if "name" in header.entries:
+            name = header_fields.identifier(header.entries["name"], "name", self._faults) or name
+        node = name
+        if "node_name" in header.entries:
+            node = header_fields.node_name(header.entries["node_name"], self._faults) or name
+        root = self._machine(name, header, scope, None)
+        if root is not None and not len(self._faults):
+            machine_checks.check_userdata(root, self._provided_by(), self._faults)
+        self._faults.raise_if_any()
+        assert root is not None, "a machine that could not be built has left a fault"
+        return TaskSpec(name, node, script, root)
+
+    # ---- machines ------------------------------------------------------------------------------------------
+    def _machine(
+        self, label: str, header: Mapping, scope: ParamsScope, parent: MachineSpec | str | None
+    ) -> MachineSpec | None:
+        """Build a machine from its header, whose references are resolved, and its states."""
+        template = self._template(header, label)
+        outcomes = self._outcomes(header)
+        type_name = self._unique_type(header, label, parent if isinstance(parent, str) else None)
+        children, links = self._children(header, scope, type_name, outcomes)
+        if template is None:
+            return None
+        self._check_header_keys(header, template, is_root=parent is None, label=label)
+        if template.concurrent:
+            machine_checks.check_concurrent(links, self._faults)
+        else:
+            machine_checks.check_sequential(links, outcomes, self._faults)
+        return MachineSpec(
+            label=label,
+            template=template,
+            type=type_name,
+            outcomes=outcomes,
+            states=tuple(children),
+            transitions=self._plain_transitions(header),
+            shares_userdata=self._shares_userdata(header),
+            default_outcome=self._default_outcome(header, template, outcomes),
+            outcome_map=self._outcome_map(header, template, outcomes, links),
+            input_keys=self._key_names(header, "input_keys"),
+            output_keys=self._key_names(header, "output_keys"),
+            options={key: header.entries[key].plain() for key in template.options if key in header.entries},
+            place=header.place,
+        )
+
+    def _resolved_header(self, node: Mapping, scope: ParamsScope) -> Mapping:
+        """Resolve the references of a header, leaving ``params`` and ``states`` for later."""
+        entries = {
+            key: value if key in ("params", "states") else scope.resolve(value, self._faults)
+            for key, value in node.entries.items()
+        }
+        return Mapping(entries, node.keys, node.place)
+
+    def _require(self, node: Mapping, keys: Iterable[str], what: str) -> None:
+        for key in keys:
+            if key not in node.entries:
+                self._faults.add(node.place, f"{what} has no '{key}'{nearest(key, set(node.entries))}")
+
+    def _template(self, header: Mapping, label: str) -> TemplateSource | None:
+        if "source" not in header.entries:
+            return None
+        node = header.entries["source"]
+        name = header_fields.text(node, "source", self._faults)
+        if name is None:
+            return None
+        template = self._templates.get(name)
+        if template is None and self._states.resolve(name) is not None:
+            self._faults.add(node.place, f"'{label}' contains states, but its source '{name}' is a state; "
+                                         f"{listing(self._templates.names())}")
+        elif template is None:
+            self._faults.add_unknown(node.place, "template", name, self._templates.names())
+        return template
+
+    def _outcomes(self, header: Mapping) -> tuple[str, ...]:
+        if "outcomes" not in header.entries:
+            return DEFAULT_OUTCOMES
+        return header_fields.names(header.entries["outcomes"], "outcomes", self._faults) or DEFAULT_OUTCOMES
+
+    def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
+        """Return a class name no other machine and no state of the task has."""
+        base = label
+        if parent_type is not None and "name" in header.entries:
+            base = header_fields.identifier(header.entries["name"], "name", self._faults) or label
+        words = base.replace("-", "_").split("_")
+        wanted = "".join(word[:1].upper() + word[1:] for word in words) or "Machine"
+        candidate = wanted
+        if candidate in self._taken and parent_type is not None:
+            candidate = parent_type + wanted
+        number = 2
+        while candidate in self._taken:
+            candidate, number = f"{wanted}{number}", number + 1
+        self._taken.add(candidate)
+        return candidate
+
+    def _check_header_keys(self, header: Mapping, template: TemplateSource, *, is_root: bool, label: str) -> None:
+        known = [*(_ROOT_KEYS if is_root else _NESTED_KEYS), *sorted(template.options)]
+        if not template.concurrent:
+            for key in ("default_outcome", "outcome_map"):
+                known.remove(key)
+        for key in header.entries:
+            if key not in known:
+                what = f"'{label}' (template {template.name}): key"
+                self._faults.add_unknown(header.keys[key], what, key, known)
+
+    def _shares_userdata(self, header: Mapping) -> bool:
+        node = header.entries.get("userdata")
+        if node is None:
+            return False
+        if isinstance(node, Scalar) and node.value == SHARED_USERDATA:
+            return True
+        self._faults.add(node.place, f"userdata can only be {SHARED_USERDATA}, found {kind_of(node)}")
+        return False
+
+    def _default_outcome(
+        self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...]
+    ) -> str | None:
+        node = header.entries.get("default_outcome")
+        if not template.concurrent or node is None:
+            return outcomes[-1] if template.concurrent else None
+        name = header_fields.text(node, "default_outcome", self._faults)
+        if name is not None and name not in outcomes:
+            self._faults.add_unknown(node.place, "default_outcome", name, outcomes)
+        return name
+
+    def _outcome_map(
+        self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...], links: list[ChildLinks]
+    ) -> dict[str, dict[str, str]]:
+        node = header.entries.get("outcome_map")
+        if not template.concurrent or node is None:
+            return {}
+        return machine_checks.check_outcome_map(node, outcomes, links, self._faults)
+
+    def _key_names(self, header: Mapping, key: str) -> tuple[str, ...]:
+        if key not in header.entries:
+            return ()
+        return header_fields.names(header.entries[key], key, self._faults, may_be_empty=True) or ()
+
+    # ---- children ------------------------------------------------------------------------------------------
+    def _children(
+        self, header: Mapping, scope: ParamsScope, parent_type: str, outcomes: tuple[str, ...]
+    ) -> tuple[list[ChildSpec], list[ChildLinks]]:
+        specs: list[ChildSpec] = []
+        links: list[ChildLinks] = []
+        first_lines: dict[str, int] = {}
+        for label, place, body in self._child_entries(header):
+            header_fields.label(label, place, self._faults)
+            if label in first_lines:
+                self._faults.add(place, f"the label '{label}' is given twice; first in line {first_lines[label]}")
+                continue
+            first_lines[label] = place.line
+            if label in outcomes:
+                self._faults.add(place, f"the label '{label}' is also an outcome of the machine; rename one of them")
+            spec, link = self._child(label, place, body, scope, parent_type)
+            links.append(link)
+            if spec is not None:
+                specs.append(spec)
+        return specs, links
+
+    def _child_entries(self, header: Mapping) -> list[tuple[str, Place, Mapping]]:
+        """Return label, place and content of each entry of ``states``."""
+        node = header.entries.get("states")
+        if node is None:
+            return []
+        if not isinstance(node, Sequence) or not node.items:
+            found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
+            self._faults.add(node.place, f"states must be a list of '- Label: {{source: ...}}', found {found}")
+            return []
+        result: list[tuple[str, Place, Mapping]] = []
+        for item in node.items:
+            if not isinstance(item, Mapping):
+                self._faults.add(item.place, f"a state must be '- Label: {{source: ...}}', found {kind_of(item)}")
+                continue
+            if len(item.entries) != 1:
+                self._faults.add(
+                    item.place,
+                    f"one entry of states has the labels {', '.join(item.entries)}; each state needs its own '-', "
+                    "and its options are indented below the label",
+                )
+            for label, body in item.entries.items():
+                if isinstance(body, Mapping):
+                    result.append((label, item.keys[label], body))
+                elif len(item.entries) == 1:
+                    message = f"state '{label}' must be a mapping with 'source', found {kind_of(body)}"
+                    self._faults.add(body.place, message)
+        return result
+
+    def _child(
+        self, label: str, place: Place, body: Mapping, outer: ParamsScope, parent_type: str
+    ) -> tuple[ChildSpec | None, ChildLinks]:
+        scope = outer.inner(params_of(body.entries.get("params"), self._faults), self._faults)
+        body = self._resolved_header(body, scope)
+        self._require(body, ("source",), f"state '{label}'")
+        spec: ChildSpec | None
+        outcomes: tuple[str, ...] | None
+        if "states" in body.entries:
+            spec = self._machine(label, body, scope, parent_type)
+            outcomes = None if spec is None else spec.outcomes
+        else:
+            spec, outcomes = self._state(label, place, body, scope)
+        transitions = None
+        keys: dict[str, Place] = {}
+        node = body.entries.get("transitions")
+        if node is not None:
+            transitions = header_fields.name_map(node, f"state '{label}': transitions", self._faults)
+            keys = node.keys if isinstance(node, Mapping) else {}
+        return spec, ChildLinks(label, outcomes, transitions, keys, place)
+
+    def _plain_transitions(self, body: Mapping) -> dict[str, str]:
+        node = body.entries.get("transitions")
+        return {} if not isinstance(node, Mapping) else {key: str(value.plain()) for key, value in node.entries.items()}
+
+    # ---- states --------------------------------------------------------------------------------------------
+    def _state(
+        self, label: str, place: Place, body: Mapping, scope: ParamsScope
+    ) -> tuple[StateSpec | None, tuple[str, ...] | None]:
+        source = self._state_source(body, label)
+        if source is None:
+            return None, None
+        given = {key: value for key, value in body.entries.items() if key not in _STATE_RESERVED}
+        options = {**self._options_from_params(label, body, scope, source), **given}
+        what = f"state '{label}' ({source.name}): option"
+        for key in given:
+            if key not in source.options and not (source.takes_any_option and key.isidentifier()):
+                self._faults.add_unknown(body.keys[key], what, key, source.options)
+        for option in source.options.values():
+            if option.required and option.name not in options:
+                self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
+        for key in STATE_KEYS:
+            if key in options:
+                may_be_empty = key != "outcomes"
+                header_fields.names(options[key], f"state '{label}': {key}", self._faults, may_be_empty=may_be_empty)
+        outcomes = self._state_outcomes(options, source)
+        values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
+        return (
+            StateSpec(label, source, source.class_name, values, outcomes or (), self._plain_transitions(body), place),
+            outcomes,
+        )
+
+    def _state_source(self, body: Mapping, label: str) -> StateSource | None:
+        node = body.entries.get("source")
+        name = None if node is None else header_fields.text(node, f"state '{label}': source", self._faults)
+        if node is None or name is None:
+            return None
+        found = self._states.resolve(name)
+        if found is None:
+            if self._templates.get(name) is not None:
+                self._faults.add(node.place, f"'{label}' uses the template '{name}' but has no 'states'")
+            else:
+                self._faults.add_unknown(node.place, f"state '{label}': source", name, self._states.names())
+            return None
+        try:
+            return self._states.get(found)
+        except StateSourceError as error:
+            self._faults.add(node.place, f"state '{label}': {error}")
+            return None
+
+    def _options_from_params(
+        self, label: str, body: Mapping, scope: ParamsScope, source: StateSource
+    ) -> dict[str, Node]:
+        """Return the values of a state's own params that are options of it; note those that are of no use."""
+        params = body.entries.get("params")
+        if not isinstance(params, Mapping):
+            return {}
+        options: dict[str, Node] = {}
+        for key, value in params.entries.items():
+            if key in source.options or source.takes_any_option:
+                options[key] = scope.resolve(value, FaultList())
+            elif key not in scope.used:
+                what = f"state '{label}' ({source.name}): params: option"
+                self._faults.add_unknown(params.keys[key], what, key, source.options)
+        return options
+
+    def _state_outcomes(self, options: dict[str, Node], source: StateSource) -> tuple[str, ...] | None:
+        if "outcomes" in options:
+            return header_fields.names(options["outcomes"], "outcomes", FaultList())
+        return source.default_names("outcomes") or None
+
+    def _provided_by(self) -> dict[str, str]:
+        """Return userdata key -> template that provides it."""
+        found: dict[str, str] = {}
+        for name in self._templates.names():
+            template = self._templates.get(name)
+            for key in (template.userdata or ()) if template else ():
+                found.setdefault(key, name)
+        return found

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds the templates state machines are written with, and what each of them expects of a machine."""
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+SUFFIX = ".template"
+_OPTION = re.compile(r"\boptions\.(\w+)|\boptions\[['\"](\w+)['\"]\]")
+_PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
+
+
+@dataclass(frozen=True, slots=True)
+class TemplateSource:
+    """A template file.
+
+    Attributes:
+        name: file name without ``.template``: what ``source`` says in a task.
+        file: absolute path.
+        concurrent: whether it makes a ``smach.Concurrence``.
+        options: header keys of its own that it uses as ``options.<key>``.
+        userdata: keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
+            None when it does not say.
+    """
+
+    name: str
+    file: Path
+    concurrent: bool
+    options: frozenset[str]
+    userdata: frozenset[str] | None
+
+
+class TemplateCatalogue:
+    """The templates in one or several directories; the first directory that has a name wins."""
+
+    def __init__(self, directories: Iterable[Path]) -> None:
+        """List and read the templates.
+
+        Raises:
+            FileNotFoundError: a directory is not there.
+        """
+        self.directories = tuple(directories)
+        self._templates: dict[str, TemplateSource] = {}
+        for directory in self.directories:
+            if not directory.is_dir():
+                raise FileNotFoundError(f"templates directory {directory} is not a directory")
+            for file in sorted(directory.glob(f"*{SUFFIX}")):
+                name = file.name.removesuffix(SUFFIX)
+                if name not in self._templates:
+                    self._templates[name] = _read_template(name, file.resolve())
+
+    def names(self) -> list[str]:
+        """Return the names ``source`` may have, sorted."""
+        return sorted(self._templates)
+
+    def get(self, name: str) -> TemplateSource | None:
+        """Return a template, or None when there is none of this name."""
+        return self._templates.get(name)
+
+
+def _read_template(name: str, file: Path) -> TemplateSource:
+    text = file.read_text(encoding="utf-8")
+    options = frozenset(first or second for first, second in _OPTION.findall(text))
+    declared = _PROVIDES.search(text)
+    provided = None if declared is None else frozenset(re.findall(r"\w+", declared.group(1)))
+    return TemplateSource(name, file, re.search(r"\bConcurrence\b", text) is not None, options, provided)

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Records what the states of a running task do: when each started and ended, with which outcome, and why.
+
+The recorder looks at any smach state, so a user's own states are recorded like the framework's.
+"""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import smach
+
+
+@dataclass(frozen=True, slots=True)
+class StateRecord:
+    """One execution of one state.
+
+    Attributes:
+        path: labels from the root to the state, joined by "/".
+        started_s: when it started [s since the task started].
+        ended_s: when it ended [s since the task started]; None while it runs.
+        outcome: what it returned; None while it runs, or when it raised.
+        failed: whether it ended with its negative (last) outcome, gave a reason, or raised.
+        reason: why, in words of the state; "" when it gave none.
+    """
+
+    path: str
+    started_s: float
+    ended_s: float | None = None
+    outcome: str | None = None
+    failed: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FailureSummary:
+    """All executions of one state that failed.
+
+    Attributes:
+        path: labels from the root to the state.
+        failures: how often it failed.
+        executions: how often it ran.
+        last_reason: why it failed the last time.
+        different_reasons: how many different reasons it gave.
+    """
+
+    path: str
+    failures: int
+    executions: int
+    last_reason: str
+    different_reasons: int
+
+    def __str__(self) -> str:
+        times = "once" if self.failures == 1 else f"{self.failures} times"
+        of = "" if self.executions == self.failures else f" of {self.executions}"
+        more = f" (the last of {self.different_reasons} different reasons)" if self.different_reasons > 1 else ""
+        return f"{self.path} failed {times}{of}: {self.last_reason}{more}"
+
+
+Listener = Callable[[StateRecord, tuple[str, ...]], None]
+"""Called at the start and the end of each state with its record and the paths of the states that run now."""
+
+
+class TaskRecorder:
+    """Keeps the records of one run of one task; safe to use from several threads."""
+
+    def __init__(self, listener: Listener | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        """Start the task's clock.
+
+        Args:
+            listener: told about each start and end of a state that has no children.
+            clock: returns the time [s].
+        """
+        self._listener = listener
+        self._clock = clock
+        self._zero = clock()
+        self._lock = threading.Lock()
+        self._records: list[StateRecord] = []
+        self._active: dict[int, str] = {}
+
+    def elapsed_s(self) -> float:
+        """Return the time since the task started [s]."""
+        return self._clock() - self._zero
+
+    def attach(self, machine: smach.Container) -> None:
+        """Record every state in a machine and in the machines nested in it from now on."""
+        for label, child in machine.get_children().items():
+            self._attach_state(child, label)
+
+    def _attach_state(self, state: smach.State, path: str) -> None:
+        if isinstance(state, smach.Container):
+            for label, child in state.get_children().items():
+                self._attach_state(child, f"{path}/{label}")
+            return
+        execute = state.execute
+
+        def recorded(userdata: Any) -> str:
+            if hasattr(state, "reason"):
+                state.reason = ""
+            number = self._begin(path)
+            try:
+                outcome = execute(userdata)
+            except BaseException as error:
+                self._end(number, None, True, f"raised {type(error).__name__}: {error}")
+                raise
+            reason = str(getattr(state, "reason", "") or "")
+            outcomes = state.get_registered_outcomes()
+            negative = len(outcomes) > 1 and outcome == outcomes[-1]
+            self._end(number, outcome, negative or bool(reason), reason)
+            return outcome
+
+        state.execute = recorded  # type: ignore[method-assign]
+
+    def _begin(self, path: str) -> int:
+        with self._lock:
+            number = len(self._records)
+            self._records.append(StateRecord(path, self.elapsed_s()))
+            self._active[number] = path
+        self._tell(number)
+        return number
+
+    def _end(self, number: int, outcome: str | None, failed: bool, reason: str) -> None:
+        with self._lock:
+            self._active.pop(number, None)
+            if failed and not reason:
+                reason = f"gave '{outcome}' and no reason"
+            self._records[number] = replace(
+                self._records[number], ended_s=self.elapsed_s(), outcome=outcome, failed=failed, reason=reason
+            )
+        self._tell(number)
+
+    def _tell(self, number: int) -> None:
+        if self._listener is not None:
+            with self._lock:
+                record, active = self._records[number], tuple(self._active.values())
+            self._listener(record, active)
+
+    def records(self) -> tuple[StateRecord, ...]:
+        """Return all records, in the order the states started."""
+        with self._lock:
+            return tuple(self._records)
+
+    def active(self) -> tuple[str, ...]:
+        """Return the paths of the states that run now."""
+        with self._lock:
+            return tuple(self._active.values())
+
+    def failures(self) -> tuple[FailureSummary, ...]:
+        """Return one summary for each state that failed, in the order they failed first."""
+        records = self.records()
+        paths = dict.fromkeys(record.path for record in records if record.failed)
+        summaries = []
+        for path in paths:
+            mine = [record for record in records if record.path == path]
+            reasons = [record.reason for record in mine if record.failed]
+            summaries.append(FailureSummary(path, len(reasons), len(mine), reasons[-1], len(set(reasons))))
+        return tuple(summaries)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parameters a framework state machine starts from: read together, checked together, reported together."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+PLANNER_FILE = "motion_planner_config.yaml"
+MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
+
+
+class UserdataParameterError(ValueError):
+    """Parameters are missing or have a wrong value; the text lists all of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class UserdataParameters:
+    """What the arm commander and the manipulator's client are made from.
+
+    Attributes:
+        planner_name: planner to ask move_group for.
+        robot_speed_factor: share of the joint velocity limits, in (0, 1].
+        arm_group_name: planning group of the arm.
+        number_plan_attempt: plans made for each request; the shortest is kept.
+        planning_max_time: longest time for a plan [s].
+        manipulator_prefix: text in the name of every link of the manipulator; "" = no manipulator.
+        manipulator_action: name of the manipulator's Grasp action; "" without manipulator.
+        max_torque: what a torque intensity of 1 stands for; None without manipulator.
+    """
+
+    planner_name: str
+    robot_speed_factor: float
+    arm_group_name: str
+    number_plan_attempt: int
+    planning_max_time: float
+    manipulator_prefix: str
+    manipulator_action: str
+    max_torque: float | None
+
+
+def read_parameters(get: Callable[[str], Any]) -> UserdataParameters:
+    """Read and check all parameters.
+
+    Args:
+        get: returns the value of a global parameter, None when it is not set.
+
+    Raises:
+        UserdataParameterError: lists every parameter that is missing or wrong, with its config file.
+    """
+    faults: list[str] = []
+
+    def value(name: str, file: str, kinds: tuple[type, ...], allowed: str, fits: Callable[[Any], bool]) -> Any:
+        found = get(name)
+        if found is None:
+            faults.append(f"'{name}' is not set; it belongs in {file} ({allowed})")
+        elif not isinstance(found, kinds) or isinstance(found, bool) or not fits(found):
+            faults.append(f"'{name}' is {found!r}; in {file} it must be {allowed}")
+        return found
+
+    number = (int, float)
+    planner = value("planner_name", PLANNER_FILE, (str,), "the name of a planner", bool)
+    speed = value("robot_speed_factor", PLANNER_FILE, number, "a number in (0, 1]", lambda v: 0.0 < v <= 1.0)
+    group = value("arm_group_name", PLANNER_FILE, (str,), "the name of a planning group", bool)
+    attempts = value("number_plan_attempt", PLANNER_FILE, (int,), "a whole number of at least 1", lambda v: v >= 1)
+    time_s = value("planning_max_time", PLANNER_FILE, number, "seconds, more than 0", lambda v: v > 0.0)
+    prefix = str(get("manipulator_prefix") or "")
+    action, torque = "", None
+    if prefix:
+        name = "manipulator_controller_action_server_name"
+        action = value(name, MANIPULATOR_FILE, (str,), "the name of an action", bool)
+        torque = value("max_torque", MANIPULATOR_FILE, number, "a number of at least 0", lambda v: v >= 0.0)
+    if faults:
+        raise UserdataParameterError("parameters of the task are missing or wrong: " + "; ".join(faults))
+    return UserdataParameters(
+        planner, float(speed), group, attempts, float(time_s), prefix, action, None if torque is None else float(torque)
+    )
+
+
+def manipulator_links(link_names: list[str], prefix: str) -> list[int]:
+    """Return the indices of the links whose name contains a text; none for an empty text."""
+    return [index for index, name in enumerate(link_names) if prefix and prefix in name]
