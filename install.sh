@@ -49,10 +49,10 @@ step() {  # title, what to do on failure, command...
 }
 
 check_system() {
-  local id="" version=""
-  if [ -r /etc/os-release ]; then
-    id=$(sed -n 's/^ID=//p' /etc/os-release | tr -d '"')
-    version=$(sed -n 's/^VERSION_ID=//p' /etc/os-release | tr -d '"')
+  local id="" version="" release=${OS_RELEASE_FILE:-/etc/os-release}
+  if [ -r "$release" ]; then
+    id=$(sed -n 's/^ID=//p' "$release" | tr -d '"')
+    version=$(sed -n 's/^VERSION_ID=//p' "$release" | tr -d '"')
   fi
   if [ "$id" != debian ] || [ "$version" != 12 ]; then
     fail "this script sets up Debian 12 only; this system is '${id:-unknown} ${version:-}'" \
