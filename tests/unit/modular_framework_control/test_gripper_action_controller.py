@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The gripper controller: reached, stalled, canceled, replaced, refused."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from modular_framework_control.goal_ticket import GoalStatus
+from modular_framework_control.gripper_action_controller import GripperGoalError, GripperTicket
+from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.robot_hw import RobotHW
+
+URDF = """<robot name="r"><joint name="finger" type="revolute">
+<limit lower="0" upper="0.5" velocity="1.0" effort="1"/></joint></robot>"""
+
+
+def parameters(**more: Any) -> dict[str, Any]:
+    return {"robot_description": URDF, "hw": {"joints": ["finger"]},
+            "gripper": {"type": "position_controllers/GripperActionController", "joint": "finger",
+                        "stall_timeout": 0.3, "max_effort": 2.0, **more}}
+
+
+@pytest.fixture
+def loop(make_loop: Callable[..., Any]) -> Any:
+    made = make_loop(parameters())
+    made.spawn("gripper")
+    return made
+
+
+def send(loop: Any, position: float, max_effort: float = 0.0) -> GripperTicket:
+    ticket = GripperTicket()
+    loop.controllers["gripper"].submit(position, max_effort, ticket)
+    return ticket
+
+
+def handle(loop: Any) -> Any:
+    robot_hw: RobotHW = loop.robot_hw
+    return robot_hw.get(PositionJointInterface).get_handle("finger")
+
+
+def test_a_free_gripper_reaches_its_goal(loop: Any) -> None:
+    ticket = send(loop, 0.4)
+    loop.run(0.3)
+    assert ticket.status is GoalStatus.ACTIVE
+    loop.run(0.2)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    assert ticket.result is not None and ticket.result.reached_goal and not ticket.result.stalled
+
+
+def test_a_blocked_gripper_stalls_after_the_timeout_and_goes_on_squeezing(loop: Any) -> None:
+    ticket = send(loop, 0.8)
+    loop.run(0.5 + 0.25)
+    assert ticket.status is GoalStatus.ACTIVE
+    loop.run(0.2)
+    assert ticket.status is GoalStatus.ABORTED
+    assert ticket.result is not None and ticket.result.stalled and not ticket.result.reached_goal
+    assert "joint 'finger' stands at 0.5" in ticket.text
+    loop.manager.update(loop.time_s, 0.01)
+    assert handle(loop).command == 0.8
+
+
+def test_a_stall_is_not_seen_before_the_timeout_has_passed_since_the_goal(loop: Any) -> None:
+    send(loop, 0.8)
+    loop.run(2.0)
+    again = send(loop, 0.9)
+    loop.run(0.25)
+    assert again.status is GoalStatus.ACTIVE
+    loop.run(0.1)
+    assert again.status is GoalStatus.ABORTED
+
+
+def test_trembling_in_place_is_a_stall(loop: Any) -> None:
+    ticket = send(loop, 0.8)
+    loop.run(0.6)
+    for cycle in range(40):
+        loop.robot_hw.read(loop.time_s, 0.01)
+        handle(loop).state.velocity = 0.05 * (-1) ** cycle
+        loop.manager.update(loop.time_s, 0.01)
+        loop.time_s += 0.01
+    assert ticket.status is GoalStatus.ABORTED
+
+
+def test_the_effort_of_the_goal_is_passed_on_and_none_means_the_default(loop: Any) -> None:
+    send(loop, 0.1, 5.0)
+    loop.step()
+    assert handle(loop).max_effort == 5.0
+    send(loop, 0.2)
+    loop.step()
+    assert handle(loop).max_effort == 2.0
+
+
+def test_a_new_goal_replaces_the_one_before(loop: Any) -> None:
+    first = send(loop, 0.4)
+    loop.run(0.1)
+    second = send(loop, 0.0)
+    loop.run(0.3)
+    assert first.status is GoalStatus.CANCELED and "preempted" in first.text
+    assert second.status is GoalStatus.SUCCEEDED
+
+
+def test_cancel_stops_where_the_joint_is(loop: Any) -> None:
+    ticket = send(loop, 0.4)
+    loop.run(0.2)
+    loop.controllers["gripper"].cancel(ticket)
+    loop.step(2)
+    assert ticket.status is GoalStatus.CANCELED
+    here = handle(loop).position
+    loop.run(0.3)
+    assert handle(loop).position == pytest.approx(here, abs=0.011)
+
+
+@pytest.mark.parametrize(("position", "effort"), [(math.nan, 0.0), (math.inf, 0.0), (0.1, math.nan), (0.1, -1.0)])
+def test_a_goal_that_makes_no_sense_is_refused(loop: Any, position: float, effort: float) -> None:
+    with pytest.raises(GripperGoalError, match="expected finite numbers"):
+        loop.controllers["gripper"].submit(position, effort, GripperTicket())
+
+
+def test_a_stopped_controller_ends_its_goal_and_takes_no_other(loop: Any) -> None:
+    ticket = send(loop, 0.4)
+    loop.step()
+    assert loop.switch([], ["gripper"]) is None
+    assert ticket.status is GoalStatus.CANCELED
+    with pytest.raises(GripperGoalError, match="not running"):
+        send(loop, 0.1)
+
+
+def test_two_joints_are_refused(make_loop: Callable[..., Any]) -> None:
+    loop = make_loop(parameters(joint=["finger", "thumb"]))
+    with pytest.raises(Exception, match="expected the name of one joint"):
+        loop.manager.load_controller("gripper")
+
+
+def test_feedback_comes_at_its_rate(make_loop: Callable[..., Any]) -> None:
+    loop = make_loop(parameters(action_monitor_rate=20.0))
+    loop.spawn("gripper")
+    seen: list[float] = []
+    loop.controllers["gripper"].on_feedback = lambda ticket, state: seen.append(state.position)
+    send(loop, 0.45)
+    loop.run(0.4)
+    assert len(seen) == pytest.approx(8, abs=1)
+    assert seen == sorted(seen)

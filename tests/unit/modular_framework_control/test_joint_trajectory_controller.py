@@ -1,0 +1,335 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The trajectory controller in a loop with fake hardware: following, tolerances, stops, splices, refusals."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly
+
+from modular_framework_control.controller import ControllerError
+from modular_framework_control.goal_ticket import GoalStatus
+from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory_goal import (
+    GoalRejectedError,
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectoryTicket,
+)
+from modular_framework_control.trajectory_tolerances import JointTolerance
+
+URDF = """<robot name="r"><joint name="a" type="revolute"><limit lower="-9" upper="9" velocity="90" effort="1"/></joint>
+<joint name="b" type="revolute"><limit lower="-9" upper="9" velocity="1.0" effort="1"/></joint>
+<joint name="c" type="continuous"/></robot>"""
+ZEROS = (0.0, 0.0, 0.0)
+
+
+def parameters(**more: Any) -> dict[str, Any]:
+    return {"robot_description": URDF, "hw": {"joints": ["a", "b", "c"]},
+            "arm": {"type": "position_controllers/JointTrajectoryController", "joints": ["a", "b", "c"],
+                    "constraints": {"goal_time": 0.2, "a": {"goal": 0.01}, "b": {"trajectory": 0.1, "goal": 0.01}},
+                    **more}}
+
+
+@pytest.fixture
+def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
+    def starter(**more: Any) -> Any:
+        loop = make_loop(parameters(**more))
+        loop.spawn("arm")
+        return loop
+
+    return starter
+
+
+@pytest.fixture
+def loop(start: Callable[..., Any]) -> Any:
+    return start()
+
+
+def points(*rows: tuple[float, tuple[float, ...]]) -> tuple[TrajectoryPoint, ...]:
+    return tuple(TrajectoryPoint(time_s, row, (0.0,) * len(row), (0.0,) * len(row)) for time_s, row in rows)
+
+
+def send(loop: Any, *rows: tuple[float, tuple[float, ...]], names: tuple[str, ...] = ("a", "b", "c"),
+         stamp_s: float = 0.0, **more: Any) -> TrajectoryTicket:
+    ticket = TrajectoryTicket()
+    trajectory = JointTrajectory(names, points(*rows), stamp_s)
+    loop.controllers["arm"].submit(TrajectoryGoal(trajectory, **more), ticket)
+    return ticket
+
+
+def command(loop: Any, *rows: tuple[float, tuple[float, ...]], stamp_s: float = 0.0) -> None:
+    trajectory = JointTrajectory(("a", "b", "c"), points(*rows), stamp_s)
+    loop.controllers["arm"].submit(TrajectoryGoal(trajectory))
+
+
+def commands(loop: Any) -> list[float]:
+    return [handle.command for handle in loop.robot_hw.get(PositionJointInterface).handles]
+
+
+def test_a_random_trajectory_of_ten_points_is_tracked_to_a_millionth(make_loop: Callable[..., Any]) -> None:
+    fast = {"joint_limits": {"b": {"has_velocity_limits": True, "max_velocity": 90.0}}}
+    loop = make_loop({**parameters(), **fast})
+    loop.spawn("arm")
+    rng = np.random.default_rng(3)
+    times = np.cumsum(rng.uniform(0.4, 0.8, 10))
+    states = rng.uniform(-0.3, 0.3, (10, 3, 3)) * np.array([1.0, 0.5, 0.5])[:, np.newaxis]
+    sent = tuple(TrajectoryPoint(float(t), *map(tuple, state)) for t, state in zip(times, states, strict=True))
+    ticket = TrajectoryTicket()
+    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory(("a", "b", "c"), sent)), ticket)
+    begun_s = loop.time_s
+    knots = np.concatenate([[0.0], times])
+    splines = [BPoly.from_derivatives(knots, np.concatenate([[ZEROS], states[:, :, joint]])) for joint in range(3)]
+    handles = loop.robot_hw.get(PositionJointInterface).handles
+    while loop.time_s - begun_s < times[-1]:
+        time_s = loop.time_s
+        loop.step()
+        loop.robot_hw.read(loop.time_s, loop.period_s)
+        for handle, spline in zip(handles, splines, strict=True):
+            assert abs(handle.position - float(spline(min(time_s - begun_s, times[-1])))) < 1e-6
+    assert ticket.status is GoalStatus.ACTIVE
+
+
+def test_success_is_told_with_its_code(loop: Any) -> None:
+    ticket = send(loop, (0.5, (0.3, 0.1, 0.1)))
+    loop.run(0.45)
+    assert ticket.status is GoalStatus.ACTIVE
+    loop.run(0.1)
+    assert (ticket.status, ticket.result) == (GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL)
+
+
+def test_a_joint_off_its_path_aborts_and_the_arm_stops(loop: Any) -> None:
+    ticket = send(loop, (0.5, (0.3, 1.5, 0.1)))
+    loop.run(0.5)
+    assert (ticket.status, ticket.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED)
+    assert "joint 'b': position error 0.1" in ticket.text and "tolerance 0.1" in ticket.text
+    desired = loop.controllers["arm"].desired_at(loop.time_s)
+    assert not desired[1:].any() and desired[0, 0] < 0.3
+
+
+def test_a_joint_short_of_its_goal_aborts_after_goal_time(loop: Any) -> None:
+    ticket = send(loop, (0.5, (0.3, 1.5, 0.1)), path_tolerance={"b": JointTolerance(-1.0)})
+    loop.run(0.65)
+    assert ticket.status is GoalStatus.ACTIVE
+    loop.run(0.1)
+    assert (ticket.status, ticket.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED)
+    assert "joint 'b'" in ticket.text and "goal_time 0.2 s" in ticket.text
+
+
+def test_a_late_joint_within_goal_time_succeeds(loop: Any) -> None:
+    ticket = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)})
+    loop.run(0.75)
+    assert ticket.status is GoalStatus.SUCCEEDED
+
+
+def test_the_goal_may_lengthen_goal_time_widen_and_erase_tolerances(loop: Any) -> None:
+    free = {"b": JointTolerance(-1.0)}
+    longer = send(loop, (0.5, (0.3, 1.5, 0.1)), path_tolerance=free, goal_time_tolerance_s=5.0)
+    loop.run(1.7)
+    assert longer.status is GoalStatus.SUCCEEDED
+    erased = send(loop, (0.5, (0.0, 0.0, 0.1)), path_tolerance=free, goal_tolerance={"b": JointTolerance(-1.0, -1.0)})
+    loop.run(0.55)
+    assert erased.status is GoalStatus.SUCCEEDED
+
+
+def test_a_goal_with_no_goal_time_at_all_must_be_there_at_once(loop: Any) -> None:
+    ticket = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)}, goal_time_tolerance_s=-1.0)
+    loop.run(0.52)
+    assert ticket.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
+
+
+def test_a_joint_that_still_moves_has_not_reached_its_goal(start: Callable[..., Any]) -> None:
+    loop = start(constraints={"goal_time": 0.05, "stopped_velocity_tolerance": 0.01})
+    ticket = send(loop, (0.5, (0.0, 1.0, 0.0)))
+    loop.run(0.6)
+    assert ticket.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert "joint 'b': velocity error" in ticket.text
+
+
+@pytest.mark.parametrize(("names", "rows", "more", "code", "words"), [
+    (("a", "b", "x"), [(1.0, ZEROS)], {}, -2, "unknown joint 'x'"),
+    (("a", "b"), [(1.0, (0.0, 0.0))], {}, -2, "joints missing: c (allow_partial_joints_goal is false)"),
+    (("a", "b", "b"), [(1.0, ZEROS)], {}, -2, "joint 'b' is named twice"),
+    ((), [], {}, -2, "joints missing: a, b, c"),
+    (("a", "b", "c"), [(1.0, (0.0, math.nan, 0.0))], {}, -1, "not a finite number"),
+    (("a", "b", "c"), [(1.0, (0.0,))], {}, -1, "has 1 positions; expected 3"),
+    (("a", "b", "c"), [(1.0, ZEROS), (1.0, ZEROS)], {}, -1, "must increase strictly"),
+    (("a", "b", "c"), [(1.0, ZEROS)], {"goal_tolerance": {"x": JointTolerance(1.0)}}, -1, "names joint 'x'"),
+    (("a", "b", "c"), [(1.0, ZEROS)], {"path_tolerance": {"a": JointTolerance(math.nan)}}, -1, "is not a number"),
+    (("a", "b", "c"), [(1.0, ZEROS)], {"goal_time_tolerance_s": math.nan}, -1, "goal_time_tolerance"),
+])
+def test_a_malformed_goal_is_refused_with_code_and_reason(
+        loop: Any, names: tuple[str, ...], rows: list[Any], more: dict[str, Any], code: int, words: str) -> None:
+    with pytest.raises(GoalRejectedError) as caught:
+        send(loop, *rows, names=names, **more)
+    assert caught.value.code == code
+    assert words in str(caught.value)
+    loop.step(3)
+    assert loop.states()["arm"] == "running"
+
+
+@pytest.mark.parametrize(("rows", "stamp_back_s"), [([(0.0, ZEROS)], 0.0), ([(0.5, ZEROS), (1.0, ZEROS)], 1.5)])
+def test_a_goal_wholly_in_the_past_is_rejected(loop: Any, rows: list[Any], stamp_back_s: float) -> None:
+    stamp_s = loop.time_s - stamp_back_s if stamp_back_s else 0.0
+    ticket = send(loop, *rows, stamp_s=stamp_s)
+    loop.step()
+    assert (ticket.status, ticket.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
+    assert "in the past" in ticket.text
+
+
+def test_points_in_the_past_are_left_out(loop: Any) -> None:
+    ticket = send(loop, (0.1, (5.0, 5.0, 5.0)), (1.0, (0.2, 0.1, 0.1)), stamp_s=loop.time_s - 0.5)
+    loop.run(0.55)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    assert commands(loop) == pytest.approx([0.2, 0.1, 0.1])
+
+
+def test_a_stamp_in_the_future_lets_the_old_motion_go_on_until_then(loop: Any) -> None:
+    begun_s = loop.time_s
+    command(loop, (1.0, (1.0, 0.4, 0.0)))
+    loop.run(0.2)
+    old = loop.controllers["arm"].desired_at(begun_s + 0.49)
+    ticket = send(loop, (0.5, (0.0, 0.0, 0.0)), stamp_s=begun_s + 0.5)
+    loop.step()
+    assert loop.controllers["arm"].desired_at(begun_s + 0.49) == pytest.approx(old)
+    seen = [loop.controllers["arm"].desired_at(begun_s + t)[0] for t in np.linspace(0.3, 1.0, 400)]
+    assert np.abs(np.diff(seen, axis=0)).max() < 0.01
+    loop.run(0.9)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    assert commands(loop) == pytest.approx(ZEROS, abs=1e-9)
+
+
+def test_a_new_goal_takes_over_without_a_jump_in_position_or_velocity(loop: Any) -> None:
+    first = send(loop, (1.0, (1.0, 0.3, 0.2)))
+    loop.run(0.5)
+    before = loop.controllers["arm"].desired_at(loop.time_s)
+    second = send(loop, (0.5, (0.2, 0.1, 0.1)))
+    time_s = loop.time_s
+    loop.step()
+    assert loop.controllers["arm"].desired_at(time_s) == pytest.approx(before, abs=1e-9)
+    assert (first.status, second.status) == (GoalStatus.CANCELED, GoalStatus.ACTIVE)
+    assert "preempted" in first.text
+    loop.run(0.6)
+    assert second.status is GoalStatus.SUCCEEDED
+
+
+@pytest.mark.parametrize("duration_s", [0.0, 0.2])
+def test_cancel_comes_to_rest_within_the_stop_duration(start: Callable[..., Any], duration_s: float) -> None:
+    loop = start(stop_trajectory_duration=duration_s)
+    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    loop.run(0.5)
+    velocity = loop.controllers["arm"].desired_at(loop.time_s)[1, 0]
+    loop.controllers["arm"].cancel(ticket)
+    canceled_s = loop.time_s
+    loop.step()
+    assert ticket.status is GoalStatus.CANCELED
+    at_cancel = loop.controllers["arm"].desired_at(canceled_s)
+    end = loop.controllers["arm"].desired_at(canceled_s + duration_s + 1e-6)
+    assert at_cancel[1, 0] == pytest.approx(velocity if duration_s else 0.0)
+    assert end[1, 0] == 0.0
+    assert end[0, 0] == pytest.approx(at_cancel[0, 0] + 0.5 * velocity * duration_s)
+
+
+def test_cancel_of_a_finished_goal_changes_nothing(loop: Any) -> None:
+    first = send(loop, (0.2, (0.1, 0.0, 0.0)))
+    loop.run(0.3)
+    second = send(loop, (0.3, (0.2, 0.0, 0.0)))
+    loop.step()
+    loop.controllers["arm"].cancel(first)
+    loop.run(0.4)
+    assert second.status is GoalStatus.SUCCEEDED
+
+
+def test_an_empty_goal_stops_and_succeeds_and_an_empty_command_stops(loop: Any) -> None:
+    command(loop, (1.0, (1.0, 0.0, 0.0)))
+    loop.run(0.5)
+    ticket = send(loop)
+    loop.run(0.1)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    held = commands(loop)
+    loop.run(0.3)
+    assert commands(loop) == held
+    command(loop, (1.0, (0.0, 0.0, 0.0)))
+    loop.run(0.5)
+    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory((), ())))
+    loop.step(2)
+    assert not loop.controllers["arm"].desired_at(loop.time_s)[1].any()
+
+
+def test_a_partial_goal_moves_its_joints_and_lets_the_others_finish(start: Callable[..., Any]) -> None:
+    loop = start(allow_partial_joints_goal=True)
+    command(loop, (1.0, (0.5, 0.3, 0.2)))
+    loop.run(0.5)
+    ticket = send(loop, (0.3, (0.0,)), names=("a",))
+    loop.run(0.4)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    loop.run(0.3)
+    assert commands(loop) == pytest.approx([0.0, 0.3, 0.2], abs=1e-9)
+
+
+def test_joints_may_be_named_in_any_order(loop: Any) -> None:
+    send(loop, (0.5, (0.3, 0.2, 0.1)), names=("c", "b", "a"))
+    loop.run(0.6)
+    assert commands(loop) == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_a_continuous_joint_takes_the_short_way(loop: Any) -> None:
+    ticket = send(loop, (0.5, (0.0, 0.0, 2.0 * math.pi + 0.1)))
+    loop.run(0.6)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    assert commands(loop)[2] == pytest.approx(0.1)
+
+
+def test_states_and_feedback_come_at_their_rates(start: Callable[..., Any]) -> None:
+    loop = start(state_publish_rate=25.0, action_monitor_rate=10.0)
+    states: list[Any] = []
+    feedback: list[Any] = []
+    loop.controllers["arm"].on_state = states.append
+    loop.controllers["arm"].on_feedback = lambda ticket, snapshot: feedback.append(snapshot)
+    send(loop, (0.95, (0.3, 0.1, 0.0)))
+    loop.run(1.0)
+    assert len(states) == pytest.approx(25, abs=1)
+    assert len(feedback) == pytest.approx(10, abs=1)
+    assert states[5].error == pytest.approx(states[5].desired[:2] - states[5].actual)
+
+
+def test_a_stopped_controller_ends_its_goals_and_takes_no_other(loop: Any) -> None:
+    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    loop.run(0.1)
+    assert loop.switch([], ["arm"]) is None
+    assert ticket.status is GoalStatus.CANCELED
+    with pytest.raises(GoalRejectedError, match="not running"):
+        send(loop, (1.0, ZEROS))
+
+
+def test_nothing_is_desired_before_the_first_start(make_loop: Callable[..., Any]) -> None:
+    loop = make_loop(parameters())
+    loop.manager.load_controller("arm")
+    with pytest.raises(ControllerError, match="has not been started"):
+        loop.controllers["arm"].desired_at(0.0)
+
+
+def test_after_a_reset_of_time_the_arm_holds_and_its_goal_has_ended(loop: Any) -> None:
+    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    loop.run(0.5)
+    held = commands(loop)
+    loop.time_s = 0.0
+    loop.run(0.2)
+    assert ticket.status is GoalStatus.CANCELED
+    assert commands(loop) == pytest.approx(held, abs=0.03)
+
+
+@pytest.mark.parametrize(("more", "words"), [
+    ({"joints": []}, "/arm/joints"), ({"joints": ["a", "a"]}, "once"), ({"joints": ["a", "z"]}, "no joint 'z'"),
+    ({"state_publish_rate": "fast"}, "/arm/state_publish_rate: got 'fast'"),
+    ({"constraints": {"goal_time": -1.0}}, "/arm/constraints/goal_time"),
+    ({"allow_partial_joints_goal": 1}, "expected true or false"),
+])
+def test_a_faulty_parameter_is_named(make_loop: Callable[..., Any], more: dict[str, Any], words: str) -> None:
+    with pytest.raises(ControllerError) as caught:
+        make_loop(parameters(**more)).manager.load_controller("arm")
+    assert words in str(caught.value)

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is read from a controller file and what is left to do for its controllers."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from modular_framework_core.robot_controllers_spawner import (
+    ControllerFileError,
+    SpawnPlan,
+    plan_spawn,
+    read_controller_file,
+    ready_topics,
+)
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "controllers.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_keys_with_a_type_are_controllers_and_everything_is_kept_as_parameters(tmp_path: Path) -> None:
+    path = write(tmp_path, "arm: {type: a/B, joints: [x]}\njoint_limits: {x: {max_velocity: 1.0}}\nhand: {type: c/D}\n")
+    read = read_controller_file(path)
+    assert read.controllers == ("arm", "hand")
+    assert read.parameters["joint_limits"] == {"x": {"max_velocity": 1.0}}
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("- arm\n", "expected a mapping"), ("", "expected a mapping"), ("arm: {type: [", "not valid YAML"),
+    ("arm: {type: NoSlash}\n", "'arm/type' is 'NoSlash'"), ("arm: {joints: [x]}\n", "no controller in it"),
+    ("1: {type: a/B}\n", "key 1 is not a name"), ("arm: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
+])
+def test_a_file_that_cannot_be_used_is_explained(tmp_path: Path, text: str, words: str) -> None:
+    path = write(tmp_path, text)
+    with pytest.raises(ControllerFileError) as caught:
+        read_controller_file(path)
+    assert words in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_a_missing_file_names_those_there_are(tmp_path: Path) -> None:
+    write(tmp_path, "arm: {type: a/B}\n")
+    with pytest.raises(ControllerFileError, match="beside it: controllers.yaml"):
+        read_controller_file(tmp_path / "controller.yaml")
+
+
+def test_only_what_is_missing_is_done() -> None:
+    states = {"a": "running", "b": "stopped", "d": "running"}
+    assert plan_spawn(["a", "b", "c"], states) == SpawnPlan(load=("c",), start=("b", "c"))
+    assert plan_spawn(["a"], states) == SpawnPlan(load=(), start=())
+
+
+def test_every_hardware_with_a_topic_is_waited_for() -> None:
+    assert ready_topics(["arm", "plain", "hand"], {"arm": "arm_ready", "plain": None, "hand": "hand_ready"}) == {
+        "arm": "arm_ready", "hand": "hand_ready"}
+    assert ready_topics(None, {}) == {}
+    assert ready_topics(["arm"], {"arm": ""}) == {}
+
+
+@pytest.mark.parametrize(("hardware", "topics", "words"), [
+    ("arm", {}, "/robot_hardware: got 'arm'"), ([1], {}, "/robot_hardware"),
+    (["arm"], {"arm": True}, "/arm/topic_to_wait_for: got True"),
+])
+def test_faulty_hardware_parameters_are_named(hardware: object, topics: dict[str, object], words: str) -> None:
+    with pytest.raises(ControllerFileError, match=words):
+        ready_topics(hardware, topics)
