@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Says which pairs of bodies may touch: explicit entries first, then defaults of a body."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+
+@dataclass(frozen=True, slots=True)
+class AllowedCollisionMatrix:
+    """Pairs of body names to "may touch"; a pair without an entry falls back to the defaults of its two bodies.
+
+    Attributes:
+        entries: explicit verdicts, order of names does not matter.
+        defaults: verdict for every pair of a body without an explicit entry.
+        names: bodies listed, in the order of the message (kept for the answer on the wire).
+    """
+
+    entries: Mapping[frozenset[str], bool] = field(default_factory=dict)
+    defaults: Mapping[str, bool] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
+
+    def allows(self, first: str, second: str) -> bool:
+        """Whether the two bodies may touch; when both have a default, both must allow it."""
+        entry = self.entries.get(frozenset((first, second)))
+        if entry is not None:
+            return entry
+        verdicts = [self.defaults[name] for name in (first, second) if name in self.defaults]
+        return bool(verdicts) and all(verdicts)
+
+    def with_entry(self, first: str, second: str, allowed: bool) -> AllowedCollisionMatrix:
+        """Returns a matrix in which one pair has the given verdict."""
+        entries = dict(self.entries)
+        entries[frozenset((first, second))] = allowed
+        names = self.names + tuple(name for name in dict.fromkeys((first, second)) if name not in self.names)
+        return replace(self, entries=entries, names=names)
+
+    def as_rows(self) -> list[list[bool]]:
+        """Returns the square matrix over `names`, as the message wants it."""
+        return [[self.entries.get(frozenset((row, column)), False) for column in self.names] for row in self.names]
+
+
+def matrix_from_pairs(pairs: Iterable[frozenset[str]], links: Sequence[str]) -> AllowedCollisionMatrix:
+    """Builds the initial matrix: the listed pairs of links may touch, every link is named."""
+    return AllowedCollisionMatrix(entries={pair: True for pair in pairs if len(pair) == 2}, names=tuple(links))
+
+
+def matrix_from_rows(names: Sequence[str], rows: Sequence[Sequence[bool]],
+                     defaults: Mapping[str, bool]) -> AllowedCollisionMatrix:
+    """Builds a matrix from its square form.
+
+    Raises:
+        ValueError: the matrix is not square, or a name stands twice.
+    """
+    if len(rows) != len(names) or any(len(row) != len(names) for row in rows):
+        raise ValueError(f"allowed_collision_matrix: {len(names)} names but rows of {[len(row) for row in rows]}; "
+                         "one row per name and one value per name in each row are needed")
+    if len(set(names)) != len(names):
+        raise ValueError("allowed_collision_matrix: a name stands twice in entry_names; list each body once")
+    entries: dict[frozenset[str], bool] = {}
+    for index, name in enumerate(names):
+        for other in range(index, len(names)):
+            entries[frozenset((name, names[other]))] = bool(rows[index][other])
+    return AllowedCollisionMatrix(entries=entries, defaults=dict(defaults), names=tuple(names))

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gives every failure of the planner one type that carries a result code and a reason a person can act on."""
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ErrorCode(IntEnum):
+    """Result codes; the numbers are those of moveit_msgs/MoveItErrorCodes."""
+
+    SUCCESS = 1
+    FAILURE = 99999
+    PLANNING_FAILED = -1
+    INVALID_MOTION_PLAN = -2
+    CONTROL_FAILED = -4
+    TIMED_OUT = -6
+    PREEMPTED = -7
+    START_STATE_IN_COLLISION = -10
+    GOAL_IN_COLLISION = -12
+    INVALID_GROUP_NAME = -15
+    INVALID_GOAL_CONSTRAINTS = -16
+    INVALID_ROBOT_STATE = -17
+    INVALID_LINK_NAME = -18
+    INVALID_OBJECT_NAME = -19
+    FRAME_TRANSFORM_FAILURE = -21
+    ROBOT_STATE_STALE = -23
+    START_STATE_INVALID = -26
+    GOAL_STATE_INVALID = -27
+    UNRECOGNIZED_GOAL_TYPE = -28
+    NO_IK_SOLUTION = -31
+
+
+class PlanningError(Exception):
+    """Base of the package's errors.
+
+    Attributes:
+        code: what the caller on the wire is told.
+        reason: where, what was got, what was allowed and what to do.
+    """
+
+    def __init__(self, code: ErrorCode, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+        self.reason = reason
+
+
+class ModelError(PlanningError):
+    """The robot's description cannot be used."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(ErrorCode.FAILURE, reason)
+
+
+class GeometryError(PlanningError):
+    """A shape, a pose or a number in a message is not usable."""
+
+    def __init__(self, reason: str, code: ErrorCode = ErrorCode.FAILURE) -> None:
+        super().__init__(code, reason)
+
+
+class UnknownNameError(PlanningError):
+    """A group, joint, link, frame or object of that name does not exist."""
+
+    def __init__(self, code: ErrorCode, kind: str, name: str, allowed: object) -> None:
+        names = ", ".join(sorted(str(item) for item in allowed)) if hasattr(allowed, "__iter__") else str(allowed)
+        super().__init__(code, f"{kind} '{name}' does not exist; known: {names or 'none'}")
+        self.kind = kind
+        self.name = name

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks straight motions of one group: a whole edge per call, far-apart samples first so that hits show early."""
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.spatial import Array
+
+
+@lru_cache(maxsize=4096)
+def bisecting_order(count: int) -> NDArray[np.int64]:
+    """Returns 1..count in an order that halves the largest unchecked gap each time, the last sample first."""
+    order, seen = [count], {0, count}
+    gaps = [(0, count)]
+    while gaps:
+        following = []
+        for low, high in gaps:
+            middle = (low + high) // 2
+            if middle in (low, high):
+                continue
+            if middle not in seen:
+                order.append(middle)
+                seen.add(middle)
+            following += [(low, middle), (middle, high)]
+        gaps = following
+    return np.array(order, dtype=np.int64)
+
+
+class MotionChecker:
+    """Answers for joint vectors of one group while the rest of the robot stays at given positions."""
+
+    def __init__(self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array) -> None:
+        """Args: the checker to ask; places of the group's joints; positions of the whole robot for all others."""
+        self._checker = checker
+        self._indices = indices
+        self._rest = np.array(rest, dtype=float)
+        model = checker.model
+        members = {int(number) for number in indices}
+        self._members = members if any(leader in members for _, leader, _, _ in model.mimics) else set()
+
+    def whole(self, values: Array) -> Array:
+        """Returns positions of the whole robot for a joint vector of the group."""
+        result = self._rest.copy()
+        result[self._indices] = values
+        return self._checker.model.with_mimics(result, self._members) if self._members else result
+
+    def state_is_free(self, values: Array) -> bool:
+        """Whether the state is free of collisions."""
+        return self._checker.is_free(self.whole(values))
+
+    def edge_is_free(self, start: Array, end: Array, step: float) -> bool:
+        """Whether the straight motion is free at samples at most `step` [rad or m, any joint] apart.
+
+        The start itself is not looked at, the end is.
+        """
+        delta = end - start
+        count = max(1, int(np.ceil(float(np.abs(delta).max()) / step)))
+        samples = start + bisecting_order(count)[:, None] / count * delta
+        if self._members:
+            return all(self.state_is_free(values) for values in samples)
+        positions = self._rest.copy()
+        indices, is_free = self._indices, self._checker.is_free
+        for values in samples:
+            positions[indices] = values
+            if not is_free(positions):
+                return False
+        return True
+
+    def first_collision(self, polyline: Array, step: float) -> Array | None:
+        """Returns the first colliding sample along straight pieces (start included), or None."""
+        if not self.state_is_free(polyline[0]):
+            return polyline[0]
+        for start, end in zip(polyline[:-1], polyline[1:], strict=True):
+            if self.edge_is_free(start, end, step):
+                continue
+            count = max(1, int(np.ceil(float(np.abs(end - start).max()) / step)))
+            for number in range(1, count + 1):
+                values = start + number / count * (end - start)
+                if not self.state_is_free(values):
+                    return values
+        return None

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a planner is asked and what it answers, free of messages."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from modular_framework_planning.planning_scene import PlanningScene
+from modular_framework_planning.spatial import Array, Transform
+from modular_framework_planning.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class JointGoal:
+    """Joint targets [rad or m] with allowed deviations below and above."""
+
+    positions: Mapping[str, float]
+    below: Mapping[str, float] = field(default_factory=dict)
+    above: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseGoal:
+    """A link's target pose in the planning frame."""
+
+    link: str
+    target: Transform
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineSettings:
+    """How the planner works where a request leaves it open; names as in the config package.
+
+    Attributes:
+        start_state_max_bounds_error: how far out of bounds a start is pulled back [rad or m].
+        jiggle_fraction: how far from a colliding start a free one is looked for (share of the joint's range).
+        start_state_contact_tolerance: depth of a held body's contact tolerated at the start [m].
+        motion_step: distance of collision checks on the returned motion [rad or m].
+        blend_deviation: most distance a rounded corner keeps from the corner [rad or m].
+    """
+
+    start_state_max_bounds_error: float = 0.1
+    jiggle_fraction: float = 0.02
+    max_sampling_attempts: int = 100
+    start_state_contact_tolerance: float = 0.003
+    search_step: float = 0.02
+    motion_step: float = 0.004
+    blend_deviation: float = 0.1
+    default_velocity_scaling_factor: float = 0.1
+    default_acceleration_scaling_factor: float = 0.1
+    planner_configs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    group_defaults: Mapping[str, str] = field(default_factory=dict)
+    seed: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanningRequest:
+    """One question to the planner.
+
+    Attributes:
+        scene: snapshot with the start positions and attached objects already in it.
+        goals: alternatives; reaching one is enough.
+        velocity_scaling, acceleration_scaling: 0 asks for the default.
+    """
+
+    scene: PlanningScene
+    group: str
+    goals: tuple[JointGoal | PoseGoal, ...]
+    planner_id: str = ""
+    attempts: int = 1
+    allowed_time_s: float = 5.0
+    velocity_scaling: float = 0.0
+    acceleration_scaling: float = 0.0
+    cancelled: Callable[[], bool] = field(default=lambda: False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanningAnswer:
+    """A checked motion.
+
+    Attributes:
+        planning_time_s: time until a path was found; total_time_s: until the checked, timed motion was ready.
+        path: vertices of the shortened path, shape (n, joints).
+    """
+
+    trajectory: Trajectory
+    start: Array
+    goal: Array
+    path: Array
+    planner_id: str
+    planning_time_s: float
+    total_time_s: float

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Holds what the robot may bump into as immutable snapshots, so that plans under way never see a half-made change."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import count
+
+from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_pairs
+from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
+from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Shape
+from modular_framework_planning.spatial import Array, Transform
+
+_versions = count(1)
+Color = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CollisionObject:
+    """A body in the world.
+
+    Attributes:
+        pose: frame of the object in the planning frame (for an attached one: in the link's frame).
+        shapes: each shape with its pose in the object's frame.
+        subframes: named poses in the object's frame.
+    """
+
+    name: str
+    pose: Transform
+    shapes: tuple[tuple[Shape, Transform], ...]
+    subframes: Mapping[str, Transform] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedObject:
+    """A body that moves with a link; it may touch that link and the links named in `touch_links`."""
+
+    body: CollisionObject
+    link: str
+    touch_links: frozenset[str]
+
+    @property
+    def name(self) -> str:
+        """The id of the attached body."""
+        return self.body.name
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanningScene:
+    """One version of the world: objects, attached objects, allowed collisions and the robot's positions.
+
+    Every `with_...` method returns a new snapshot with a new version number; the old one stays as it is.
+    """
+
+    model: RobotModel
+    positions: Array
+    acm: AllowedCollisionMatrix
+    objects: Mapping[str, CollisionObject] = field(default_factory=dict)
+    attached: Mapping[str, AttachedObject] = field(default_factory=dict)
+    colors: Mapping[str, Color] = field(default_factory=dict)
+    fixed_frames: Mapping[str, Transform] = field(default_factory=dict)
+    name: str = ""
+    version: int = 0
+    geometry_version: int = 0
+
+    def _changed(self, **changes: object) -> PlanningScene:
+        number = next(_versions)
+        geometry = self.geometry_version
+        if changes.keys() & {"objects", "attached", "acm"}:
+            geometry = number
+        return replace(self, version=number, geometry_version=geometry, **changes)  # type: ignore[arg-type]
+
+    def with_positions(self, positions: Array) -> PlanningScene:
+        """Returns the scene with the robot at other joint positions."""
+        return self._changed(positions=positions)
+
+    def with_acm(self, acm: AllowedCollisionMatrix) -> PlanningScene:
+        """Returns the scene with another allowed collision matrix."""
+        return self._changed(acm=acm)
+
+    def with_name(self, name: str) -> PlanningScene:
+        """Returns the scene under another name."""
+        return self._changed(name=name)
+
+    def with_colors(self, colors: Mapping[str, Color]) -> PlanningScene:
+        """Returns the scene with colours (r, g, b, a in 0..1) added to those it has."""
+        return self._changed(colors={**self.colors, **colors})
+
+    def with_fixed_frames(self, frames: Mapping[str, Transform]) -> PlanningScene:
+        """Returns the scene with further named frames, given in the planning frame."""
+        return self._changed(fixed_frames={**self.fixed_frames, **frames})
+
+    def with_object(self, body: CollisionObject) -> PlanningScene:
+        """Adds an object, or replaces the one of that name.
+
+        Raises:
+            GeometryError: it has no shape or no name, or a link or an attached object has that name.
+        """
+        if not body.name:
+            raise GeometryError("collision object: id is empty; give the object a name")
+        if not body.shapes:
+            raise GeometryError(f"collision object '{body.name}': no shape; an object to ADD needs at least one")
+        if self.model.has_link(body.name):
+            raise GeometryError(f"collision object '{body.name}': a link of the robot has that name; use another id")
+        return self._changed(objects={**self.objects, body.name: body},
+                             attached={key: value for key, value in self.attached.items() if key != body.name})
+
+    def with_shapes_appended(self, body: CollisionObject) -> PlanningScene:
+        """Adds shapes to an object (an unknown object is added); the object keeps its own pose."""
+        old = self.objects.get(body.name)
+        if old is None:
+            return self.with_object(body)
+        into_old = old.pose.inverse() * body.pose
+        shapes = old.shapes + tuple((shape, into_old * pose) for shape, pose in body.shapes)
+        return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes)})
+
+    def with_object_moved(self, name: str, pose: Transform) -> PlanningScene:
+        """Moves an object to another pose in the planning frame; raises UnknownNameError."""
+        body = self.find_object(name)
+        return self._changed(objects={**self.objects, name: replace(body, pose=pose)})
+
+    def without_object(self, name: str) -> PlanningScene:
+        """Removes an object from the world; raises UnknownNameError."""
+        self.find_object(name)
+        return self._changed(objects={key: value for key, value in self.objects.items() if key != name})
+
+    def without_objects(self) -> PlanningScene:
+        """Removes every object from the world; attached ones stay."""
+        return self._changed(objects={})
+
+    def find_object(self, name: str) -> CollisionObject:
+        """Returns an object of the world; raises UnknownNameError with the known ones."""
+        if name not in self.objects:
+            raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, "collision object", name, self.objects)
+        return self.objects[name]
+
+    def with_attached(self, item: AttachedObject) -> PlanningScene:
+        """Attaches a body to a link; a world object of that name disappears from the world.
+
+        Raises:
+            UnknownNameError: the link, or a touch link, does not exist.
+            GeometryError: the body has no shape.
+        """
+        for link in (item.link, *sorted(item.touch_links)):
+            if not self.model.has_link(link):
+                raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"attaching '{item.name}': link", link,
+                                       self.model.frame_ids)
+        if not item.body.shapes:
+            raise GeometryError(f"attached object '{item.name}': no shape, and the world has no object of that name")
+        return self._changed(attached={**self.attached, item.name: item},
+                             objects={key: value for key, value in self.objects.items() if key != item.name})
+
+    def with_detached(self, name: str) -> PlanningScene:
+        """Puts an attached body back into the world at the place where it is now; raises UnknownNameError."""
+        if name not in self.attached:
+            raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, "attached object", name, self.attached)
+        body = replace(self.attached[name].body, pose=self.attached_pose(name))
+        rest = {key: value for key, value in self.attached.items() if key != name}
+        return self._changed(attached=rest, objects={**self.objects, name: body})
+
+    def without_attached(self, names: Iterable[str]) -> PlanningScene:
+        """Drops attached bodies without putting them into the world."""
+        drop = set(names)
+        return self._changed(attached={key: value for key, value in self.attached.items() if key not in drop})
+
+    def attached_pose(self, name: str) -> Transform:
+        """Returns the pose of an attached body in the planning frame at the scene's positions."""
+        item = self.attached[name]
+        return self.model.link_transforms(self.positions)[item.link] * item.body.pose
+
+    def frame_transform(self, frame: str, positions: Array | None = None) -> Transform:
+        """Returns the pose of a frame in the planning frame.
+
+        Args:
+            frame: a link, an object, "object/subframe", a fixed frame; empty means the planning frame.
+            positions: joint positions [rad or m] to use instead of the scene's.
+
+        Raises:
+            UnknownNameError: no such frame.
+        """
+        from pinocchio import SE3
+
+        frame = frame.removeprefix("/")
+        if frame in ("", self.model.planning_frame, self.model.document.root_link):
+            return SE3.Identity()
+        if self.model.has_link(frame):
+            return self.model.link_transforms(self.positions if positions is None else positions)[frame]
+        if frame in self.fixed_frames:
+            return self.fixed_frames[frame]
+        body_name, _, subframe = frame.partition("/")
+        for name, inner in ((frame, ""), (body_name, subframe)):
+            pose = self._body_transform(name, positions)
+            if pose is not None and not inner:
+                return pose
+            if pose is not None:
+                subframes = (self.objects.get(name) or self.attached[name].body).subframes
+                if inner in subframes:
+                    return pose * subframes[inner]
+        known = [self.model.planning_frame, *self.model.frame_ids, *self.objects, *self.attached, *self.fixed_frames]
+        raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)
+
+    def _body_transform(self, name: str, positions: Array | None) -> Transform | None:
+        if name in self.objects:
+            return self.objects[name].pose
+        if name in self.attached:
+            item = self.attached[name]
+            at = self.positions if positions is None else positions
+            return self.model.link_transforms(at)[item.link] * item.body.pose
+        return None
+
+
+def empty_scene(model: RobotModel, positions: Array | None = None) -> PlanningScene:
+    """Returns the scene of a robot alone in the world, with the SRDF's allowed collisions."""
+    acm = matrix_from_pairs(model.semantics.disabled_pairs, model.document.links)
+    start = model.default_positions() if positions is None else model.with_mimics(positions)
+    return PlanningScene(model=model, positions=start, acm=acm)

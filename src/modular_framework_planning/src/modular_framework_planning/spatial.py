@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns positions and xyzw quaternions into rigid transforms, and refuses numbers that are not a pose."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from modular_framework_planning.errors import GeometryError
+
+Array = NDArray[np.float64]
+Transform = Any  # pinocchio.SE3: Pinocchio ships no type information
+
+QUATERNION_NORM_TOLERANCE = 0.1
+
+
+def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], where: str = "pose") -> Transform:
+    """Builds the transform of a pose.
+
+    Args:
+        position: x, y, z [m].
+        quaternion_xyzw: x, y, z, w; within 0.1 of unit length (it is normalised).
+        where: what the pose belongs to, for the error text.
+
+    Raises:
+        GeometryError: a number is not finite, or the quaternion is not of unit length.
+    """
+    translation = np.asarray(position, dtype=float)
+    quaternion = np.asarray(quaternion_xyzw, dtype=float)
+    if not (np.isfinite(translation).all() and np.isfinite(quaternion).all()):
+        raise GeometryError(f"{where}: position {list(position)} or orientation {list(quaternion_xyzw)} holds a number "
+                            "that is not finite; every number must be finite")
+    norm = float(np.linalg.norm(quaternion))
+    if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
+        raise GeometryError(f"{where}: quaternion xyzw {list(quaternion_xyzw)} has length {norm:.3g}; allowed is 1 "
+                            f"within {QUATERNION_NORM_TOLERANCE}; the identity is 0 0 0 1")
+    x, y, z, w = quaternion / norm
+    return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), translation)
+
+
+def pose_of(transform: Transform) -> tuple[Array, Array]:
+    """Returns position [m] and xyzw quaternion of a transform."""
+    return np.array(transform.translation), np.array(pin.Quaternion(transform.rotation).coeffs())
+
+
+def pose_difference(first: Transform, second: Transform) -> tuple[float, float]:
+    """Returns the distance [m] and the angle [rad] between two poses given in one frame."""
+    distance = float(np.linalg.norm(first.translation - second.translation))
+    angle = float(np.linalg.norm(pin.log3(first.rotation.T @ second.rotation)))
+    return distance, angle
