@@ -78,6 +78,7 @@ class TaskRecorder:
         self._clock = clock
         self._zero = clock()
         self._lock = threading.Lock()
+        self._tell_lock = threading.Lock()
         self._records: list[StateRecord] = []
         self._active: dict[int, str] = {}
 
@@ -133,7 +134,9 @@ class TaskRecorder:
         self._tell(number)
 
     def _tell(self, number: int) -> None:
-        if self._listener is not None:
+        if self._listener is None:
+            return
+        with self._tell_lock:  # so that what is told last is what holds now
             with self._lock:
                 record, active = self._records[number], tuple(self._active.values())
             self._listener(record, active)

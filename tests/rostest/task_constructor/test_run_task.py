@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""run_task on a real master: makes the state machine of a task, runs it, tells how it ended, and stops when asked."""
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import rospy
+from ros_session import RosSession
+from std_msgs.msg import Bool, String
+
+STOPPED_WITHIN_S = 2.0
+"""From the signal to the end of the process, the exit of the interpreter on a busy machine included [s]."""
+
+STATES = {
+    "give.py": """
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Give(FrameworkState):
+    def __init__(self, answer=True, why="it was told to", outcomes=("success", "fail"), input_keys=(),
+                 output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._answer, self._why = answer, why
+
+    def execute(self, userdata):
+        return self.succeed() if self._answer else self.fail(self._why)
+""",
+    "stay.py": """
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Stay(FrameworkState):
+    def __init__(self, outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+
+    def execute(self, userdata):
+        self.wait_until(lambda: False, None)
+        return self.stopped()
+""",
+    "nap.py": """
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Nap(FrameworkState):
+    def execute(self, userdata):
+        self.wait_until(lambda: False, 0.8)
+        return self.succeed()
+""",
+    "deaf.py": """
+import threading
+
+import smach
+
+
+class Deaf(smach.State):
+    def __init__(self, outcomes=("success", "fail")):
+        smach.State.__init__(self, outcomes=outcomes)
+
+    def execute(self, userdata):
+        threading.Event().wait(60.0)
+        return "success"
+""",
+    "burst.py": """
+import smach
+
+
+class Burst(smach.State):
+    def __init__(self, outcomes=("success", "fail")):
+        smach.State.__init__(self, outcomes=outcomes)
+
+    def execute(self, userdata):
+        raise RuntimeError("a tyre burst")
+""",
+}
+
+
+def task(states: str, name: str = "tiny") -> str:
+    header = f"name: {name}\nsource: state_machine\nnode_name: tiny_node\noutcomes: [done, gave_up]\nstates:\n"
+    return header + states
+
+
+GOOD = task("  - A:\n      source: give\n      transitions: {success: done, fail: gave_up}\n")
+BAD = task(
+    "  - A:\n      source: give\n      answer: false\n      why: the door is locked\n"
+    "      transitions: {success: done, fail: gave_up}\n"
+)
+LONG = task("  - A:\n      source: stay\n      transitions: {success: done, fail: A}\n")
+
+
+class TaskProcess:
+    """run_task as a process of its own."""
+
+    def __init__(self, session: RosSession, folder: Path, text: str | None, *extra: str, own: bool = True) -> None:
+        script = folder / "tiny.yaml"
+        if text is not None:
+            script.write_text(text)
+        command = ["rosrun", "modular_framework_core", "run_task", *([str(script)] if text is not None else [])]
+        command += [f"_states_directory:={folder / 'states'}"] if own else []
+        command += extra
+        self.process = subprocess.Popen(
+            command, env=session.env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+
+    def end(self, timeout_s: float = 20.0) -> tuple[int, str]:
+        """Answers the exit code and all output."""
+        output, _ = self.process.communicate(timeout=timeout_s)
+        return self.process.returncode, output
+
+
+@pytest.fixture()
+def run(ros_session: RosSession, tmp_path: Path) -> Iterator[Callable[..., TaskProcess]]:
+    states = tmp_path / "states"
+    states.mkdir()
+    if rospy.has_param("/run_task"):
+        rospy.delete_param("/run_task")
+    for file, text in STATES.items():
+        (states / file).write_text(text)
+    started: list[TaskProcess] = []
+
+    def start(text: str | None, *extra: str, own: bool = True) -> TaskProcess:
+        started.append(TaskProcess(ros_session, tmp_path, text, *extra, own=own))
+        return started[-1]
+
+    yield start
+    for item in started:
+        if item.process.poll() is None:
+            item.process.kill()
+            item.process.communicate()
+
+
+class Heard:
+    """Collects the messages of a topic."""
+
+    def __init__(self, topic: str) -> None:
+        self.messages: list[str] = []
+        self._subscriber = rospy.Subscriber(topic, String, lambda message: self.messages.append(message.data))
+
+    def wait_for(self, condition: Callable[[list[str]], bool], timeout_s: float = 15.0) -> None:
+        end = time.monotonic() + timeout_s
+        while not condition(self.messages):
+            assert time.monotonic() < end, f"not heard within {timeout_s} s; heard: {self.messages}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self._subscriber.unregister()
+
+
+@pytest.fixture()
+def status() -> Iterator[Heard]:
+    heard = Heard("task_status")
+    yield heard
+    heard.close()
+
+
+def wait_for_start(status: Heard, state: str = "A") -> None:
+    status.wait_for(lambda messages: any(state in json.loads(text)["active"] for text in messages))
+
+
+def test_the_success_outcome_exits_with_0_and_says_so_in_the_last_line(run) -> None:
+    code, output = run(GOOD).end()
+    assert code == 0, output
+    assert output.strip().splitlines()[-1] == "Task 'tiny' ended with outcome 'done': SUCCEEDED"
+    assert "first state running: A after" in output
+
+
+def test_another_outcome_exits_with_1_and_tells_the_reason_of_the_state(run) -> None:
+    code, output = run(BAD).end()
+    assert code == 1, output
+    assert output.strip().splitlines()[-1] == "Task 'tiny' ended with outcome 'gave_up': FAILED"
+    assert "A failed once: the door is locked" in output
+
+
+def test_the_outcome_and_the_states_are_published(run, status: Heard) -> None:
+    outcome = Heard("task_outcome")
+    nap = "states:\n  - Nap: {source: nap, transitions: {success: A, fail: A}}\n"
+    run(BAD.replace("states:\n", nap)).end()
+    outcome.wait_for(lambda messages: messages == ["gave_up"])
+    outcome.close()
+    events = [event for event in map(json.loads, status.messages) if event["state"] != "Nap"]
+    assert [(event["event"], event["state"]) for event in events] == [("start", "A"), ("end", "A"), ("task_end", "")]
+    assert events[1]["outcome"] == "fail"
+    assert events[1]["reason"] == "the door is locked"
+    assert events[2]["succeeded"] is False
+
+
+def test_the_generated_module_is_written_below_ros_home(run, ros_session: RosSession) -> None:
+    run(GOOD).end()
+    written = Path(ros_session.env["ROS_HOME"]) / "modular_framework" / "state_machines" / "tiny.py"
+    assert "class Tiny(smach.StateMachine)" in written.read_text()
+
+
+def test_a_generated_module_can_be_loaded_instead_of_a_script(run) -> None:
+    run(BAD).end()
+    code, output = run(None, "_state_machine_to_load:=tiny.py").end()
+    assert code == 1, output
+    assert "Task 'tiny' ended with outcome 'gave_up': FAILED" in output
+
+
+def test_a_faulty_script_exits_with_2_and_lists_every_fault(run) -> None:
+    code, output = run(task("  - A:\n      source: giv\n      transitions: {success: dnoe}\n")).end()
+    assert code == 2, output
+    assert "tiny.yaml:7:15: state 'A': source 'giv' is unknown" in output
+    assert "transition target 'dnoe' is unknown" in output
+    assert "Traceback" not in output
+
+
+def test_nothing_to_run_exits_with_2(run) -> None:
+    code, output = run(None).end()
+    assert code == 2, output
+    assert "~task_constructor_script" in output
+
+
+def test_a_framework_task_without_its_parameters_lists_all_of_them_and_exits_with_2(run) -> None:
+    text = GOOD.replace("source: state_machine", "source: framework_state_machine")
+    code, output = run(text).end()
+    assert code == 2, output
+    for name in ("planner_name", "robot_speed_factor", "arm_group_name", "number_plan_attempt", "planning_max_time"):
+        assert f"'{name}' is not set; it belongs in motion_planner_config.yaml" in output
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_the_running_state_within_a_second(run, status: Heard, number: int) -> None:
+    process = run(LONG)
+    wait_for_start(status)
+    before = time.monotonic()
+    process.process.send_signal(number)
+    code, output = process.end()
+    assert time.monotonic() - before < STOPPED_WITHIN_S
+    assert "did not end in time" not in output
+    assert code == 1, output
+    assert output.strip().splitlines()[-1] == "Task 'tiny' ended with outcome 'preempted': FAILED"
+    assert f"stopped by {signal.Signals(number).name}" in output
+
+
+def test_a_state_in_a_concurrence_in_a_nested_machine_is_stopped_too(run, status: Heard) -> None:
+    inner = (
+        "  - Nested:\n      source: state_machine\n      outcomes: [done, gave_up]\n      states:\n"
+        "        - Both:\n            source: concurrent_state_machine\n            outcomes: [done, gave_up]\n"
+        "            default_outcome: gave_up\n            states:\n"
+        "              - A: {source: stay}\n              - B: {source: stay}\n"
+    )
+    process = run(task(inner))
+    wait_for_start(status, "Nested/Both/B")
+    before = time.monotonic()
+    process.process.send_signal(signal.SIGINT)
+    code, output = process.end()
+    assert time.monotonic() - before < STOPPED_WITHIN_S
+    assert "did not end in time" not in output
+    assert code == 1, output
+    assert "Traceback" not in output
+
+
+def test_a_state_that_does_not_listen_is_given_up_and_named(run, status: Heard) -> None:
+    process = run(LONG.replace("source: stay", "source: deaf"))
+    wait_for_start(status)
+    before = time.monotonic()
+    process.process.send_signal(signal.SIGINT)
+    code, output = process.end()
+    assert time.monotonic() - before < STOPPED_WITHIN_S + 1.5
+    assert code == 1, output
+    assert "stopped by SIGINT, but A did not end in time" in output
+
+
+def test_a_state_that_raises_ends_the_task_with_its_error(run) -> None:
+    code, output = run(GOOD.replace("source: give", "source: burst")).end()
+    assert code == 1, output
+    assert "A failed once: raised RuntimeError: a tyre burst" in output
+    assert output.strip().splitlines()[-1] == "Task 'tiny' ended with outcome 'error': FAILED"
+
+
+def test_a_launch_ends_with_its_task(ros_session: RosSession, tmp_path: Path) -> None:
+    (tmp_path / "give.py").write_text(STATES["give.py"])
+    (tmp_path / "tiny.yaml").write_text(GOOD)
+    launch = ros_session.launch(
+        f"""<launch><node pkg="modular_framework_core" type="run_task" name="task" output="screen" required="true">
+        <param name="task_constructor_script" value="{tmp_path}/tiny.yaml"/>
+        <param name="states_directory" value="{tmp_path}"/></node></launch>"""
+    )
+    launch.wait(20.0)
+    assert "Task 'tiny' ended with outcome 'done': SUCCEEDED" in launch.log()
+
+
+def test_the_shipped_wait_for_signal_state_runs_in_a_task(run, status: Heard) -> None:
+    text = task("  - A:\n      source: wait_for_signal\n      topic_name: go\n"
+                "      transitions: {success: done, fail: gave_up}\n")
+    publisher = rospy.Publisher("go", Bool, queue_size=1, latch=True)
+    publisher.publish(Bool(True))
+    code, output = run(text, own=False).end()
+    assert code == 0, output
+    publisher.unregister()
