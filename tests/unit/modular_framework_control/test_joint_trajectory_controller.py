@@ -333,3 +333,21 @@ def test_a_faulty_parameter_is_named(make_loop: Callable[..., Any], more: dict[s
     with pytest.raises(ControllerError) as caught:
         make_loop(parameters(**more)).manager.load_controller("arm")
     assert words in str(caught.value)
+
+
+def test_a_goal_that_slips_in_while_the_controller_stops_is_not_followed_later(loop: Any) -> None:
+    controller = loop.controllers["arm"]
+    assert loop.switch([], ["arm"]) is None
+    controller._running = True
+    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    assert loop.switch(["arm"], []) is None
+    loop.run(0.2)
+    assert ticket.status is GoalStatus.REJECTED
+    assert commands(loop) == pytest.approx(ZEROS)
+
+
+def test_a_goal_that_ends_with_the_cycle_it_arrives_in_does_no_harm(loop: Any) -> None:
+    for end_s in (0.0, 1e-12, 1e-7, 1e-5):
+        send(loop, (0.5, ZEROS), (1.0 + end_s, ZEROS), stamp_s=loop.time_s - 1.0)
+        loop.step(2)
+        assert loop.states()["arm"] == "running"

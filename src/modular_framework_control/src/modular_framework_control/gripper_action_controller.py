@@ -116,6 +116,7 @@ class GripperActionController(Controller):
     # ---- control loop ----
 
     def starting(self, time_s: float) -> None:
+        self._reject_waiting("the goal was sent while the controller was being stopped")
         self._hold()
         self._active = None
         self._apply()
@@ -130,6 +131,9 @@ class GripperActionController(Controller):
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
         self._finish(status, self._state(False, False), text)
+        self._reject_waiting(text)
+
+    def _reject_waiting(self, text: str) -> None:
         while self._mailbox:
             order = self._mailbox.popleft()
             if isinstance(order, _Order):

@@ -23,6 +23,7 @@ from modular_framework_control.node_handle import NodeHandle, read_bool, read_na
 from modular_framework_control.rates import next_due, period_of
 from modular_framework_control.trajectory import (
     POSITION,
+    SHORTEST_SEGMENT_S,
     Array,
     InvalidTrajectoryError,
     Spline,
@@ -164,6 +165,7 @@ class JointTrajectoryController(Controller):
     # ---- control loop ----
 
     def starting(self, time_s: float) -> None:
+        self._reject_waiting("the goal was sent while the controller was being stopped")
         self._read_actual()
         everything = tuple(range(len(self.joint_names)))
         self._stages = (_Stage(time_s, (Track.hold(everything, self._actual[POSITION], time_s),)),)
@@ -183,6 +185,9 @@ class JointTrajectoryController(Controller):
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
+        self._reject_waiting(text)
+
+    def _reject_waiting(self, text: str) -> None:
         while self._mailbox:
             order = self._mailbox.popleft()
             if isinstance(order, _Order) and order.ticket is not None:
@@ -238,7 +243,7 @@ class JointTrajectoryController(Controller):
             return
         origin_s = order.stamp_s if order.stamp_s > 0.0 else time_s
         end_s = origin_s + float(order.spline.times_s[-1])
-        if end_s <= time_s:
+        if end_s <= time_s + SHORTEST_SEGMENT_S:
             text = (f"all points lie in the past: the last one was due {time_s - end_s:.6g} s before the goal was "
                     f"taken up at {time_s:.6g} s; give a later header stamp or time_from_start")
             if order.ticket is None:
@@ -247,7 +252,7 @@ class JointTrajectoryController(Controller):
                 order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
             return
         splice_s = max(time_s, origin_s)
-        if end_s <= splice_s:
+        if end_s <= splice_s + SHORTEST_SEGMENT_S:
             splice_s = time_s
         joints = list(order.joints)
         track = splice(order.spline, joints, origin_s, splice_s, self.desired_at(splice_s)[:, joints],

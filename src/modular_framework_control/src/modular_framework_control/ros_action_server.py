@@ -77,6 +77,10 @@ class ControllerActionServer:
             del self._goals[ticket]
             rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)
             goal.set_rejected(error.result, str(error))
+        except Exception as error:  # whatever is in the message, its sender gets an answer
+            del self._goals[ticket]
+            rospy.logerr("%s: goal rejected: %s: %s", self._server.ns, type(error).__name__, error)
+            goal.set_rejected(None, f"{type(error).__name__}: {error}")
 
     def _on_cancel(self, goal: ServerGoalHandle) -> None:
         for ticket, known in list(self._goals.items()):

@@ -55,7 +55,13 @@ class RosControllerManager:
         self._services: list[rospy.Service] = []
 
     def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
-        return attach_ros(controller, self._namespace, name, self._outbox)
+        close = attach_ros(controller, self._namespace, name, self._outbox)
+
+        def detach() -> None:
+            self._outbox.flush()
+            close()
+
+        return detach
 
     def connect(self) -> None:
         """Advertise the services."""

@@ -37,6 +37,14 @@ class Outbox:
         if self._jobs.qsize() < self._backlog:
             self._jobs.put((job, arguments))
 
+    def flush(self, timeout_s: float = 2.0) -> None:
+        """Wait until everything queued so far has been worked off, at most `timeout_s` [s]."""
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            reached = threading.Event()
+            self._jobs.put((reached.set, ()))
+            if not reached.wait(timeout_s):
+                rospy.logwarn("control outbox: messages still wait after %.1f s", timeout_s)
+
     def close(self) -> None:
         """Work off what waits, then end; may be called twice."""
         if self._thread.is_alive() and threading.current_thread() is not self._thread:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 POSITION, VELOCITY, ACCELERATION = 0, 1, 2
+SHORTEST_SEGMENT_S = 1e-6
 
 
 class InvalidTrajectoryError(Exception):
@@ -216,7 +217,7 @@ def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: flo
     as sent; otherwise a segment of the order of the next point leads over to it.
 
     Args:
-        spline: the new trajectory; at least one of its points comes after `splice_s`.
+        spline: the new trajectory; it ends at least SHORTEST_SEGMENT_S after `splice_s`.
         joints: indices of its joints in the controller, in the order of its values.
         origin_s: time of its time_from_start 0 [s].
         splice_s: when it takes over [s].
