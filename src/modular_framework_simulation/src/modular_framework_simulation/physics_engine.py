@@ -82,7 +82,6 @@ class PhysicsEngine:
             numSolverIterations=settings.solver_iterations,
             numSubSteps=0,
             contactERP=settings.contact_erp,
-            frictionERP=settings.friction_erp,
             enableConeFriction=1,
             deterministicOverlappingPairs=1,
             physicsClientId=self.client,

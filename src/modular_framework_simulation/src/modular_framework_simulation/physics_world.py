@@ -249,14 +249,16 @@ class PhysicsWorld:
             index = body.link_indices.get(STATIC_LINK if model.static else link.name)
             if index is None or not link.collisions:
                 continue
-            torsional = [each.friction.torsional for each in link.collisions if each.friction.torsional is not None]
+            frictions = [each.friction for each in link.collisions]
+            spinning = [each.torsional for each in frictions if each.torsional is not None]
+            rolling = [each.rolling for each in frictions if each.rolling is not None]
             self.engine.api.changeDynamics(
                 body.number,
                 index,
                 # One coefficient a link is all the engine takes: the most slippery surface decides.
-                lateralFriction=min(each.friction.lateral for each in link.collisions),
-                spinningFriction=min(torsional, default=self.settings.body_spinning_friction),
-                rollingFriction=self.settings.body_rolling_friction,
+                lateralFriction=min(each.lateral for each in frictions),
+                spinningFriction=min(spinning, default=self.settings.body_spinning_friction),
+                rollingFriction=min(rolling, default=self.settings.body_rolling_friction),
                 restitution=0.0,
                 linearDamping=0.0,
                 angularDamping=0.01,

@@ -35,7 +35,7 @@ from modular_framework_simulation.simulation_loop import Actors, Hook, Simulatio
 from modular_framework_simulation.snapshots import take_snapshot
 
 _CLOCK_RATE_HZ = 100
-_STATES_RATE_HZ = 40
+_STATES_RATE_HZ = 50
 _GRASP_RATE_HZ = 50
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30

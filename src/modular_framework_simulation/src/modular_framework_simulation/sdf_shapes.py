@@ -120,14 +120,25 @@ def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
 
 
 def _read_friction(node: XmlNode) -> specs.Friction:
-    mu = node.find_path("surface", "friction", "ode", "mu")
-    torsional = node.find_path("surface", "friction", "torsional", "coefficient")
-    lateral = mu.number() if mu is not None else 1.0
-    spinning = torsional.number() if torsional is not None else None
-    for child, value in ((mu, lateral), (torsional, spinning)):
-        if child is not None and value is not None and value < 0:
+    friction = node.find_path("surface", "friction")
+
+    def coefficient(*path: str) -> float | None:
+        child = friction.find_path(*path) if friction is not None else None
+        if child is None:
+            return None
+        value = child.number()
+        if value < 0:
             raise DescriptionError(child.where, f"got {value:g}", "allowed: 0 or greater")
-    return specs.Friction(lateral, spinning)
+        return value
+
+    lateral = coefficient("ode", "mu")
+    if lateral is None:
+        lateral = coefficient("bullet", "friction")
+    return specs.Friction(
+        1.0 if lateral is None else lateral,
+        coefficient("torsional", "coefficient"),
+        coefficient("bullet", "rolling_friction"),
+    )
 
 
 def _positive(node: XmlNode, count: int) -> tuple[float, ...]:

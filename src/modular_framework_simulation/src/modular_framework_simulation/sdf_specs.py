@@ -63,10 +63,12 @@ class Friction:
     Attributes:
         lateral: Resistance against sliding, dimensionless.
         torsional: Resistance against spinning about the contact normal [m], None when the file does not say.
+        rolling: Resistance against rolling [m], None when the file does not say.
     """
 
     lateral: float = 1.0
     torsional: float | None = None
+    rolling: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
