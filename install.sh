@@ -200,7 +200,6 @@ source_workspace() {
   # shellcheck disable=SC1090,SC1091
   . "$ROOT/$space/setup.bash"
   set -u
-  export PATH="$VENV/bin:$PATH"
 }
 
 main() {
