@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import subprocess
 import time
+from xmlrpc.client import ServerProxy
 
 import pytest
-from ros_session import RosSession
+import rosgraph
+from ros_session import Launch, RosSession
 
 TASK_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 45.0
@@ -49,18 +51,15 @@ def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str
     assert f"'{node}'" in launch.log().splitlines()[-1] or f"node '{node}' died" in launch.log(), launch.log()
 
 
-def _wait_for_text(launch: object, text: str, timeout_s: float) -> None:
+def _wait_for_text(launch: Launch, text: str, timeout_s: float) -> None:
     end = time.monotonic() + timeout_s
-    while text not in launch.log():  # type: ignore[attr-defined]
-        assert time.monotonic() < end, f"'{text}' was not printed in {timeout_s} s:\n{launch.log()}"  # type: ignore[attr-defined]
-        assert launch.alive(), launch.log()  # type: ignore[attr-defined]
+    while text not in launch.log():
+        assert time.monotonic() < end, f"'{text}' was not printed in {timeout_s} s:\n{launch.log()}"
+        assert launch.alive(), launch.log()
         time.sleep(0.1)
 
 
 def _pid_of(session: RosSession, node: str) -> int:
     """The process of a node, as the node itself tells it through its slave interface."""
-    import rosgraph
-    from xmlrpc.client import ServerProxy
-
     uri = rosgraph.Master("/test", master_uri=session.env["ROS_MASTER_URI"]).lookupNode("/" + node)
     return int(ServerProxy(uri).getPid("/test")[2])
