@@ -19,7 +19,8 @@ example_trajectory:
   - {name: stability_gravity_side, interpolate_time: 0.4, pause_time: 0.25}
   - {name: stability_pose, interpolate_time: 0.4, pause_time: 0.25}
 """
-STATES = {"stability_gravity_down": {"wrist": -0.3735, "elbow": 0.35}, "stability_pose": {"elbow": 1.57, "wrist": -1.57},
+STATES = {"stability_gravity_down": {"wrist": -0.3735, "elbow": 0.35},
+          "stability_pose": {"elbow": 1.57, "wrist": -1.57},
           "stability_gravity_side": {"elbow": 0.35, "wrist": -1.97}, "short": {"elbow": 0.0}}
 
 

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the grasp server makes of a command, and when it says that a stage was reached."""
+from __future__ import annotations
+
+import pytest
+
+from modular_framework_core.grasp_server import (
+    GraspCommandError,
+    Outcome,
+    Stage,
+    closed_positions,
+    effort_limits,
+    judge,
+    posture_targets,
+)
+from modular_framework_core.robot_groups import RobotModelError, read_group, read_joints
+
+URDF = """<robot name="r"><link name="base"/><link name="l1"/><link name="l2"/>
+<link name="palm"/><link name="f1"/><link name="f2"/>
+<joint name="a" type="revolute"><parent link="base"/><child link="l1"/><limit lower="-3" upper="3" effort="10"/></joint>
+<joint name="b" type="continuous"><parent link="l1"/><child link="l2"/></joint>
+<joint name="mount" type="fixed"><parent link="l2"/><child link="palm"/></joint>
+<joint name="f" type="revolute"><parent link="palm"/><child link="f1"/>
+<limit lower="0" upper="1.94" effort="2"/></joint>
+<joint name="g" type="revolute"><parent link="palm"/><child link="f2"/>
+<limit lower="0" upper="1.94"/><mimic joint="f"/></joint>
+</robot>"""
+SRDF = """<robot name="r"><group name="arm"><chain base_link="base" tip_link="palm"/></group>
+<group name="hand"><joint name="f"/><joint name="g"/></group>
+<group name="all"><group name="arm"/><group name="hand"/></group>
+<group name="odd"><joint name="zz"/></group><group name="loop"><group name="loop"/></group>
+<group_state name="closed" group="hand"><joint name="f" value="1.9"/></group_state></robot>"""
+HAND = read_group(URDF, SRDF, "hand")
+CLOSED = closed_positions(HAND)
+
+
+def test_groups_hold_their_active_joints_in_order_and_know_their_tip() -> None:
+    arm = read_group(URDF, SRDF, "arm")
+    assert arm.joint_names == ("a", "b")
+    assert arm.tip_link == "palm"
+    assert read_group(URDF, SRDF, "all").joint_names == ("a", "b", "f")
+    assert HAND.joint_names == ("f",)
+    assert CLOSED == {"f": 1.9}
+    assert read_joints(URDF)["b"].upper == float("inf")
+
+
+@pytest.mark.parametrize(("group", "hint"), [("nothing", "no planning group 'nothing'.*arm"), ("odd", "zz"),
+                                             ("loop", "contains itself")])
+def test_a_wrong_group_is_named(group: str, hint: str) -> None:
+    with pytest.raises(RobotModelError, match=hint):
+        read_group(URDF, SRDF, group)
+
+
+def test_a_description_that_is_no_xml_is_named() -> None:
+    with pytest.raises(RobotModelError, match="URDF"):
+        read_group("<robot", SRDF, "arm")
+    with pytest.raises(RobotModelError, match="no chain"):
+        read_group(URDF, SRDF.replace('tip_link="palm"', 'tip_link="moon"'), "arm")
+
+
+@pytest.mark.parametrize(("names", "positions", "hint"), [
+    ([], [], "at least one"), (["f"], [], "as many"), (["f", "f"], [0.1, 0.1], "twice"),
+    (["a"], [0.1], "no active joint"),
+    (["g"], [0.1], "no active joint"), (["f"], [2.5], "limits"), (["f"], [float("nan")], "limits")])
+def test_a_posture_that_does_not_fit_the_hand_is_refused(names: list[str], positions: list[float], hint: str) -> None:
+    with pytest.raises(GraspCommandError, match=hint):
+        posture_targets(names, positions, HAND)
+
+
+def test_effort_is_the_share_of_what_the_joint_can_do() -> None:
+    assert effort_limits({"f": 1.0}, {"f": -0.5}, HAND, 0.5) == {"f": pytest.approx(0.5)}
+    assert effort_limits({"f": 1.0}, {}, HAND, 1.0) == {"f": 2.0}
+    with pytest.raises(GraspCommandError, match="intensity"):
+        effort_limits({"f": 1.0}, {"f": 1.5}, HAND, 1.0)
+    with pytest.raises(GraspCommandError, match="max_torque"):
+        effort_limits({"f": 1.0}, {}, HAND, 0.0)
+
+
+@pytest.mark.parametrize(("stage", "target", "position", "stalled", "reached", "why"), [
+    (Stage.PREGRASP, 0.5, 0.51, False, True, "reached"), (Stage.PREGRASP, 0.0, 0.4, False, False, "'f' is 0.4"),
+    (Stage.PREGRASP, 0.5, 0.9, True, False, "away"), (Stage.GRASP, 1.94, 1.2, True, True, "stopped on something"),
+    (Stage.GRASP, 1.94, 1.93, False, False, "without anything"),
+    (Stage.GRASP, 1.94, 1.92, True, False, "without anything"),
+    (Stage.GRASP, 1.2, 1.21, False, True, "reached"), (Stage.GRASP, 1.94, 1.2, False, False, "away"),
+    (Stage.POSTGRASP, 1.94, 1.2, True, True, "still"), (Stage.POSTGRASP, 1.2, 1.2, False, True, "reached"),
+    (Stage.POSTGRASP, 1.94, 0.3, False, False, "away")])
+def test_a_stage_is_reached_only_when_the_fingers_say_so(stage: Stage, target: float, position: float, stalled: bool,
+                                                         reached: bool, why: str) -> None:
+    verdict = judge(stage, {"f": target}, Outcome({"f": position}, stalled), CLOSED, 0.05)
+    assert verdict.reached is reached
+    assert why in verdict.reason
+
+
+def test_joints_are_compared_by_name_not_by_sorted_values() -> None:
+    verdict = judge(Stage.PREGRASP, {"f": 0.0, "h": 1.0}, Outcome({"f": 1.0, "h": 0.0}, False), {}, 0.05)
+    assert not verdict.reached
+
+
+def test_an_unknown_stage_is_refused() -> None:
+    with pytest.raises(GraspCommandError, match="POST_GRASP_STATE=2"):
+        Stage.of(3)
