@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The controllers under a simulated clock: it sets their pace, may stand still, and may jump back."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from controller_manager_msgs.srv import LoadController, SwitchController
+from rosgraph_msgs.msg import Clock
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+LAUNCH = """
+<launch>
+  <param name="use_sim_time" value="true"/>
+  <rosparam>
+    arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}
+  </rosparam>
+  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
+    <rosparam>{joints: [shoulder], rate: 100}</rosparam>
+  </node>
+</launch>
+"""
+
+
+class ClockSource:
+    """Publishes /clock, twice as fast as real time, unless it stands still."""
+
+    def __init__(self) -> None:
+        self.time_s = 10.0
+        self.running = True
+        self._ended = False
+        self._publisher = rospy.Publisher("/clock", Clock, queue_size=1)
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ended:
+            if self.running:
+                self.time_s += 0.01
+                self._publisher.publish(Clock(rospy.Time.from_sec(self.time_s)))
+            time.sleep(0.005)
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._ended = True
+        self._thread.join(2.0)
+
+
+@pytest.fixture(scope="module")
+def clock(ros_launch: Callable[..., Any]) -> Iterator[ClockSource]:
+    ros_launch(LAUNCH)
+    source = ClockSource()
+    rospy.wait_for_service("controller_manager/switch_controller", 20.0)
+    assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)("arm").ok
+    assert rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)(["arm"], [], 2, False, 0.0).ok
+    yield source
+    source.close()
+
+
+@pytest.fixture
+def arm(clock: ClockSource) -> actionlib.SimpleActionClient:
+    client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(10.0))
+    return client
+
+
+def move(client: actionlib.SimpleActionClient, position: float, duration_s: float) -> None:
+    point = JointTrajectoryPoint(positions=[position], time_from_start=rospy.Duration.from_sec(duration_s))
+    client.send_goal(FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=["shoulder"], points=[point])))
+
+
+def test_a_goal_takes_its_time_on_the_simulated_clock(clock: ClockSource, arm: actionlib.SimpleActionClient) -> None:
+    begun_s = clock.time_s
+    move(arm, 0.5, 1.0)
+    assert arm.wait_for_result(rospy.Duration(10.0))
+    assert arm.get_state() == GoalStatus.SUCCEEDED
+    assert 1.0 <= clock.time_s - begun_s < 1.5
+
+
+def test_while_the_clock_stands_still_so_does_the_goal(clock: ClockSource, arm: actionlib.SimpleActionClient) -> None:
+    move(arm, 0.0, 0.5)
+    time.sleep(0.1)
+    clock.running = False
+    assert not arm.wait_for_result(rospy.Duration(0.8))
+    clock.running = True
+    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert arm.get_state() == GoalStatus.SUCCEEDED
+
+
+def test_after_the_clock_jumps_back_goals_end_and_new_ones_are_followed(
+        clock: ClockSource, arm: actionlib.SimpleActionClient) -> None:
+    move(arm, 3.0, 20.0)
+    time.sleep(0.3)
+    clock.time_s = 1.0
+    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert arm.get_state() == GoalStatus.PREEMPTED
+    move(arm, 0.2, 0.5)
+    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert arm.get_state() == GoalStatus.SUCCEEDED
+    statuses: list[float] = []
+    subscriber = rospy.Subscriber("arm/follow_joint_trajectory/status", GoalStatusArray,
+                                  lambda message: statuses.append(message.header.stamp.to_sec()))
+    time.sleep(0.9)
+    subscriber.unregister()
+    assert len(statuses) > 3, "the status topic must survive the jump"
