@@ -93,7 +93,8 @@ def _master_port() -> int | None:
 def _verdict(watcher: EndWatcher) -> int:
     if watcher.dead_node is not None:
         name, exit_code = watcher.dead_node
-        how = f"was killed by signal {-exit_code}" if exit_code is not None and exit_code < 0 else f"exited with {exit_code}"
+        killed = exit_code is not None and exit_code < 0
+        how = f"was killed by signal {-exit_code}" if killed else f"exited with {exit_code}"
         print(f"run_framework: node '{name}' died ({how}); everything was stopped", file=sys.stderr)
         return EXIT_NODE_DIED
     if watcher.task_exit_code is None:
