@@ -38,6 +38,8 @@ class Grasp(FrameworkState):
     def execute(self, userdata):
         """Sends the goal and waits for its end."""
         client = userdata.manipulator_controller_client
+        if client is None:
+            return self.fail(f"{self._type}: the task has no manipulator; set manipulator_prefix to drive one")
         try:
             grasp = self._grasp(userdata)
             wait_for_action(client, "the manipulator's action server", SERVER_TIMEOUT_S)
