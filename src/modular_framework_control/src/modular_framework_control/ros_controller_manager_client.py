@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Asks a controller manager for something over ROS, and says which service failed when it does not answer."""
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+from controller_manager_msgs.msg import ControllerState
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllerTypes,
+    LoadController,
+    ReloadControllerLibraries,
+    SwitchController,
+    SwitchControllerRequest,
+    UnloadController,
+)
+
+from modular_framework_control.node_handle import join_names
+
+
+class ControllerManagerClientError(Exception):
+    """The controller manager is not there, does not answer, or refused."""
+
+
+class ControllerManagerClient:
+    """The services of one controller manager.
+
+    Args:
+        namespace: namespace of the robot; "" for that of the node.
+        timeout_s: how long to wait for a service [s of real time]; infinite waits for ever. May be changed.
+    """
+
+    def __init__(self, namespace: str = "", timeout_s: float = 30.0) -> None:
+        self._namespace = rospy.resolve_name(namespace) if namespace else rospy.get_namespace()
+        self.timeout_s = timeout_s
+
+    def load(self, name: str) -> None:
+        """Load a controller."""
+        self._ask("load_controller", LoadController, f"controller '{name}' was not loaded", name)
+
+    def unload(self, name: str) -> None:
+        """Unload a controller."""
+        self._ask("unload_controller", UnloadController, f"controller '{name}' was not unloaded", name)
+
+    def switch(self, start: Sequence[str], stop: Sequence[str],
+               strictness: int = SwitchControllerRequest.STRICT) -> None:
+        """Stop and start controllers."""
+        self._ask("switch_controller", SwitchController,
+                  f"controllers were not switched (start {list(start)}, stop {list(stop)})",
+                  list(start), list(stop), strictness, False, 0.0)
+
+    def list_controllers(self) -> list[ControllerState]:
+        """All loaded controllers."""
+        controllers: list[ControllerState] = self._call("list_controllers", ListControllers).controller
+        return controllers
+
+    def list_controller_types(self) -> list[str]:
+        """Known controller types."""
+        types: list[str] = self._call("list_controller_types", ListControllerTypes).types
+        return types
+
+    def reload_libraries(self, force_kill: bool) -> None:
+        """Look again for controller classes."""
+        self._ask("reload_controller_libraries", ReloadControllerLibraries, "controller libraries were not reloaded",
+                  force_kill)
+
+    def _ask(self, service: str, kind: Any, failure: str, *arguments: Any) -> None:
+        if not self._call(service, kind, *arguments).ok:
+            raise ControllerManagerClientError(f"{failure}; the log of the controller manager says why")
+
+    def _call(self, service: str, kind: Any, *arguments: Any) -> Any:
+        name = join_names(self._namespace, f"controller_manager/{service}")
+        proxy = rospy.ServiceProxy(name, kind)
+        deadline = time.monotonic() + self.timeout_s
+        while True:
+            try:
+                proxy.wait_for_service(timeout=0.2)
+                return proxy(*arguments)
+            except rospy.ServiceException as error:
+                raise ControllerManagerClientError(f"service {name} failed: {error}") from error
+            except rospy.ROSException as error:
+                if time.monotonic() > deadline or rospy.is_shutdown():
+                    raise ControllerManagerClientError(f"waited {self.timeout_s:.0f} s for service {name} in vain; is "
+                                                       "the simulation or the hardware's node running?") from error

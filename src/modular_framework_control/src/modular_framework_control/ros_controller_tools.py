@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Command-line tools for controllers: spawner, unspawner and controller_manager, as users of ros_control know them."""
+from __future__ import annotations
+
+import argparse
+import math
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import rospy
+import yaml
+from std_msgs.msg import Bool
+
+from modular_framework_control.ros_controller_manager_client import (
+    ControllerManagerClient,
+    ControllerManagerClientError,
+)
+
+LAST_CALLS_TIMEOUT_S = 2.0
+
+
+def spawner_main() -> int:
+    """Load and start controllers, wait for the end of this process, then stop and unload them in reverse."""
+    parser = argparse.ArgumentParser(prog="spawner", description=spawner_main.__doc__)
+    parser.add_argument("--stopped", action="store_true", help="load the controllers but do not start them")
+    parser.add_argument("--wait-for", metavar="TOPIC", help="wait until this std_msgs/Bool topic says True")
+    _add_common(parser)
+    return _run(parser, "spawner", _spawn)
+
+
+def unspawner_main() -> int:
+    """Stop controllers, wait for the end of this process, then start them again."""
+    parser = argparse.ArgumentParser(prog="unspawner", description=unspawner_main.__doc__)
+    _add_common(parser)
+    return _run(parser, "unspawner", _unspawn)
+
+
+def controller_manager_main() -> int:
+    """Ask the controller manager once: load, unload, start, stop, spawn, kill, list, list-types, reload-libraries."""
+    parser = argparse.ArgumentParser(prog="controller_manager", description=controller_manager_main.__doc__)
+    parser.add_argument("command", choices=[*_PER_CONTROLLER, "list", "list-types", "reload-libraries"])
+    parser.add_argument("--restore", action="store_true",
+                        help="with reload-libraries: load and start again what was there before")
+    _add_common(parser, names="*")
+    return _run(parser, "controller_manager", _command)
+
+
+def _add_common(parser: argparse.ArgumentParser, names: str = "+") -> None:
+    parser.add_argument("--namespace", default="", help="namespace of the robot")
+    parser.add_argument("--timeout", type=float, default=30.0, help="seconds to wait for the controller manager")
+    parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
+    parser.add_argument("--shutdown-timeout", type=float, help="accepted, not used")
+    parser.add_argument("controllers", nargs=names, help="names, or YAML files whose keys are names")
+
+
+def _run(parser: argparse.ArgumentParser, name: str,
+         action: Callable[[ControllerManagerClient, argparse.Namespace, threading.Event], None]) -> int:
+    arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    rospy.init_node(name, anonymous=True, disable_signals=True)
+    timeout_s = math.inf if arguments.no_timeout else arguments.timeout
+    try:
+        arguments.controllers = names_of(arguments.controllers)
+        action(ControllerManagerClient(arguments.namespace, timeout_s), arguments, ended)
+    except ControllerManagerClientError as error:
+        rospy.logerr("%s", error)
+        return 1
+    finally:
+        rospy.signal_shutdown("done")
+    return 0
+
+
+def names_of(arguments: Sequence[str]) -> list[str]:
+    """Controller names: a word is a name, an existing YAML file stands for its keys (or for its list of names).
+
+    Raises:
+        ControllerManagerClientError: a file that holds no names.
+    """
+    names: list[str] = []
+    for argument in arguments:
+        path = Path(argument)
+        if not path.is_file():
+            names.append(argument)
+            continue
+        try:
+            content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except (yaml.YAMLError, OSError) as error:
+            raise ControllerManagerClientError(f"file {path}: {error}") from error
+        if not isinstance(content, (dict, list)) or not all(isinstance(name, str) for name in content):
+            raise ControllerManagerClientError(f"file {path}: expected a mapping or a list of controller names")
+        names.extend(content)
+    return names
+
+
+def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
+    if arguments.wait_for:
+        _wait_for_topic(arguments.wait_for, math.inf if arguments.no_timeout else arguments.timeout, ended)
+    loaded: list[str] = []
+    try:
+        for name in arguments.controllers:
+            client.load(name)
+            loaded.append(name)
+        if not arguments.stopped:
+            client.switch(loaded, [])
+        rospy.loginfo("%s controllers: %s", "loaded" if arguments.stopped else "started", ", ".join(loaded))
+        _wait_for_end(ended)
+    finally:
+        _clean_up(client, loaded)
+
+
+def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
+    """Stop and unload what was loaded; a manager that has gone meanwhile needs no cleaning."""
+    if not loaded:
+        return
+    client.timeout_s = LAST_CALLS_TIMEOUT_S
+    try:
+        states = {entry.name: entry.state for entry in client.list_controllers()}
+        client.switch([], [name for name in loaded if states.get(name) == "running"])
+        for name in reversed(loaded):
+            client.unload(name)
+    except ControllerManagerClientError as error:
+        rospy.logwarn("controllers not unloaded: %s", error)
+
+
+def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
+    client.switch([], arguments.controllers)
+    rospy.loginfo("stopped controllers: %s", ", ".join(arguments.controllers))
+    try:
+        _wait_for_end(ended)
+    finally:
+        client.timeout_s = LAST_CALLS_TIMEOUT_S
+        client.switch(arguments.controllers, [])
+
+
+def _wait_for_end(ended: threading.Event) -> None:
+    while not ended.wait(0.2) and not rospy.is_shutdown():
+        pass
+
+
+def _wait_for_topic(topic: str, timeout_s: float, ended: threading.Event) -> None:
+    ready = threading.Event()
+    subscriber = rospy.Subscriber(topic, Bool, lambda message: ready.set() if message.data else None)
+    deadline = time.monotonic() + timeout_s
+    while not ready.wait(0.1):
+        if time.monotonic() > deadline or ended.is_set():
+            raise ControllerManagerClientError(f"waited {timeout_s:.0f} s for topic {rospy.resolve_name(topic)} to say "
+                                               "True in vain")
+    subscriber.unregister()
+
+
+def _kill(client: ControllerManagerClient, name: str) -> None:
+    client.switch([], [name])
+    client.unload(name)
+
+
+def _spawn_one(client: ControllerManagerClient, name: str) -> None:
+    client.load(name)
+    client.switch([name], [])
+
+
+_PER_CONTROLLER: dict[str, tuple[Callable[[ControllerManagerClient, str], None], str]] = {
+    "load": (lambda client, name: client.load(name), "loaded"),
+    "unload": (lambda client, name: client.unload(name), "unloaded"),
+    "start": (lambda client, name: client.switch([name], []), "started"),
+    "stop": (lambda client, name: client.switch([], [name]), "stopped"),
+    "spawn": (_spawn_one, "loaded and started"),
+    "kill": (_kill, "stopped and unloaded"),
+}
+
+
+def _command(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
+    del ended
+    if arguments.command in _PER_CONTROLLER:
+        if not arguments.controllers:
+            raise ControllerManagerClientError(f"{arguments.command}: name at least one controller")
+        action, done = _PER_CONTROLLER[arguments.command]
+        for name in arguments.controllers:
+            action(client, name)
+            print(f"{done}: {name}")
+    elif arguments.command == "list":
+        for state in client.list_controllers():
+            interfaces = ", ".join(claim.hardware_interface for claim in state.claimed_resources)
+            print(f"'{state.name}' - '{interfaces}' ( {state.state} )")
+    elif arguments.command == "list-types":
+        print("\n".join(client.list_controller_types()))
+    else:
+        _reload(client, arguments.restore)
+
+
+def _reload(client: ControllerManagerClient, restore: bool) -> None:
+    before = client.list_controllers()
+    client.reload_libraries(force_kill=True)
+    print("reloaded controller libraries")
+    if not restore:
+        return
+    for state in before:
+        client.load(state.name)
+    client.switch([state.name for state in before if state.state == "running"], [])
+    print(f"restored: {', '.join(state.name for state in before) or 'none'}")

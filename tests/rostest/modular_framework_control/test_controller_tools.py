@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command-line tools for controllers, run as a user runs them."""
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rospy
+from controller_manager_msgs.srv import ListControllers
+from std_msgs.msg import Bool
+
+LAUNCH = """
+<launch>
+  <rosparam>
+    states: {type: joint_state_controller/JointStateController}
+    arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}
+  </rosparam>
+  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
+    <rosparam>{joints: [shoulder]}</rosparam>
+  </node>
+</launch>
+"""
+
+
+@pytest.fixture(scope="module")
+def tool(ros_launch: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
+    session = ros_launch(LAUNCH)
+    started: list[subprocess.Popen[str]] = []
+
+    def start(name: str, *arguments: str) -> subprocess.Popen[str]:
+        command = ["rosrun", "controller_manager", name, *arguments]
+        started.append(subprocess.Popen(command, env=session.env, text=True, stdout=subprocess.PIPE,
+                                        stderr=subprocess.STDOUT))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+
+
+def run(process: subprocess.Popen[str]) -> tuple[int, str]:
+    output, _ = process.communicate(timeout=30.0)
+    return process.returncode, output
+
+
+def states() -> dict[str, str]:
+    rospy.wait_for_service("controller_manager/list_controllers", 15.0)
+    reply = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)()
+    return {entry.name: entry.state for entry in reply.controller}
+
+
+def wait_until(expected: dict[str, str]) -> None:
+    deadline = time.monotonic() + 15.0
+    while states() != expected:
+        assert time.monotonic() < deadline, states()
+        time.sleep(0.05)
+
+
+def test_the_spawner_waits_spawns_and_cleans_up_at_its_end(tool: Callable[..., Any], tmp_path: Path) -> None:
+    names = tmp_path / "controllers.yaml"
+    names.write_text("states: {}\narm: {}\n")
+    process = tool("spawner", "--wait-for", "robot_ready", str(names))
+    time.sleep(0.9)
+    assert states() == {}
+    ready = rospy.Publisher("robot_ready", Bool, queue_size=1, latch=True)
+    ready.publish(True)
+    wait_until({"states": "running", "arm": "running"})
+    process.send_signal(signal.SIGINT)
+    assert process.wait(10.0) == 0
+    assert states() == {}
+
+
+def test_an_unspawner_stops_and_starts_again_at_its_end(tool: Callable[..., Any]) -> None:
+    spawner = tool("spawner", "--stopped", "arm")
+    wait_until({"arm": "initialized"})
+    assert run(tool("controller_manager", "start", "arm"))[0] == 0
+    unspawner = tool("unspawner", "arm")
+    wait_until({"arm": "stopped"})
+    unspawner.send_signal(signal.SIGTERM)
+    assert unspawner.wait(10.0) == 0
+    assert states() == {"arm": "running"}
+    spawner.send_signal(signal.SIGINT)
+    assert spawner.wait(10.0) == 0
+
+
+def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
+    assert run(tool("controller_manager", "spawn", "states")) == (0, "loaded and started: states\n")
+    code, output = run(tool("controller_manager", "list"))
+    assert (code, output) == (0, "'states' - 'hardware_interface/JointStateInterface' ( running )\n")
+    assert "position_controllers/JointTrajectoryController" in run(tool("controller_manager", "list-types"))[1]
+    assert run(tool("controller_manager", "reload-libraries", "--restore"))[0] == 0
+    assert states() == {"states": "running"}
+    assert run(tool("controller_manager", "kill", "states"))[0] == 0
+    assert states() == {}
+
+
+def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:
+    processes = {"controller 'absent' was not loaded": tool("controller_manager", "load", "absent"),
+                 "name at least one controller": tool("controller_manager", "start"),
+                 "waited 1 s for service /elsewhere/controller_manager/load_controller":
+                     tool("spawner", "--timeout", "1", "--namespace", "/elsewhere", "arm")}
+    for words, process in processes.items():
+        code, output = run(process)
+        assert code == 1
+        assert words in output
