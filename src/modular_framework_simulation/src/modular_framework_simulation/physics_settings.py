@@ -16,7 +16,8 @@ class PhysicsSettings:
             100 Hz clock.
         solver_iterations: Of the contact solver. A grasped object hangs in a chain arm - finger - object - finger; with
             60 iterations the solver leaves a creep of 1 to 2 mm/s behind in that chain, with 150 a tenth of it.
-        contact_erp: Share of a penetration that is corrected in one step; low, since a grasp is a standing penetration.
+        contact_erp: Share of a penetration that is corrected in one step; low, so that objects that fall or are
+            spawned a little too deep do not jump.
         body_spinning_friction: Resistance of objects against spinning about a contact normal [m], where the
             model does not say; about the radius of a small contact patch.
         body_rolling_friction: Resistance of objects against rolling [m]; brings balls to rest on a table.
@@ -28,7 +29,7 @@ class PhysicsSettings:
 
     time_step_ns: int = 2_000_000
     solver_iterations: int = 150
-    contact_erp: float = 0.2
+    contact_erp: float = 0.1
     body_spinning_friction: float = 0.0005
     body_rolling_friction: float = 0.0001
     pad_friction: float = 1.2

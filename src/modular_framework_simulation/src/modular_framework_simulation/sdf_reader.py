@@ -184,7 +184,8 @@ def _check_tree(node: XmlNode, model: specs.Model) -> None:
     """Refuses models whose links are not one tree: the physics engine knows trees only."""
     if model.static:
         return
-    children = [joint.child for joint in model.joints]
+    joints = [joint for joint in model.joints if joint.parent != "world"]
+    children = [joint.child for joint in joints]
     roots = [link.name for link in model.links if link.name not in children]
     if len(roots) != 1 or len(set(children)) != len(children):
         raise DescriptionError(
@@ -192,7 +193,7 @@ def _check_tree(node: XmlNode, model: specs.Model) -> None:
             f"its joints leave {len(roots)} links without a parent ({', '.join(roots) or 'a closed loop'})",
             "a model that is not static needs joints that connect all its links to one tree",
         )
-    parents = {joint.child: joint.parent for joint in model.joints}
+    parents = {joint.child: joint.parent for joint in joints}
     for link in model.links:
         seen = {link.name}
         name = link.name

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Worlds for tests."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+
+sys.path.insert(0, str(Path(__file__).parent))
+from simulated_samples import solid  # noqa: E402
+
+
+@pytest.fixture(scope="session")
+def convex_parts(tmp_path_factory: pytest.TempPathFactory) -> ConvexParts:
+    """A mesh cache that lives as long as the tests."""
+    return ConvexParts(tmp_path_factory.mktemp("convex_parts"))
+
+
+@pytest.fixture
+def make_world(convex_parts: ConvexParts) -> Iterator[Callable[[], PhysicsWorld]]:
+    """Makes worlds with a floor at z = 0 and takes them down at the end."""
+    worlds: list[PhysicsWorld] = []
+
+    def make() -> PhysicsWorld:
+        world = PhysicsWorld(PhysicsSettings(), convex_parts, (0.0, 0.0, -9.81))
+        world.spawn(solid("floor", specs.Plane((0, 0, 1), (10, 10)), Pose(), static=True))
+        worlds.append(world)
+        return world
+
+    yield make
+    for world in worlds:
+        world.close()
+
+
+@pytest.fixture
+def world(make_world: Callable[[], PhysicsWorld]) -> PhysicsWorld:
+    """A world with a floor at z = 0."""
+    return make_world()

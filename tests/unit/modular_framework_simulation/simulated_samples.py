@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Models and a two-finger robot small enough for tests."""
+
+from __future__ import annotations
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.poses import Pose
+
+LIFT_ROBOT = """<robot name="lifter">
+  <link name="world"/>
+  <link name="palm"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial></link>
+  <joint name="lift" type="prismatic"><parent link="world"/><child link="palm"/><origin xyz="0 0 0.3"/>
+    <axis xyz="0 0 1"/><limit lower="-0.3" upper="0.5" effort="100" velocity="1"/></joint>
+  {fingers}
+  <transmission name="t1"><type>transmission_interface/SimpleTransmission</type>
+    <joint name="lift"><hardwareInterface>{lift_interface}</hardwareInterface></joint>
+    <actuator name="a1"><hardwareInterface>{lift_interface}</hardwareInterface></actuator></transmission>
+  <transmission name="t2"><type>transmission_interface/SimpleTransmission</type>
+    <joint name="slide_1"><hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint>
+    <actuator name="a2"/></transmission>
+</robot>"""
+
+FINGER = """
+  <link name="finger_{number}">
+    <inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 -0.03"/><geometry><box size="0.01 0.03 0.06"/></geometry></collision></link>
+  <joint name="slide_{number}" type="prismatic"><parent link="palm"/><child link="finger_{number}"/>
+    <origin xyz="{x} 0 0"/><axis xyz="{axis} 0 0"/><limit lower="0" upper="0.05" effort="20" velocity="0.2"/>
+    {mimic}</joint>"""
+
+
+def lift_robot_urdf(lift_interface: str = "hardware_interface/PositionJointInterface") -> str:
+    """A palm on a vertical slide with two fingers that close along x."""
+    one = FINGER.format(number=1, x=-0.06, axis=1, mimic="")
+    two = FINGER.format(number=2, x=0.06, axis=-1, mimic='<mimic joint="slide_1" multiplier="1" offset="0"/>')
+    return LIFT_ROBOT.format(fingers=one + two, lift_interface=lift_interface)
+
+
+def solid(name: str, geometry: specs.Geometry, pose: Pose, mass: float = 0.2, static: bool = False) -> specs.Model:
+    """A model of one link called "link" with one shape."""
+    collision = specs.Collision("shape", Pose(), geometry, specs.Friction(0.8))
+    moment = mass * 0.05**2 / 6
+    inertial = specs.Inertial(Pose(), mass, (moment, 0, 0, moment, 0, moment))
+    return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (collision,), ()),), (), "test")

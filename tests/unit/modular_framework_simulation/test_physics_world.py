@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Models obey physics, requests and reset, and the same commands give the same world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import trimesh
+from simulated_samples import solid
+
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.errors import DescriptionError, DuplicateModelError, UnknownEntityError
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.sdf_reader import read_model_text
+from modular_framework_simulation.sdf_resources import Resources
+from modular_framework_simulation.simulated_body import BodyState, Twist
+from modular_framework_simulation.urdf_model import read_urdf_model
+
+CUBE = specs.Box((0.05, 0.05, 0.05))
+
+
+def run(world: PhysicsWorld, seconds: float) -> None:
+    for _ in range(round(seconds / world.settings.time_step_s)):
+        world.step()
+
+
+def test_a_box_falls_as_newton_says_and_comes_to_rest_on_the_floor(world: PhysicsWorld) -> None:
+    body = world.spawn(solid("cube", CUBE, Pose((0, 0, 1.025))))
+    run(world, 0.4)
+    assert body.state().pose.position[2] == pytest.approx(1.025 - 9.81 * 0.4**2 / 2, abs=0.01)
+    assert body.state().twist.linear[2] == pytest.approx(-9.81 * 0.4, rel=0.01)
+    run(world, 1.6)
+    assert body.state().pose.position[2] == pytest.approx(0.025, abs=0.001)
+    assert math.dist(body.state().twist.linear, (0, 0, 0)) < 0.01
+
+
+def test_a_box_slides_on_a_steep_slope_and_sticks_on_a_shallow_one(world: PhysicsWorld) -> None:
+    moved = {}
+    for name, angle, y in (("shallow", 0.3, 0.0), ("steep", 0.9, 2.0)):
+        slope = Pose.from_xyz_rpy((0, y, 0.5), (0, angle, 0))
+        world.spawn(solid(f"{name}_slope", specs.Box((0.6, 0.4, 0.02)), slope, static=True))
+        body = world.spawn(solid(name, CUBE, slope @ Pose((0, 0, 0.0355))))
+        start = body.state().pose
+        run(world, 0.3)
+        moved[name] = start.distance_to(body.state().pose)[0]
+    assert moved["shallow"] < 0.002
+    assert moved["steep"] > 0.02
+
+
+def test_a_ball_comes_to_rest(world: PhysicsWorld) -> None:
+    body = world.spawn(solid("ball", specs.Sphere(0.03), Pose((0, 0, 0.03))))
+    world.set_state("ball", BodyState(Pose((0, 0, 0.03)), Twist((0.05, 0, 0), (0, 0.05 / 0.03, 0))))
+    run(world, 5.0)
+    assert math.dist(body.state().twist.linear, (0, 0, 0)) < 0.005
+
+
+def test_the_model_frame_is_not_the_centre_of_mass(world: PhysicsWorld) -> None:
+    text = """<sdf version='1.6'><model name='m'><link name='a'><pose>0.1 0 0 0 0 0.5</pose><inertial><mass>1</mass>
+        <pose>0 0.2 0 0 0 0</pose><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>
+        <collision name='c'><geometry><box><size>0.5 0.5 0.1</size></box></geometry></collision></link></model></sdf>"""
+    model = read_model_text(text, "text", Resources())
+    body = world.spawn(model)
+    wanted = Pose.from_xyz_rpy((1, 2, 3), (0.1, 0.2, 0.3))
+    world.set_state("m", BodyState(wanted, Twist((0.3, 0, 0), (0, 0, 1.0))))
+    assert body.state().pose.distance_to(wanted)[0] < 1e-9
+    assert body.state().twist.linear == pytest.approx((0.3, 0, 0))
+    link = world.entity_state("m::a")
+    assert link.pose.distance_to(wanted @ model.links[0].pose)[0] < 1e-9
+    lever = [a - b for a, b in zip(link.pose.position, wanted.position, strict=True)]
+    assert link.twist.linear == pytest.approx((0.3 - lever[1], lever[0], 0))
+
+
+def test_a_static_model_carries_all_its_links_and_never_moves(world: PhysicsWorld) -> None:
+    text = """<sdf version='1.6'><model name='table'><static>true</static>
+        <link name='top'><pose>0 0 0.5 0 0 0</pose><collision name='c'><geometry><box><size>1 1 0.04</size></box>
+        </geometry></collision></link>
+        <link name='leg'><pose>0 0 0.24 0 0 0</pose><collision name='c'><geometry><box><size>.1 .1 .48</size></box>
+        </geometry></collision></link></model></sdf>"""
+    world.spawn(read_model_text(text, "text", Resources()))
+    cube = world.spawn(solid("cube", CUBE, Pose((0.3, 0.3, 0.6))))
+    run(world, 1.0)
+    assert cube.state().pose.position[2] == pytest.approx(0.545, abs=0.001)
+    assert world.entity_state("table::leg").pose.position == pytest.approx((0, 0, 0.24))
+
+
+def test_the_links_of_a_jointed_model_are_where_the_file_puts_them_and_swing(world: PhysicsWorld) -> None:
+    inertial = "<inertial><mass>0.5</mass><inertia><ixx>.001</ixx><iyy>.001</iyy><izz>.001</izz></inertia></inertial>"
+    text = f"""<sdf version='1.6'><model name='door'><link name='post'>{inertial}</link>
+        <link name='leaf'><pose>0.4 0 1 0 0 0</pose>{inertial}</link>
+        <joint name='fast' type='fixed'><parent>world</parent><child>post</child></joint>
+        <joint name='hinge' type='revolute'><pose>-0.4 0 0 0 0 0</pose><parent>post</parent><child>leaf</child>
+        <axis><xyz>0 1 0</xyz><limit><lower>-3</lower><upper>3</upper></limit></axis></joint></model></sdf>"""
+    world.spawn(read_model_text(text, "text", Resources()))
+    assert world.entity_state("door::leaf").pose.position == pytest.approx((0.4, 0, 1.0))
+    run(world, 0.2)
+    swung = world.entity_state("door::leaf").pose.position
+    assert math.dist(swung, (0, 0, 1)) == pytest.approx(0.4, abs=0.01)
+    assert swung[2] < 0.95
+
+
+def test_a_hollow_mesh_stays_hollow(world: PhysicsWorld, tmp_path: Path) -> None:
+    file = tmp_path / "ring.stl"
+    trimesh.creation.annulus(r_min=0.04, r_max=0.06, height=0.04, sections=24).export(file)
+    world.spawn(solid("ring", specs.Mesh(file), Pose((0, 0, 0.02)), mass=1.0))
+    ball = world.spawn(solid("ball", specs.Sphere(0.015), Pose((0, 0, 0.1)), mass=0.02))
+    run(world, 1.0)
+    assert ball.state().pose.position[2] == pytest.approx(0.015, abs=0.002)
+
+
+def test_states_are_given_relative_to_models_and_links(world: PhysicsWorld) -> None:
+    frame = Pose.from_xyz_rpy((1, 0, 0), (0, 0, math.pi / 2))
+    world.spawn(solid("base", CUBE, frame, static=True))
+    world.spawn(solid("cube", CUBE, Pose((1, 2, 0.5))))
+    assert world.state_relative_to("cube", "base").pose.position == pytest.approx((2, 0, 0.5))
+    assert world.state_relative_to("cube", "base::link").pose.position == pytest.approx((2, 0, 0.5))
+    assert world.state_relative_to("cube", "world").pose.position == pytest.approx((1, 2, 0.5))
+    world.set_state("cube", BodyState(Pose((1, 0, 0)), Twist((1, 0, 0))), "base")
+    state = world.entity_state("cube")
+    assert state.pose.position == pytest.approx((1, 1, 0))
+    assert state.twist.linear == pytest.approx((0, 1, 0))
+
+
+def test_unknown_and_taken_names_are_refused_with_what_there_is(world: PhysicsWorld) -> None:
+    world.spawn(solid("cube", CUBE, Pose((0, 0, 1))))
+    with pytest.raises(DuplicateModelError, match="'cube' is already"):
+        world.spawn(solid("cube", CUBE, Pose()))
+    with pytest.raises(UnknownEntityError, match="no model 'mug'.*known: cube, floor"):
+        world.delete("mug")
+    with pytest.raises(UnknownEntityError, match="no link 'cube::lid'.*known: cube::link"):
+        world.entity_state("cube::lid")
+    with pytest.raises(UnknownEntityError, match="no model 'nowhere'"):
+        world.state_relative_to("cube", "nowhere")
+
+
+def test_a_deleted_model_is_gone_and_its_name_free(world: PhysicsWorld) -> None:
+    world.spawn(solid("cube", CUBE, Pose((0, 0, 1))))
+    world.delete("cube")
+    assert world.names() == ["floor"]
+    assert world.spawn(solid("cube", CUBE, Pose((0, 0, 2)))).state().pose.position[2] == pytest.approx(2)
+
+
+def test_reset_puts_models_back_at_rest(world: PhysicsWorld) -> None:
+    body = world.spawn(solid("cube", CUBE, Pose((0, 0, 1))))
+    run(world, 0.2)
+    world.reset_poses()
+    assert body.state() == BodyState(Pose((0, 0, 1)), Twist())
+    assert world.time_ns == 200_000_000
+    world.reset_time()
+    assert world.time_ns == 0
+
+
+def test_two_worlds_stepped_alike_are_equal_bit_for_bit(make_world: Callable[[], PhysicsWorld]) -> None:
+    prints = []
+    for _ in range(2):
+        world = make_world()
+        for number in range(4):
+            pose = Pose.from_xyz_rpy((0.01 * number, 0, 0.1 + 0.06 * number), (0.1, 0.2, 0.3))
+            world.spawn(solid(f"cube_{number}", CUBE, pose))
+        run(world, 0.5)
+        world.set_state("cube_0", BodyState(Pose((0.1, 0, 0.3)), Twist()))
+        run(world, 0.5)
+        prints.append(world.fingerprint())
+    assert prints[0] == prints[1]
+    world.step()
+    assert world.fingerprint() != prints[1]
+
+
+def test_an_object_in_urdf_is_read_with_weight_and_friction(world: PhysicsWorld) -> None:
+    text = """<robot name='r'><link name='body'><inertial><mass value='0.3'/><inertia ixx='0.001' iyy='0.001'
+        izz='0.001' ixy='0' ixz='0' iyz='0'/></inertial><collision><geometry><box size='0.1 0.1 0.1'/></geometry>
+        </collision></link><link name='knob'/><joint name='j' type='fixed'><parent link='body'/><child link='knob'/>
+        <origin xyz='0 0 0.1'/></joint><gazebo reference='body'><mu1>0.3</mu1></gazebo></robot>"""
+    model = read_urdf_model(text, "text", Resources())
+    assert model.links[0].collisions[0].friction.lateral == 0.3
+    assert model.links[1].pose.position == (0, 0, 0.1)
+    world.spawn(replace(model, pose=Pose((0, 0, 0.052))))
+    run(world, 0.3)
+    assert world.entity_state("r").pose.position[2] == pytest.approx(0.05, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("<link name='a'><collision><geometry><box size='1 1'/></geometry></collision></link>", "expected 3"),
+        ("<link name='a'><collision><geometry><torus/></geometry></collision></link>", "allowed: one of box"),
+        ("", "has no <link>"),
+        ("<link name='a'/><joint name='j' type='ball'><parent link='a'/><child link='b'/></joint>", "'ball'"),
+        ("<link name='a'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>", "'b' is no link"),
+    ],
+)
+def test_a_fault_in_an_urdf_object_is_pointed_at(body: str, said: str) -> None:
+    with pytest.raises(DescriptionError, match=said):
+        read_urdf_model(f"<robot name='r'>{body}</robot>", "text", Resources())

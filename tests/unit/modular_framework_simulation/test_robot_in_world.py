@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot in the world follows commands through its hardware interfaces, and holds things by friction alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from simulated_samples import lift_robot_urdf, solid
+
+from modular_framework_control.hardware_interface import (
+    ControllerInfo,
+    EffortJointInterface,
+    HardwareInterfaceError,
+    InterfaceResources,
+    JointStateInterface,
+    PositionJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_simulation import sdf_specs as specs
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.pacing import Pacer
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.request_queue import RequestQueue
+from modular_framework_simulation.robot_body import RobotBody, Role
+from modular_framework_simulation.robot_description import read_robot
+from modular_framework_simulation.sdf_resources import no_packages
+from modular_framework_simulation.simulation_loop import Actors, SimulationLoop
+from modular_framework_simulation.snapshots import take_snapshot
+
+Script = Callable[[float], None]
+
+
+class Commander:
+    """Stands where the controller manager does: calls a script with the time of each cycle."""
+
+    def __init__(self) -> None:
+        self.script: Script = lambda time_s: None
+        self.resets = 0
+
+    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
+        self.resets += reset_controllers
+        if period_s > 0:
+            self.script(time_s)
+
+
+class Lifter:
+    """The two-finger robot of the samples with everything around it."""
+
+    def __init__(self, world: PhysicsWorld, parts: ConvexParts, interface: str = "PositionJointInterface") -> None:
+        self.world = world
+        urdf = lift_robot_urdf(f"hardware_interface/{interface}")
+        description = read_robot(urdf, no_packages, parts, False)
+        self.robot = RobotBody(world, description, "lifter", Pose(), {"lift": 0.1})
+        self.hardware = PyBulletRobotHW(self.robot)
+        assert self.hardware.init(MappingNodeHandle(), MappingNodeHandle())
+        self.commander = Commander()
+        self.loop = SimulationLoop(
+            world, Pacer(0.0), RequestQueue(), Actors(self.robot, self.hardware, self.commander)
+        )
+        self.states = {each.name: each for each in self.hardware.get(JointStateInterface).handles}
+        self.commands = {each.name: each for each in self.hardware.get(PositionJointInterface).handles}
+
+    def run(self, seconds: float, script: Script = lambda time_s: None) -> None:
+        self.commander.script = script
+        for number in range(round(seconds / self.world.settings.time_step_s)):
+            self.loop.step()
+            if number % 10 == 0:
+                self.loop.watch_grasp()
+
+    def move_lift(self, target: float, seconds: float) -> None:
+        start, begin = self.commands["lift"].command, self.world.time_ns * 1e-9
+
+        def script(time_s: float) -> None:
+            share = min(1.0, (time_s - begin) / seconds)
+            self.commands["lift"].command = start + share**2 * (3 - 2 * share) * (target - start)
+
+        self.run(seconds, script)
+
+
+@pytest.fixture
+def lifter(world: PhysicsWorld, convex_parts: ConvexParts) -> Lifter:
+    return Lifter(world, convex_parts)
+
+
+def test_every_movable_joint_has_a_state_and_starts_where_it_was_told(lifter: Lifter) -> None:
+    assert {name: state.position for name, state in lifter.states.items()} == pytest.approx(
+        {"lift": 0.1, "slide_1": 0.0, "slide_2": 0.0}
+    )
+
+
+def test_interfaces_come_from_the_transmissions(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    lifter = Lifter(world, convex_parts, "VelocityJointInterface")
+    assert lifter.hardware.get(VelocityJointInterface).names == ["lift"]
+    assert lifter.hardware.get(PositionJointInterface).names == ["slide_1"]
+
+
+def test_an_unknown_interface_in_a_transmission_is_refused(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    with pytest.raises(HardwareInterfaceError, match="unknown hardware interface"):
+        Lifter(world, convex_parts, "WishInterface")
+
+
+def test_a_joint_tracks_a_moving_command_within_a_millimetre(lifter: Lifter) -> None:
+    worst = 0.0
+
+    def sine(time_s: float) -> None:
+        nonlocal worst
+        worst = max(worst, abs(lifter.states["lift"].position - lifter.commands["lift"].command))
+        lifter.commands["lift"].command = 0.1 + 0.1 * (1 - math.cos(3 * time_s))
+
+    lifter.run(2.0, sine)
+    assert worst < 0.001
+
+
+def test_a_joint_holds_against_gravity(lifter: Lifter) -> None:
+    lifter.run(2.0)
+    assert lifter.states["lift"].position == pytest.approx(0.1, abs=1e-4)
+    assert lifter.states["lift"].effort == pytest.approx(2.2 * 9.81, rel=0.02)
+
+
+def test_a_command_beyond_the_limits_is_cut_and_the_velocity_limit_kept(lifter: Lifter) -> None:
+    too_early = []
+
+    def jump(time_s: float) -> None:
+        too_early.append(lifter.states["lift"].position > 0.1 + 1.0 * time_s + 0.003)
+        lifter.commands["lift"].command = 5.0
+
+    lifter.run(1.0, jump)
+    assert lifter.states["lift"].position == pytest.approx(0.5, abs=1e-3)
+    assert not any(too_early)
+
+
+def test_the_second_finger_does_what_the_first_does(lifter: Lifter) -> None:
+    lifter.run(0.3, lambda _time_s: setattr(lifter.commands["slide_1"], "command", 0.03))
+    assert lifter.robot.roles["slide_2"] is Role.COUPLED
+    assert lifter.states["slide_2"].position == pytest.approx(0.03, abs=1e-3)
+
+
+def test_a_velocity_joint_runs_at_the_commanded_velocity(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    lifter = Lifter(world, convex_parts, "VelocityJointInterface")
+    lifter.hardware.get(VelocityJointInterface).handles[0].command = 0.2
+    lifter.run(1.0)
+    assert lifter.states["lift"].position == pytest.approx(0.3, abs=0.003)
+
+
+def test_an_effort_joint_accelerates_as_newton_says(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    lifter = Lifter(world, convex_parts, "EffortJointInterface")
+    mass = 2.2
+    lifter.hardware.get(EffortJointInterface).handles[0].command = mass * (9.81 + 1.0)
+    lifter.run(0.5)
+    assert lifter.states["lift"].velocity == pytest.approx(0.5, rel=0.05)
+
+
+def test_a_starting_controller_takes_a_joint_over_without_a_jump(lifter: Lifter) -> None:
+    lifter.run(0.2)
+    claim = InterfaceResources(PositionJointInterface.type_name, frozenset({"lift"}))
+    lifter.commands["lift"].command = 0.4
+    lifter.hardware.do_switch([ControllerInfo("c", "t", (claim,))], [])
+    assert lifter.commands["lift"].command == pytest.approx(0.1, abs=1e-3)
+
+
+def grasp(lifter: Lifter, geometry: specs.Geometry, height: float) -> None:
+    lifter.world.spawn(solid("thing", geometry, Pose((0, 0, height / 2))))
+    lifter.move_lift(height / 2 - 0.27, 1.0)
+    lifter.commands["slide_1"].command = 0.05
+    lifter.run(0.8, lambda _time_s: setattr(lifter.commands["slide_1"], "command", 0.05))
+
+
+@pytest.mark.parametrize(
+    ("geometry", "height"),
+    [(specs.Box((0.06, 0.03, 0.06)), 0.06), (specs.Cylinder(0.03, 0.08), 0.08), (specs.Sphere(0.03), 0.06)],
+)
+def test_an_object_is_lifted_by_friction_and_let_go_again(
+    lifter: Lifter, geometry: specs.Geometry, height: float
+) -> None:
+    grasp(lifter, geometry, height)
+    assert lifter.loop.grasp_watch.held == "thing"
+    held = lifter.loop.held_object()
+    assert held is not None
+    assert (held.model, held.carrier_link) == ("thing", "palm")
+    lifter.move_lift(0.2, 1.0)
+    lifter.run(2.0)
+    lifted = lifter.world.entity_state("thing").pose.position[2]
+    assert lifted == pytest.approx(0.2 + 0.27, abs=0.005)
+    snapshot = take_snapshot(lifter.world, lifter.loop.held_object())
+    assert snapshot.held is not None
+    assert {model.name for model in snapshot.models} == {"floor", "thing"}
+    lifter.run(1.0, lambda _time_s: setattr(lifter.commands["slide_1"], "command", 0.0))
+    assert lifter.loop.grasp_watch.held is None
+    assert lifter.world.entity_state("thing").pose.position[2] < 0.1
+
+
+def test_less_effort_grips_less(lifter: Lifter) -> None:
+    forces = []
+    for effort in (5.0, 10.0):
+        lifter.commands["slide_1"].max_effort = effort
+        if effort == 5.0:
+            grasp(lifter, specs.Box((0.06, 0.03, 0.06)), 0.06)
+        lifter.run(0.5)
+        forces.append(sum(each.force for each in lifter.world.contacts(lifter.robot.body, lifter.robot.fingers[0][0])))
+    assert forces == pytest.approx([5.0, 10.0], rel=0.1)
+
+
+def test_reset_puts_the_robot_back_and_restarts_the_controllers_once(lifter: Lifter) -> None:
+    lifter.move_lift(0.4, 0.8)
+    lifter.loop.reset_all()
+    assert lifter.world.time_ns == 0
+    lifter.run(0.1)
+    assert lifter.commander.resets == 1
+    assert lifter.states["lift"].position == pytest.approx(0.1, abs=1e-3)
+
+
+def test_the_same_commands_give_the_same_world(
+    make_world: Callable[[], PhysicsWorld], convex_parts: ConvexParts
+) -> None:
+    prints = []
+    for _ in range(2):
+        lifter = Lifter(make_world(), convex_parts)
+        grasp(lifter, specs.Cylinder(0.03, 0.08), 0.08)
+        lifter.move_lift(0.2, 1.0)
+        prints.append(lifter.world.fingerprint())
+    assert prints[0] == prints[1]
+
+
+def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    description = read_robot(lift_robot_urdf(), no_packages, convex_parts, False)
+    with pytest.raises(DescriptionError, match=r"\['elbow'\].*allowed: lift, slide_1, slide_2"):
+        RobotBody(world, description, "r", Pose(), {"elbow": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("urdf", "said"),
+    [
+        ("<robot", "well-formed"),
+        ("<sdf/>", "expected a URDF"),
+        ("<robot name='r'><link name='a'><collision><geometry><mesh filename='package://p/x.stl'/></geometry>"
+         "</collision></link></robot>", "package 'p' is not found"),
+        ("<robot name='r'><link name='a'><collision><geometry><mesh filename='/nowhere/x.stl'/></geometry>"
+         "</collision></link></robot>", "'/nowhere/x.stl' does not exist"),
+        ("<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'><parent link='a'/>"
+         "<child link='b'/><limit lower='x'/></joint></robot>", "joint 'j'.*got 'x'"),
+        ("<robot name='r'><link name='a'/><joint name='j' type='revolute'><parent link='a'/></joint></robot>",
+         "joint 'j'.*has no <child"),
+    ],
+)
+def test_a_faulty_robot_description_is_refused(urdf: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match=said):
+        read_robot(urdf, no_packages, ConvexParts(tmp_path), False)

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parts around the world: pacing, requests from other threads, grasp detection, starting pose, meshes."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from modular_framework_simulation.errors import DescriptionError, LoopTimeoutError
+from modular_framework_simulation.grasp_watch import GraspWatch
+from modular_framework_simulation.mesh_files import ConvexParts, load_mesh
+from modular_framework_simulation.pacing import Pacer
+from modular_framework_simulation.request_queue import RequestQueue
+from modular_framework_simulation.sdf_specs import Mesh
+from modular_framework_simulation.starting_pose import parse_starting_pose
+
+
+class FakeTime:
+    """Real time that passes only when somebody sleeps or works."""
+
+    def __init__(self) -> None:
+        self.now = 50.0
+
+    def clock(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+def test_the_pacer_holds_simulated_time_back_to_real_time() -> None:
+    time = FakeTime()
+    pacer = Pacer(1.0, time.clock, time.sleep)
+    for step in range(1, 101):
+        time.now += 0.0005
+        pacer.keep(step * 0.002)
+    assert time.now == pytest.approx(50.2)
+    report = pacer.report(0.2)
+    assert report.factor == pytest.approx(1.0)
+    assert report.busy_share == pytest.approx(0.25)
+    assert report.step_cost_s == pytest.approx(0.0005)
+
+
+def test_the_pacer_makes_good_a_short_stall_and_forgives_a_long_one() -> None:
+    time = FakeTime()
+    pacer = Pacer(1.0, time.clock, time.sleep)
+    time.now += 0.5
+    for step in range(1, 1001):
+        pacer.keep(step * 0.002)
+    assert time.now == pytest.approx(52.0)
+    time.now += 60.0
+    for step in range(1001, 2001):
+        pacer.keep(step * 0.002)
+    assert time.now == pytest.approx(52.0 + 60.0 + 1.0, abs=0.01)
+
+
+def test_a_factor_of_two_runs_twice_as_fast_and_zero_never_sleeps() -> None:
+    time = FakeTime()
+    Pacer(2.0, time.clock, time.sleep).keep(1.0)
+    assert time.now == pytest.approx(50.5)
+    Pacer(0.0, time.clock, time.sleep).keep(100.0)
+    assert time.now == pytest.approx(50.5)
+    with pytest.raises(ValueError, match="allowed"):
+        Pacer(-1.0)
+
+
+def test_requests_are_carried_out_by_the_loops_thread_and_errors_come_back() -> None:
+    requests, stop, threads = RequestQueue(), threading.Event(), []
+
+    def loop() -> None:
+        while not stop.is_set():
+            requests.wait(0.05)
+            requests.run_pending()
+
+    def fail() -> None:
+        raise KeyError("told")
+
+    thread = threading.Thread(target=loop)
+    thread.start()
+    try:
+        requests.call("name", lambda: threads.append(threading.current_thread()), 5.0)
+        assert threads == [thread]
+        with pytest.raises(KeyError, match="told"):
+            requests.call("failing", fail, 5.0)
+    finally:
+        stop.set()
+        thread.join(5.0)
+
+
+def test_a_request_nobody_gets_to_times_out_and_is_never_done_later() -> None:
+    requests, done = RequestQueue(), []
+    with pytest.raises(LoopTimeoutError, match=r"'spawn' waited 0\.01 s"):
+        requests.call("spawn", lambda: done.append(1), 0.01)
+    requests.run_pending()
+    assert done == []
+
+
+def test_an_object_is_held_after_two_fingers_touched_it_for_a_while() -> None:
+    watch = GraspWatch(hold_after_s=0.2, release_after_s=0.3)
+    assert watch.update(0.0, [{"cube"}, {"cube"}]) is None
+    assert watch.update(0.1, [{"cube"}, {"cube", "ball"}]) is None
+    assert watch.update(0.2, [{"cube"}, {"cube"}]) == "cube"
+
+
+def test_one_finger_is_no_grasp_and_an_interrupted_touch_starts_again() -> None:
+    watch = GraspWatch(0.2, 0.3)
+    for time_s in (0.0, 0.5, 1.0):
+        assert watch.update(time_s, [{"cube"}, {"can"}]) is None
+    watch.update(1.1, [{"cube"}, {"cube"}])
+    watch.update(1.2, [{"cube"}, set()])
+    assert watch.update(1.31, [{"cube"}, {"cube"}]) is None
+    assert watch.update(1.52, [{"cube"}, {"cube"}]) == "cube"
+
+
+def test_an_object_is_let_go_only_after_a_finger_missed_it_for_a_while() -> None:
+    watch = GraspWatch(0.0, 0.3)
+    assert watch.update(0.0, [{"cube"}, {"cube"}]) == "cube"
+    assert watch.update(0.1, [{"cube"}, set()]) == "cube"
+    assert watch.update(0.2, [{"cube"}, {"cube"}]) == "cube"
+    assert watch.update(0.3, [set(), set()]) == "cube"
+    assert watch.update(0.61, [set(), set()]) is None
+
+
+def test_a_starting_pose_is_read_as_spawn_model_writes_it() -> None:
+    assert parse_starting_pose("-J a 1.5 -J b -2") == {"a": 1.5, "b": -2.0}
+    assert parse_starting_pose("") == {}
+
+
+@pytest.mark.parametrize("text", ["a 1", "-J a", "-J a b", "-J a 1 -J a 2", "-J a nan", "-j a 1"])
+def test_a_wrong_starting_pose_is_refused(text: str) -> None:
+    with pytest.raises(DescriptionError, match="starting pose, word"):
+        parse_starting_pose(text)
+
+
+def volume_of(files: tuple[Path, ...]) -> float:
+    return sum(trimesh.load(file, force="mesh").volume for file in files)
+
+
+def test_a_mesh_that_is_not_convex_is_cut_into_convex_parts_of_its_volume(tmp_path: Path) -> None:
+    ring = trimesh.creation.annulus(r_min=0.03, r_max=0.05, height=0.02, sections=16)
+    file = tmp_path / "ring.stl"
+    ring.export(file)
+    parts = ConvexParts(tmp_path / "cache")
+    files = parts.parts(Mesh(file))
+    assert len(files) >= 4
+    assert all(trimesh.load(each, force="mesh").is_convex for each in files)
+    assert volume_of(files) == pytest.approx(ring.volume, rel=0.15)
+    assert trimesh.load(parts.hull(Mesh(file)), force="mesh").volume > 1.3 * ring.volume
+
+
+def test_convex_parts_come_from_the_cache_and_follow_content_and_scale(tmp_path: Path) -> None:
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(file)
+    parts = ConvexParts(tmp_path / "cache")
+    first = parts.parts(Mesh(file))
+    written = first[0].stat().st_mtime_ns
+    assert len(first) == 1
+    assert parts.parts(Mesh(file))[0].stat().st_mtime_ns == written
+    assert volume_of(parts.parts(Mesh(file, (2.0, 1.0, 1.0)))) == pytest.approx(0.002)
+    trimesh.creation.box((0.2, 0.1, 0.1)).export(file)
+    assert volume_of(parts.parts(Mesh(file))) == pytest.approx(0.002)
+
+
+def test_an_exact_mesh_keeps_its_triangles_and_a_broken_one_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "box.obj"
+    trimesh.creation.box((1, 1, 1)).export(file)
+    mesh = load_mesh(Mesh(file, (2.0, 1.0, 1.0)))
+    assert mesh.triangles.shape == (12, 3)
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx((2, 1, 1))
+    broken = tmp_path / "broken.stl"
+    broken.write_text("this is no mesh")
+    with pytest.raises(DescriptionError, match=r"broken\.stl"):
+        load_mesh(Mesh(broken))
