@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The arm commander: every call stands alone, and every failure has a reason."""
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import rospy
+from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
+
+from modular_framework_core.arm_commander import ArmCommander, CommanderError
+from modular_framework_core.grasp_messages import generate_pose_stamped_message
+
+sys.path.insert(0, str(Path(__file__).parent))
+from fake_move_group import FakeMoveGroup  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def commander(ros_session):
+    lonely = ArmCommander("arm")
+    with pytest.raises(CommanderError, match="robot_description"):
+        lonely.connect(0.3)
+    rospy.set_param("robot_description", "<robot/>")
+    fake = FakeMoveGroup()
+    with pytest.raises(CommanderError, match="no planning group 'leg'"):
+        ArmCommander("leg").connect(0.3)
+    made = ArmCommander("arm")
+    made.connect(20.0)
+    made.fake = fake
+    return made
+
+
+@pytest.fixture(autouse=True)
+def fresh(commander) -> None:
+    fake = commander.fake
+    fake.reach, fake.blocked, fake.plan_error, fake.execution_error, fake.slow = 1.0, 1.0, 0, 0, False
+    fake.requests.clear()
+
+
+def pose(x: float, y: float = 0.0):
+    return generate_pose_stamped_message("world", (x, y, 0), (0, 0, 0, 1))
+
+
+def test_settings_and_targets_arrive_in_the_request(commander) -> None:
+    commander.set_max_velocity_scaling_factor(0.5)
+    commander.set_planner_id("RRTConnect")
+    commander.set_num_planning_attempts(3)
+    commander.set_planning_time(2.5)
+    result = commander.plan_to_joint_value_target({"jx": 0.4, "f": 1.0}, custom_start_state={"jx": 0.1, "f": 0.03})
+    assert result.success
+    request = commander.fake.requests[-1]
+    assert (request.group_name, request.planner_id, request.num_planning_attempts) == ("arm", "RRTConnect", 3)
+    assert (request.allowed_planning_time, request.max_velocity_scaling_factor) == (2.5, 0.5)
+    assert request.start_state.is_diff
+    assert dict(zip(request.start_state.joint_state.name, request.start_state.joint_state.position, strict=True)) == {
+        "jx": 0.1, "f": 0.03}
+    assert [(c.joint_name, c.position) for c in request.goal_constraints[0].joint_constraints] == [("jx", 0.4)]
+
+
+def test_a_pose_target_is_a_goal_for_the_tip_and_the_next_call_starts_afresh(commander) -> None:
+    assert commander.plan_to_pose_target(pose(0.3), custom_start_state={"jx": 0.2})
+    goal = commander.fake.requests[-1].goal_constraints[0]
+    assert goal.position_constraints[0].link_name == "tip"
+    assert goal.position_constraints[0].constraint_region.primitive_poses[0].position.x == 0.3
+    assert goal.orientation_constraints[0].link_name == "tip"
+    commander.plan_to_joint_value_target({"jx": 0.0})
+    request = commander.fake.requests[-1]
+    assert not request.start_state.joint_state.name
+    assert not request.goal_constraints[0].position_constraints
+
+
+def test_threads_do_not_mix_their_targets(commander) -> None:
+    ends: dict[int, float] = {}
+
+    def plan(number: int) -> None:
+        result = commander.plan_to_joint_value_target({"jx": number / 10})
+        ends[number] = result.trajectory.joint_trajectory.points[-1].positions[0]
+
+    threads = [threading.Thread(target=plan, args=(number,)) for number in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20)
+    assert ends == {number: number / 10 for number in range(6)}
+
+
+def test_a_failed_plan_tells_the_reported_reason_and_falls_back_on_the_codes_name(commander) -> None:
+    time.sleep(0.3)
+    commander.fake.plan_error, commander.fake.reason = MoveItErrorCodes.GOAL_IN_COLLISION, "'palm' touches 'wall'"
+    result = commander.plan_to_joint_value_target({"jx": 0.0})
+    assert not result.success
+    assert result.error_code == MoveItErrorCodes.GOAL_IN_COLLISION
+    assert result.reason == "GOAL_IN_COLLISION: 'palm' touches 'wall'"
+    commander.fake.reason = ""
+    assert commander.plan_to_joint_value_target({"jx": 0.0}).reason == "GOAL_IN_COLLISION"
+    assert "none of them" in commander.plan_to_joint_value_target({"knee": 0.0}).reason
+
+
+def test_inverse_kinematics_tells_out_of_reach_from_collision(commander) -> None:
+    assert commander.get_ik(pose(0.3, 0.2)) == {"jx": 0.3, "jy": 0.2}
+    commander.fake.blocked = 0.1
+    result = commander.solve_ik(pose(0.3, 0.2))
+    assert not result
+    assert "'palm' with 'wall'" in result.reason
+    commander.fake.reach = 0.1
+    assert "out of reach" in commander.solve_ik(pose(0.3, 0.0)).reason
+    assert commander.get_ik(pose(0.3)) is None
+
+
+def test_executing_tells_the_truth(commander) -> None:
+    plan = commander.plan_to_joint_value_target({"jx": 0.0})
+    assert commander.execute_plan(plan)
+    commander.fake.execution_error = MoveItErrorCodes.CONTROL_FAILED
+    result = commander.execute_plan(plan.trajectory)
+    assert not result
+    assert result.reason == "CONTROL_FAILED: the controller said no"
+    assert not commander.execute_plan(RobotTrajectory())
+
+
+def test_a_stop_cancels_the_motion(commander) -> None:
+    plan = commander.plan_to_joint_value_target({"jx": 0.0})
+    commander.fake.slow = True
+    threading.Timer(0.3, commander.stop).start()
+    result = commander.execute_plan(plan)
+    assert not result
+    assert result.error_code == MoveItErrorCodes.PREEMPTED
+    time.sleep(0.2)
+    assert commander.fake.canceled
+
+
+@pytest.mark.parametrize(("method", "value"), [
+    ("set_max_velocity_scaling_factor", 0.0), ("set_max_velocity_scaling_factor", 1.1),
+    ("set_num_planning_attempts", 0), ("set_planning_time", 0.0)])
+def test_settings_out_of_range_are_refused(commander, method: str, value: float) -> None:
+    with pytest.raises(CommanderError, match="allowed"):
+        getattr(commander, method)(value)
