@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A polyline whose corners are replaced by parabolas: smooth enough to pass without stopping, never far from the line."""
+"""A polyline whose corners are replaced by parabolas: smooth enough to pass without stopping, near the line."""
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds joint positions that bring a link to a pose: every analytic solution where there are some, else numeric ones."""
+"""Finds joint positions that bring a link to a pose: every closed-form solution where there are some, else numeric."""
 from __future__ import annotations
 
 import itertools
@@ -153,7 +153,7 @@ class InverseKinematics:
 
     def _polish(self, data: Any, seed: Array, values: Array, target: Transform,
                 steps: int = NEWTON_STEPS) -> Array | None:
-        """Drives the pose error of a candidate below the tolerance by Newton steps; None where it does not get there."""
+        """Drives the pose error of a candidate below the tolerance by Newton steps; None where that fails."""
         if not np.isfinite(values).all():
             return None
         frame = self.model.frame_ids[self._last_link]

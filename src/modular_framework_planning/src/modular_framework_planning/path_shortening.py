@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes a planner's path short and straight: leaves out vertices, then cuts corners, as long as the motion stays free."""
+"""Makes a planner's path short and straight: leaves out vertices, cuts corners, while the motion stays free."""
 from __future__ import annotations
 
 import time

@@ -113,8 +113,8 @@ class _Attempt:
         checker = CollisionChecker(self._request.scene, self._group.indices)
         fixed = checker.fixed_contacts(start)
         if fixed:
-            raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no joint "
-                                f"of group '{self._group.name}' can change that; allow the pair or move the object")
+            raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
+                                f"joint of group '{self._group.name}' can change that; allow the pair or move the object")
         if checker.is_free(start):
             return checker, []
         contacts = checker.contacts(start, include_fixed=False)

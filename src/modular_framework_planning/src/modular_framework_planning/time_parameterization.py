@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives a geometric path its fastest timing within velocity and acceleration limits (TOPP-RA), sampled for a controller."""
+"""Gives a path its fastest timing within velocity and acceleration limits (TOPP-RA), sampled for a controller."""
 from __future__ import annotations
 
 from typing import Any

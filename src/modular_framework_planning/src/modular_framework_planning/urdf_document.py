@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prepares a URDF for Pinocchio: mesh files are found, continuous joints become unbounded revolute ones, mimics are noted."""
+"""Prepares a URDF for Pinocchio: mesh files are found, continuous joints become unbounded, mimics are noted."""
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import pinocchio as pin
+
 from modular_framework_planning.errors import ModelError
+from modular_framework_planning.spatial import Transform
 
 MeshResolver = Callable[[str], str]
+VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
 CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
 MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
 
@@ -35,7 +40,7 @@ class UrdfDocument:
     joint_children: Mapping[str, str]
     joint_kinds: Mapping[str, str]
     mimics: Mapping[str, Mimic] = field(default_factory=dict)
-    visual_meshes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    visual_meshes: Mapping[str, tuple[VisualMesh, ...]] = field(default_factory=dict)
 
 
 def directory_resolver(root: Path) -> MeshResolver:
@@ -93,12 +98,34 @@ def _prepare_joint(joint: ET.Element, name: str, mimics: dict[str, Mimic]) -> No
         joint.remove(mimic)
 
 
-def _resolve_meshes(root: ET.Element, resolve: MeshResolver) -> dict[str, tuple[str, ...]]:
-    visuals: dict[str, tuple[str, ...]] = {}
+def _numbers(text: str | None, default: tuple[float, float, float], where: str) -> tuple[float, float, float]:
+    if text is None:
+        return default
+    try:
+        first, second, third = (float(item) for item in text.split())
+    except ValueError as error:
+        raise ModelError(f"{where}: '{text}'; three numbers are needed") from error
+    return first, second, third
+
+
+def _visual_meshes(link: ET.Element) -> Iterator[VisualMesh]:
+    where = f"URDF link '{link.get('name')}' visual"
+    for visual in link.findall("visual"):
+        origin = visual.find("origin")
+        xyz = _numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0), where)
+        rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0), where)
+        pose = pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.array(xyz))
+        for mesh in visual.iter("mesh"):
+            yield mesh.get("filename", ""), pose, _numbers(mesh.get("scale"), (1.0, 1.0, 1.0), where)
+
+
+def _resolve_meshes(root: ET.Element, resolve: MeshResolver) -> dict[str, tuple[VisualMesh, ...]]:
+    """Makes collision meshes file paths, takes the visual elements out and returns them."""
+    visuals: dict[str, tuple[VisualMesh, ...]] = {}
     for link in root.findall("link"):
-        uris = [mesh.get("filename", "") for visual in link.findall("visual") for mesh in visual.iter("mesh")]
-        if uris:
-            visuals[link.get("name", "")] = tuple(uris)
+        meshes = tuple(_visual_meshes(link))
+        if meshes:
+            visuals[link.get("name", "")] = meshes
         for collision in link.findall("collision"):
             for mesh in collision.iter("mesh"):
                 mesh.set("filename", resolve(mesh.get("filename", "")))

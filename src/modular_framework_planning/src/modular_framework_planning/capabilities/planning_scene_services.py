@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Services get_planning_scene, apply_planning_scene and clear_octomap."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    ApplyPlanningSceneResponse,
+    GetPlanningScene,
+    GetPlanningSceneResponse,
+)
+from std_srvs.srv import Empty, EmptyResponse
+
+from modular_framework_planning import capability_names as names
+from modular_framework_planning.ros_context import MoveGroupContext
+from modular_framework_planning.scene_messages import apply_scene, scene_message
+
+
+class PlanningSceneServices:
+    """Offers the scene's services; a change is in force when apply_planning_scene answers."""
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+
+    def connect(self) -> None:
+        """Advertises the services."""
+        rospy.Service(names.GET_SCENE_SERVICE, GetPlanningScene, self._get)
+        rospy.Service(names.APPLY_SCENE_SERVICE, ApplyPlanningScene, self._apply)
+        rospy.Service(names.CLEAR_OCTOMAP_SERVICE, Empty, self._clear_octomap)
+
+    def _get(self, request: Any) -> GetPlanningSceneResponse:
+        return GetPlanningSceneResponse(scene_message(self._context.monitor.snapshot(), request.components.components))
+
+    def _apply(self, request: Any) -> ApplyPlanningSceneResponse:
+        try:
+            self._context.monitor.apply(lambda scene: apply_scene(scene, request.scene), request.scene)
+        except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+            self._context.reporter.failure("scene", error)
+            return ApplyPlanningSceneResponse(success=False)
+        return ApplyPlanningSceneResponse(success=True)
+
+    def _clear_octomap(self, _: Any) -> EmptyResponse:
+        return EmptyResponse()  # there is no octomap to clear

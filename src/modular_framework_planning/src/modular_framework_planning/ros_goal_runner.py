@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An action server whose goals run in threads of their own, so that a cancel arrives while a goal is worked on."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import actionlib
+import rospy
+
+PREVIOUS_GOAL_TIMEOUT_S = 10.0
+
+
+class GoalRunner:
+    """Runs one goal at a time; a new goal cancels the one before and starts when that has ended.
+
+    `work(goal, cancelled, feedback)` returns the result and whether it succeeded; `cancelled` is an Event.
+    """
+
+    def __init__(self, name: str, kind: Any,
+                 work: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]]) -> None:
+        self._work = work
+        self._lock = threading.Lock()
+        self._turn = threading.Lock()
+        self._cancels: dict[str, threading.Event] = {}
+        self._server = actionlib.ActionServer(name, kind, self._on_goal, self._on_cancel, auto_start=False)
+
+    def connect(self) -> None:
+        """Starts the server."""
+        self._server.start()
+
+    def _on_goal(self, handle: Any) -> None:
+        cancelled = threading.Event()
+        with self._lock:
+            for event in self._cancels.values():
+                event.set()
+            self._cancels[handle.get_goal_id().id] = cancelled
+        threading.Thread(target=self._run, args=(handle, cancelled), daemon=True).start()
+
+    def _on_cancel(self, handle: Any) -> None:
+        with self._lock:
+            event = self._cancels.get(handle.get_goal_id().id)
+        if event is not None:
+            event.set()
+
+    def _run(self, handle: Any, cancelled: threading.Event) -> None:
+        if not self._turn.acquire(timeout=PREVIOUS_GOAL_TIMEOUT_S):
+            handle.set_rejected(None, f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s")
+            return
+        try:
+            handle.set_accepted()
+            result, succeeded, text = self._work(handle.get_goal(), cancelled, handle.publish_feedback)
+            if succeeded:
+                handle.set_succeeded(result, text)
+            elif cancelled.is_set():
+                handle.set_canceled(result, text)
+            else:
+                handle.set_aborted(result, text)
+        except Exception as error:  # noqa: BLE001 - the client must get an answer whatever happens; it is logged here
+            rospy.logerr("action goal ended by an unexpected %s", type(error).__name__, exc_info=error)
+            handle.set_aborted(None, f"unexpected {type(error).__name__}: {error}")
+        finally:
+            self._turn.release()
+            with self._lock:
+                self._cancels.pop(handle.get_goal_id().id, None)

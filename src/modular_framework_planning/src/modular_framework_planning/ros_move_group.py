@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The move_group node: reads the robot, then offers every endpoint; nothing is advertised before it can answer."""
+from __future__ import annotations
+
+import sys
+import time
+
+import rospy
+
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.pipeline import PlanningPipeline
+from modular_framework_planning.ros_context import MoveGroupContext
+from modular_framework_planning.ros_execution import TrajectoryExecution
+from modular_framework_planning.ros_markers import MarkerPublisher
+from modular_framework_planning.ros_parameters import (
+    load_controllers,
+    load_execution_settings,
+    load_pipeline_settings,
+    load_robot_model,
+)
+from modular_framework_planning.ros_report import Reporter
+from modular_framework_planning.ros_scene_monitor import SceneMonitor
+
+
+def build_context() -> MoveGroupContext:
+    """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
+    model = load_robot_model()
+    name, settings = load_pipeline_settings()
+    kinematics = KinematicsPool(model)
+    monitor = SceneMonitor(model)
+    execution = TrajectoryExecution(load_controllers(), load_execution_settings(), monitor)
+    return MoveGroupContext(model, monitor, kinematics, PlanningPipeline(model, kinematics, settings), name, execution,
+                            MarkerPublisher(), Reporter())
+
+
+def advertise(context: MoveGroupContext) -> None:
+    """Starts every endpoint."""
+    from modular_framework_planning.capabilities.execute_trajectory_action import ExecuteTrajectory
+    from modular_framework_planning.capabilities.kinematics_service import KinematicsService
+    from modular_framework_planning.capabilities.move_action import MoveAction
+    from modular_framework_planning.capabilities.plan_service import PlanService
+    from modular_framework_planning.capabilities.planning_scene_services import PlanningSceneServices
+    from modular_framework_planning.capabilities.query_planners_service import QueryPlannersService
+    from modular_framework_planning.capabilities.state_validation_service import StateValidationService
+
+    context.monitor.listeners.append(context.markers.show_scene)
+    context.monitor.connect()
+    context.markers.show_scene(context.monitor.snapshot())
+    context.execution.connect()
+    for capability in (PlanService, KinematicsService, StateValidationService, PlanningSceneServices,
+                       QueryPlannersService, MoveAction, ExecuteTrajectory):
+        capability(context).connect()
+
+
+def main() -> int:
+    """Runs the node; returns its exit code."""
+    begun = time.monotonic()
+    rospy.init_node("move_group")
+    try:
+        context = build_context()
+    except PlanningError as error:
+        rospy.logfatal("move_group cannot start: %s", error.reason)
+        return 1
+    for group in context.model.groups.values():
+        if group.is_chain:
+            context.kinematics.solver(group.name)
+    advertise(context)
+    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipeline '%s', %d controllers, after %.1f s",
+                  context.model.name, ", ".join(context.model.groups), context.pipeline_name,
+                  len(context.execution.controllers), time.monotonic() - begun)
+    import toppra.algorithm  # noqa: F401 - half a second that would otherwise be part of the first plan
+
+    rospy.spin()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Applies a whole PlanningScene message to a snapshot, all of it or nothing, and writes one with the asked parts."""
+from __future__ import annotations
+
+from typing import Any
+
+from moveit_msgs.msg import PlanningScene as SceneMessage
+from moveit_msgs.msg import PlanningSceneComponents as Parts
+
+from modular_framework_planning.conversions import scene_with_state, state_message
+from modular_framework_planning.errors import GeometryError
+from modular_framework_planning.planning_scene import PlanningScene, empty_scene
+from modular_framework_planning.scene_conversions import (
+    apply_collision_object,
+    colors_to_message,
+    fixed_frames_from,
+    frames_to_message,
+    matrix_from_message,
+    object_to_message,
+    write_matrix,
+)
+
+
+def apply_world(scene: PlanningScene, world: Any) -> PlanningScene:
+    """Returns the scene after the changes of a PlanningSceneWorld message."""
+    if world.octomap.octomap.data:
+        raise GeometryError("world.octomap: octomaps are not supported; send the obstacles as collision objects")
+    for item in world.collision_objects:
+        scene = apply_collision_object(scene, item)
+    return scene
+
+
+def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
+    """Returns the scene after a diff, or the scene a full message describes.
+
+    Raises:
+        PlanningError: something in the message is not usable; the given scene is unchanged, as always.
+    """
+    if not message.is_diff:
+        scene = empty_scene(scene.model, scene.positions)
+    if message.name:
+        scene = scene.with_name(message.name)
+    if message.fixed_frame_transforms:
+        scene = scene.with_fixed_frames(fixed_frames_from(scene, message.fixed_frame_transforms))
+    scene = scene_with_state(scene, message.robot_state, "planning scene robot_state")
+    scene = apply_world(scene, message.world)
+    matrix = message.allowed_collision_matrix
+    if matrix.entry_names or matrix.default_entry_names:
+        scene = scene.with_acm(matrix_from_message(matrix))
+    if message.object_colors:
+        scene = scene.with_colors({c.id: (c.color.r, c.color.g, c.color.b, c.color.a) for c in message.object_colors})
+    return scene
+
+
+def scene_message(scene: PlanningScene, components: int) -> SceneMessage:
+    """Writes the parts of the scene that are asked for (bits of PlanningSceneComponents; 0 means all)."""
+    wanted = components or 0x3FF
+    message = SceneMessage(is_diff=False)
+    if wanted & Parts.SCENE_SETTINGS:
+        message.name, message.robot_model_name = scene.name or "(noname)", scene.model.name
+    if wanted & (Parts.ROBOT_STATE | Parts.ROBOT_STATE_ATTACHED_OBJECTS):
+        message.robot_state = state_message(scene, None, bool(wanted & Parts.ROBOT_STATE_ATTACHED_OBJECTS))
+    geometry = bool(wanted & Parts.WORLD_OBJECT_GEOMETRY)
+    if geometry or wanted & Parts.WORLD_OBJECT_NAMES:
+        message.world.collision_objects = [object_to_message(scene, body, scene.model.planning_frame, geometry)
+                                           for body in scene.objects.values()]
+    if wanted & Parts.TRANSFORMS:
+        message.fixed_frame_transforms = frames_to_message(scene)
+    if wanted & Parts.ALLOWED_COLLISION_MATRIX:
+        write_matrix(scene.acm, message.allowed_collision_matrix)
+    if wanted & Parts.OBJECT_COLORS:
+        message.object_colors = colors_to_message(scene)
+    return message
