@@ -227,10 +227,13 @@ class ArmCommander:
         self._planning_time_s = float(seconds)
 
     def current_joints(self) -> dict[str, float]:
-        """Returns the latest positions of every joint heard of [rad or m]."""
-        self.connect()
+        """Returns the latest positions of the group's joints [rad or m].
+
+        Joints outside the group are left out on purpose: a seed that names them would pin fingers that follow others.
+        """
+        names = self.group.joint_names
         with self._joints_lock:
-            return dict(self._positions)
+            return {name: self._positions[name] for name in names}
 
     def plan_to_pose_target(self, pose: PoseStamped, custom_start_state: StartState = None) -> PlanResult:
         """Plans to a pose of the group's tip link.
@@ -412,9 +415,11 @@ class ArmCommander:
     def _on_report(self, message: String) -> None:
         try:
             report = json.loads(message.data)
-            name = str(report["request_name"])
-        except (ValueError, KeyError, TypeError) as error:
+            name = str(report.get("request_name", ""))
+        except (ValueError, AttributeError) as error:
             rospy.logwarn_throttle(10.0, f"Topic '{rospy.resolve_name(REPORT_TOPIC)}': unreadable report ({error!r})")
+            return
+        if not name:
             return
         self._reports[name] = report
         while len(self._reports) > REPORTS_KEPT:
