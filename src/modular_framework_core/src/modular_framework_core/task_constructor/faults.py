@@ -77,8 +77,11 @@ def listing(allowed: Iterable[str]) -> str:
 
 
 def nearest(found: str, allowed: Iterable[str]) -> str:
-    """Return ``; did you mean 'x'?`` for the allowed name closest to the one found, or nothing."""
+    """Return ``; did you mean 'x'?`` for the allowed name closest to the one found (or part of it), or nothing."""
     names = [str(name) for name in allowed]
     by_lower = {name.lower(): name for name in names}
-    matches = difflib.get_close_matches(str(found).lower(), list(by_lower), n=1, cutoff=0.6)
+    wanted = str(found).lower()
+    matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.6)
+    if not matches and len(wanted) >= 3:
+        matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
     return f"; did you mean '{by_lower[matches[0]]}'?" if matches else ""

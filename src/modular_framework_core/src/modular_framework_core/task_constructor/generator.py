@@ -54,6 +54,8 @@ def literal(value: Any) -> str:
     Raises:
         GenerationError: the value is no text, number, truth value, None, list, tuple or dict of these.
     """
+    if isinstance(value, jinja2.Undefined):
+        str(value)  # raises jinja2.UndefinedError, which names what the template asked for
     if isinstance(value, float) and not math.isfinite(value):
         return f"float({str(value)!r})"
     if value is None or isinstance(value, (str, bool, int, float)):
@@ -127,7 +129,7 @@ def _section(environment: jinja2.Environment, machine: MachineSpec, task: TaskSp
         ).strip("\n") + "\n"
     except jinja2.TemplateSyntaxError as error:
         raise GenerationError(f"{file}:{error.lineno}: {error.message}") from error
-    except (jinja2.TemplateError, TypeError, ValueError) as error:
+    except (jinja2.TemplateError, GenerationError, TypeError, ValueError) as error:
         raise GenerationError(f"{file}: the template cannot be filled for '{machine.label}': {error}") from error
 
 

@@ -73,8 +73,8 @@ def name_map(node: Node, what: str, faults: FaultList) -> dict[str, Scalar] | No
         return None
     result: dict[str, Scalar] = {}
     for key, value in node.entries.items():
-        if isinstance(value, Scalar) and text(value, f"{what}: the value of '{key}'", faults) is not None:
+        if isinstance(value, Scalar) and isinstance(value.value, str) and value.value:
             result[key] = value
-        elif not isinstance(value, Scalar):
+        else:
             faults.add(value.place, f"{what}: the value of '{key}' must be a name, found {kind_of(value)}")
-    return result
+    return result if len(result) == len(node.entries) else None

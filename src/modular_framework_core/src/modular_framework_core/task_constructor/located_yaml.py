@@ -9,7 +9,7 @@ from typing import Any, Union
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.nodes import ScalarNode, SequenceNode
 
 from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault
 
@@ -143,6 +143,8 @@ class _Converter:
         try:
             if isinstance(node, ScalarNode):
                 return self._scalar(node, place)
+            if not isinstance(node, ScalarNode) and not str(node.tag).endswith((":seq", ":map")):
+                self._faults.add(place, f"the tag {node.tag} cannot be used here")
             if isinstance(node, SequenceNode):
                 return Sequence(tuple(self._node(item) for item in node.value), place)
             return self._mapping(node, place)
@@ -161,8 +163,6 @@ class _Converter:
         return Scalar(None, place)
 
     def _mapping(self, node: Any, place: Place) -> Mapping:
-        if not isinstance(node, MappingNode) or not str(node.tag).endswith(":map"):
-            self._faults.add(place, f"the tag {node.tag} cannot be used here")
         entries: dict[str, Node] = {}
         keys: dict[str, Place] = {}
         merged: list[Mapping] = []

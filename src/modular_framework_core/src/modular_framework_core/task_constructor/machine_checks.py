@@ -2,12 +2,17 @@
 """Checks how the states of a machine are linked: transitions, outcome maps, reachability, userdata."""
 from __future__ import annotations
 
+import difflib
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
+
+MISSPELT = 0.75
+"""An io key that only one state uses counts as misspelt when it is this similar to a key of a template (0 to 1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +22,7 @@ class ChildLinks:
     Attributes:
         label: the child's name.
         outcomes: what it may end with; None when that could not be found out.
-        transitions: outcome -> target; None when it has no ``transitions``.
+        transitions: outcome -> target; None when they could not be read.
         keys: place of each key of ``transitions``.
         place: where the child is defined.
     """
@@ -29,17 +34,29 @@ class ChildLinks:
     place: Place
 
 
-def check_sequential(children: list[ChildLinks], outcomes: tuple[str, ...], faults: FaultList) -> None:
-    """Check the transitions of the children of a state machine."""
-    targets = [child.label for child in children] + list(outcomes)
+def check_sequential(
+    children: list[ChildLinks], labels: list[str], outcomes: tuple[str, ...] | None, faults: FaultList
+) -> None:
+    """Check the transitions of the children of a state machine.
+
+    Args:
+        children: the children that could be read.
+        labels: the labels of all children, those that could not be read included.
+        outcomes: outcomes of the machine; None when they could not be read, which leaves targets unchecked.
+        faults: where faults are noted.
+    """
+    targets = [*labels, *(outcomes or ())]
+    before = len(faults)
     for child in children:
         transitions = child.transitions or {}
         for outcome, target in transitions.items():
             if child.outcomes is not None and outcome not in child.outcomes:
                 faults.add_unknown(child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes)
-            if target.value not in targets:
+            if outcomes is not None and target.value not in targets:
                 what = f"state '{child.label}': transition target"
                 faults.add_unknown(target.place, what, str(target.value), targets)
+        if child.transitions is None or outcomes is None:
+            continue
         missing = [name for name in child.outcomes or () if name not in transitions and name not in outcomes]
         if missing:
             faults.add(
@@ -47,14 +64,14 @@ def check_sequential(children: list[ChildLinks], outcomes: tuple[str, ...], faul
                 f"state '{child.label}': no transition for {', '.join(map(repr, missing))}; "
                 f"add it to transitions, leading to one of: {', '.join(targets)}",
             )
-    _check_reachable(children, faults)
+    all_clear = len(faults) == before and len(children) == len(labels)
+    if all_clear and all(child.transitions is not None for child in children):
+        _check_reachable(children, faults)
 
 
 def _check_reachable(children: list[ChildLinks], faults: FaultList) -> None:
-    """Note states no chain of transitions leads to; says nothing while transitions are unclear."""
+    """Note states no chain of transitions leads to."""
     by_label = {child.label: child for child in children}
-    if any(child.transitions is None for child in children) and len(children) > 1:
-        return
     reached: set[str] = set()
     waiting = [children[0].label] if children else []
     while waiting:
@@ -127,7 +144,7 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
         return
     members = list(_members(machine))
     available = {*machine.template.userdata, *machine.input_keys}
-    exchanged: set[str] = set()
+    exchanged: Counter[str] = Counter()
     for state in members:
         for key in ("output_keys", "io_keys"):
             known = _keys(state, key)
@@ -136,7 +153,10 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
             (available if key == "output_keys" else exchanged).update(known)
     for child in _nested(machine):
         available.update(child.output_keys)
-    available |= {key for key in exchanged if key not in provided_by}
+    for key, users in exchanged.items():
+        misspelt = users == 1 and difflib.get_close_matches(key, list(provided_by), n=1, cutoff=MISSPELT)
+        if key not in provided_by and not misspelt:
+            available.add(key)
     for state in members:
         needed = dict.fromkeys([*(_keys(state, "input_keys") or ()), *(_keys(state, "io_keys") or ())])
         for key in needed:

@@ -79,20 +79,22 @@ class TaskBuilder:
 
     # ---- machines ------------------------------------------------------------------------------------------
     def _machine(
-        self, label: str, header: Mapping, scope: ParamsScope, parent: MachineSpec | str | None
+        self, label: str, header: Mapping, scope: ParamsScope, parent: str | None
     ) -> MachineSpec | None:
-        """Build a machine from its header, whose references are resolved, and its states."""
+        """Build a machine from its header, whose references are resolved; ``parent`` is the class name around it."""
         template = self._template(header, label)
-        outcomes = self._outcomes(header)
-        type_name = self._unique_type(header, label, parent if isinstance(parent, str) else None)
-        children, links = self._children(header, scope, type_name, outcomes)
+        known_outcomes = self._outcomes(header)
+        outcomes = known_outcomes or ()
+        type_name = self._unique_type(header, label, parent)
+        entries, labels = self._child_entries(header)
+        children, links = self._children(entries, scope, type_name, outcomes)
         if template is None:
             return None
         self._check_header_keys(header, template, is_root=parent is None, label=label)
         if template.concurrent:
             machine_checks.check_concurrent(links, self._faults)
         else:
-            machine_checks.check_sequential(links, outcomes, self._faults)
+            machine_checks.check_sequential(links, labels, known_outcomes, self._faults)
         return MachineSpec(
             label=label,
             template=template,
@@ -137,10 +139,11 @@ class TaskBuilder:
             self._faults.add_unknown(node.place, "template", name, self._templates.names())
         return template
 
-    def _outcomes(self, header: Mapping) -> tuple[str, ...]:
+    def _outcomes(self, header: Mapping) -> tuple[str, ...] | None:
+        """Return the outcomes of a machine; None when they are there and wrong."""
         if "outcomes" not in header.entries:
             return DEFAULT_OUTCOMES
-        return header_fields.names(header.entries["outcomes"], "outcomes", self._faults) or DEFAULT_OUTCOMES
+        return header_fields.names(header.entries["outcomes"], "outcomes", self._faults)
 
     def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
         """Return a class name no other machine and no state of the task has."""
@@ -181,8 +184,10 @@ class TaskBuilder:
         self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...]
     ) -> str | None:
         node = header.entries.get("default_outcome")
-        if not template.concurrent or node is None:
-            return outcomes[-1] if template.concurrent else None
+        if not template.concurrent or not outcomes:
+            return None
+        if node is None:
+            return outcomes[-1]
         name = header_fields.text(node, "default_outcome", self._faults)
         if name is not None and name not in outcomes:
             self._faults.add_unknown(node.place, "default_outcome", name, outcomes)
@@ -192,7 +197,7 @@ class TaskBuilder:
         self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...], links: list[ChildLinks]
     ) -> dict[str, dict[str, str]]:
         node = header.entries.get("outcome_map")
-        if not template.concurrent or node is None:
+        if not template.concurrent or node is None or not outcomes:
             return {}
         return machine_checks.check_outcome_map(node, outcomes, links, self._faults)
 
@@ -203,12 +208,12 @@ class TaskBuilder:
 
     # ---- children ------------------------------------------------------------------------------------------
     def _children(
-        self, header: Mapping, scope: ParamsScope, parent_type: str, outcomes: tuple[str, ...]
+        self, entries: list[tuple[str, Place, Mapping]], scope: ParamsScope, parent_type: str, outcomes: tuple[str, ...]
     ) -> tuple[list[ChildSpec], list[ChildLinks]]:
         specs: list[ChildSpec] = []
         links: list[ChildLinks] = []
         first_lines: dict[str, int] = {}
-        for label, place, body in self._child_entries(header):
+        for label, place, body in entries:
             header_fields.label(label, place, self._faults)
             if label in first_lines:
                 self._faults.add(place, f"the label '{label}' is given twice; first in line {first_lines[label]}")
@@ -222,16 +227,17 @@ class TaskBuilder:
                 specs.append(spec)
         return specs, links
 
-    def _child_entries(self, header: Mapping) -> list[tuple[str, Place, Mapping]]:
-        """Return label, place and content of each entry of ``states``."""
+    def _child_entries(self, header: Mapping) -> tuple[list[tuple[str, Place, Mapping]], list[str]]:
+        """Return label, place and content of each entry of ``states`` that can be read, and the labels of all."""
         node = header.entries.get("states")
         if node is None:
-            return []
+            return [], []
         if not isinstance(node, Sequence) or not node.items:
             found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
             self._faults.add(node.place, f"states must be a list of '- Label: {{source: ...}}', found {found}")
-            return []
-        result: list[tuple[str, Place, Mapping]] = []
+            return [], []
+        entries: list[tuple[str, Place, Mapping]] = []
+        labels: list[str] = []
         for item in node.items:
             if not isinstance(item, Mapping):
                 self._faults.add(item.place, f"a state must be '- Label: {{source: ...}}', found {kind_of(item)}")
@@ -243,12 +249,13 @@ class TaskBuilder:
                     "and its options are indented below the label",
                 )
             for label, body in item.entries.items():
-                if isinstance(body, Mapping):
-                    result.append((label, item.keys[label], body))
+                labels.append(label)
+                if isinstance(body, Mapping) and (len(item.entries) == 1 or "source" in body.entries):
+                    entries.append((label, item.keys[label], body))
                 elif len(item.entries) == 1:
                     message = f"state '{label}' must be a mapping with 'source', found {kind_of(body)}"
-                    self._faults.add(body.place, message)
-        return result
+                    self._faults.add(item.keys[label], message)
+        return entries, list(dict.fromkeys(labels))
 
     def _child(
         self, label: str, place: Place, body: Mapping, outer: ParamsScope, parent_type: str
@@ -263,7 +270,7 @@ class TaskBuilder:
             outcomes = None if spec is None else spec.outcomes
         else:
             spec, outcomes = self._state(label, place, body, scope)
-        transitions = None
+        transitions: dict[str, Scalar] | None = {}
         keys: dict[str, Place] = {}
         node = body.entries.get("transitions")
         if node is not None:

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A small world for tests of the task constructor: a folder of states, the shipped templates, and one valid task."""
+from __future__ import annotations
+
+from pathlib import Path
+
+from modular_framework_core.task_constructor import generator, located_yaml
+from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
+from modular_framework_core.task_constructor.task_builder import TaskBuilder
+from modular_framework_core.task_constructor.task_spec import TaskSpec
+from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
+
+TEMPLATES = Path(__file__).parents[3] / "src" / "modular_framework_core" / "templates"
+
+STATE_FILES = {
+    "plan": '''
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Plan(FrameworkState):
+    """Plans."""
+
+    def __init__(self, target, plan_name="", speed=0.5, outcomes=("success", "fail"), input_keys=(),
+                 output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self.target, self.plan_name, self.speed = target, plan_name, speed
+
+    def execute(self, userdata):
+        return self.fail("no way") if self.target == "nowhere" else self.succeed()
+''',
+    "move": '''
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Move(FrameworkState):
+    def execute(self, userdata):
+        return self.succeed()
+''',
+    "use_arm": '''
+from modular_framework_core.framework_state import FrameworkState
+
+
+class UseArm(FrameworkState):
+    def __init__(self, outcomes=("success", "fail"), io_keys=("arm_commander",)):
+        super().__init__(outcomes, (), (), io_keys)
+''',
+    "remember": '''
+import smach
+
+
+class Remember(smach.State):
+    def __init__(self, outcomes=["success", "fail"], **options):
+        smach.State.__init__(self, outcomes=outcomes, io_keys=["notes"])
+        self.options = options
+        self.outcomes = outcomes
+
+    def execute(self, userdata):
+        userdata.notes = [*(userdata.notes if "notes" in userdata else []), self.options]
+        return self.outcomes[0]
+''',
+    "broken_file": "class BrokenFile(:\n",
+    "wrong_class": "class Wrongclass:\n    pass\n",
+}
+
+GOOD_TASK = """\
+name: tiny
+source: state_machine
+outcomes: [done, gave_up]
+states:
+  - A:
+      source: plan
+      target: home
+      transitions: {success: B, fail: gave_up}
+  - B:
+      source: move
+      transitions: {success: done, fail: gave_up}
+"""
+
+
+def write_states(folder: Path) -> Path:
+    """Write the state files and return their folder."""
+    states = folder / "own_states"
+    states.mkdir(exist_ok=True)
+    for name, text in STATE_FILES.items():
+        (states / f"{name}.py").write_text(text)
+    return states
+
+
+class World:
+    """Builds and generates tasks from text."""
+
+    def __init__(self, folder: Path, *templates: Path) -> None:
+        self.folder = folder
+        self.states = StateCatalogue([write_states(folder)])
+        self.template_folders = [*templates, TEMPLATES]
+        self.templates = TemplateCatalogue(self.template_folders)
+
+    def build(self, text: str) -> TaskSpec:
+        """Check a task; its file is called t.yaml in messages."""
+        return TaskBuilder(self.states, self.templates).build(located_yaml.loads(text, "t.yaml"), "t.yaml")
+
+    def faults(self, text: str) -> list[str]:
+        """Return the messages about a task, one a fault; none for a valid one."""
+        try:
+            self.build(text)
+        except TaskFault as error:
+            return [str(fault) for fault in error.faults]
+        return []
+
+    def generate(self, text: str) -> str:
+        """Return the module of a task."""
+        return generator.generate(self.build(text), self.template_folders)
+
+    def write(self, text: str) -> Path:
+        """Write the module of a task and return its path."""
+        return generator.write(self.build(text), self.generate(text), self.folder / "generated")

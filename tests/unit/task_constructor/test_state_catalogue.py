@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""States are found in folders and read without being run."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSourceError, class_name_of
+
+
+def catalogue(folder: Path, **files: str) -> StateCatalogue:
+    for name, text in files.items():
+        (folder / f"{name}.py").write_text(text)
+    return StateCatalogue([folder])
+
+
+@pytest.mark.parametrize(("file", "name"), [("plan", "Plan"), ("wait_for_signal", "WaitForSignal")])
+def test_the_class_name_is_the_camel_case_of_the_file_name(file: str, name: str) -> None:
+    assert class_name_of(file) == name
+
+
+def test_reading_a_state_does_not_run_its_file(tmp_path: Path) -> None:
+    text = "open('/nowhere/at/all')\nclass Plan:\n    def __init__(self, a, b=1): pass\n"
+    source = catalogue(tmp_path, plan=text).get("plan")
+    assert list(source.options) == ["a", "b"]
+    assert [option.required for option in source.options.values()] == [True, False]
+
+
+def test_defaults_that_are_literals_are_known_and_others_are_not(tmp_path: Path) -> None:
+    text = "class Plan:\n    def __init__(self, *, outcomes=('a', 'b'), io_keys=KEYS, output_keys=None): pass\n"
+    source = catalogue(tmp_path, plan=text).get("plan")
+    assert source.default_names("outcomes") == ("a", "b")
+    assert source.default_names("io_keys") is None
+    assert source.default_names("output_keys") == ()
+    assert source.default_names("input_keys") == ()
+
+
+def test_a_state_without_constructor_has_that_of_its_base(tmp_path: Path) -> None:
+    source = catalogue(tmp_path, plan="class Plan(FrameworkState):\n    pass\n").get("plan")
+    assert source.default_names("outcomes") == ("success", "fail")
+    text = "class Base:\n    def __init__(self, a=1): pass\nclass Plan(Base):\n    pass\n"
+    assert list(catalogue(tmp_path, plan=text).get("plan").options) == ["a"]
+
+
+def test_a_base_from_elsewhere_leaves_the_options_open(tmp_path: Path) -> None:
+    source = catalogue(tmp_path, plan="import x\nclass Plan(x.Y):\n    pass\n").get("plan")
+    assert source.takes_any_option
+    assert source.default_names("outcomes") is None
+
+
+def test_files_that_begin_with_an_underscore_are_no_states(tmp_path: Path) -> None:
+    assert catalogue(tmp_path, __init__="", _base="", plan="").names() == ["plan"]
+
+
+def test_the_first_folder_that_has_a_name_wins(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "plan.py").write_text(f"class Plan:\n    def __init__(self, {folder}): pass\n")
+    (tmp_path / "two" / "move.py").write_text("class Move: pass\n")
+    found = StateCatalogue([tmp_path / "one", tmp_path / "two"])
+    assert found.names() == ["move", "plan"]
+    assert list(found.get("plan").options) == ["one"]
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="states directory .*gone is not a directory"):
+        StateCatalogue([tmp_path / "gone"])
+
+
+def test_a_file_without_the_class_says_which_classes_it_has(tmp_path: Path) -> None:
+    with pytest.raises(StateSourceError, match="must define the class Plan .* it defines: no class"):
+        catalogue(tmp_path, plan="").get("plan")
