@@ -89,3 +89,12 @@ def test_a_receiver_that_was_started_again_is_told_everything() -> None:
     changes = told(snapshot(0.0, held_at=-1.0))
     changes.forget()
     assert changes.towards(snapshot(0.0, held_at=-1.0)) == [Attach(CUBE, LINK, "palm", at(1.0))]
+
+
+def test_an_object_that_vanished_while_the_receiver_was_in_doubt_is_removed() -> None:
+    changes = told(snapshot(0.0))
+    changes.towards(snapshot(0.1))
+    changes.forget()
+    assert changes.towards(snapshot(None)) == [Remove(CUBE)]
+    changes.confirm()
+    assert changes.towards(snapshot(None)) == []

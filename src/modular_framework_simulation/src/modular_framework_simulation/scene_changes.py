@@ -90,9 +90,14 @@ class SceneChanges:
         self._rotation_rad = rotation_rad
         self._shown: dict[ObjectKey, _Shown] = {}
         self._pending: dict[ObjectKey, _Shown] = {}
+        self._doubtful: set[ObjectKey] = set()
 
     def forget(self) -> None:
-        """Takes it that the receiver knows nothing, for instance because it was started again."""
+        """Takes it that what the receiver knows is uncertain: it was started again, or refused a change.
+
+        It will be told everything; objects that it may still have, but the world no longer has, are removed.
+        """
+        self._doubtful |= self._shown.keys() | self._pending.keys()
         self._shown = {}
 
     def towards(self, snapshot: WorldSnapshot) -> list[Change]:
@@ -103,7 +108,7 @@ class SceneChanges:
         """
         wanted = _wanted(snapshot)
         self._pending = dict(self._shown)
-        changes: list[Change] = []
+        changes: list[Change] = [Remove(key) for key in sorted(self._doubtful - wanted.keys())]
         for key, shown in self._shown.items():
             if key not in wanted or wanted[key].shown.instance != shown.instance:
                 changes += [Detach(key, shown.carrier_link)] if shown.carrier_link is not None else []
@@ -116,6 +121,7 @@ class SceneChanges:
     def confirm(self) -> None:
         """Notes that the receiver took the changes of the last `towards`."""
         self._shown = self._pending
+        self._doubtful = set()
 
     def _change_of(self, key: ObjectKey, want: _Wanted) -> list[Change]:
         before, now = self._pending.get(key), want.shown

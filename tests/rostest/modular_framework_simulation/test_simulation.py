@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The simulation as its users see it on the wire: clock, controllers, Gazebo's services and topics, planning scene."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import actionlib
+import pytest
+import rospy
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from gazebo_msgs.msg import LinkStates, ModelState, ModelStates
+from gazebo_msgs.srv import (
+    DeleteModel,
+    GetLinkState,
+    GetModelProperties,
+    GetModelState,
+    GetPhysicsProperties,
+    GetWorldProperties,
+    SetModelState,
+    SpawnModel,
+)
+from geometry_msgs.msg import Point, Pose, Quaternion
+from moveit_msgs.msg import CollisionObject
+from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneResponse
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+LAUNCH = """<launch>
+  <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
+  <include file="$(find modular_framework_simulation)/launch/simulation.launch">
+    <arg name="world_file" value="$(find modular_framework_description)/worlds/ur5_setup.world"/>
+    <arg name="model_path" value="$(find modular_framework_description)/models"/>
+    <arg name="starting_pose" value="-J shoulder_pan_joint 1.57 -J shoulder_lift_joint -1.57 -J elbow_joint 1.57
+      -J wrist_1_joint -1.57 -J wrist_2_joint -1.57"/>
+  </include>
+  <node name="spawner" pkg="modular_framework_core" type="robot_controllers_spawner"
+        args="ur5_ezgripper_robot ur5_ezgripper_controller_simulation.yaml"/>
+</launch>"""
+
+ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
+START = [1.57, -1.57, 1.57, -1.57, -1.57, 0.0]
+BALL = """<sdf version="1.6"><model name="ball"><link name="link"><inertial><mass>0.1</mass><inertia><ixx>4e-5</ixx>
+  <iyy>4e-5</iyy><izz>4e-5</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.03</radius>
+  </sphere></geometry></collision></link></model></sdf>"""
+
+
+class FakePlanningScene:
+    """Stands where move_group does: keeps what it was told."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.objects: dict[str, Any] = {}
+        self.poses: dict[str, Any] = {}
+        self.refuse = False
+        self.service = rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply)
+
+    def apply(self, request: Any) -> ApplyPlanningSceneResponse:
+        if self.refuse:
+            return ApplyPlanningSceneResponse(False)
+        with self.lock:
+            for item in request.scene.world.collision_objects:
+                if item.operation == CollisionObject.REMOVE:
+                    self.objects.pop(item.id, None)
+                    continue
+                if item.operation == CollisionObject.ADD:
+                    self.objects[item.id] = item
+                self.poses[item.id] = item.pose.position
+        return ApplyPlanningSceneResponse(True)
+
+
+def call(name: str, kind: Any, *values: Any, **fields: Any) -> Any:
+    rospy.wait_for_service(name, 20.0)
+    return rospy.ServiceProxy(name, kind)(*values, **fields)
+
+
+def eventually(what: str, true: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    end = time.monotonic() + timeout_s
+    while not true():
+        assert time.monotonic() < end, f"{what}: not within {timeout_s} s"
+        time.sleep(0.02)
+
+
+def spawn(name: str, x: float, y: float, z: float, frame: str = "world", xml: str = BALL) -> Any:
+    pose = Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))
+    return call("/gazebo/spawn_sdf_model", SpawnModel, name, xml, "", pose, frame)
+
+
+@pytest.fixture(scope="module")
+def simulation(ros_launch: Callable[..., Any]) -> Iterator[Any]:
+    session = ros_launch(LAUNCH)
+    session.wait_for_service("/gazebo/get_world_properties", 40.0)
+    yield session
+
+
+def test_the_clock_runs_at_a_hundred_hertz_of_simulated_time_and_in_real_time(simulation: Any) -> None:
+    stamps: list[float] = []
+    begin = time.monotonic()
+    subscriber = rospy.Subscriber("/clock", Clock, lambda message: stamps.append(message.clock.to_sec()))
+    eventually("two seconds of clock", lambda: len(stamps) > 200, 15.0)
+    subscriber.unregister()
+    assert time.monotonic() - begin < 8.0
+    steps = [b - a for a, b in zip(stamps[10:], stamps[11:], strict=False)]
+    assert sum(steps) / len(steps) == pytest.approx(0.01, abs=0.0005)
+
+
+def test_the_world_holds_the_models_of_the_file_and_the_robot(simulation: Any) -> None:
+    answer = call("/gazebo/get_world_properties", GetWorldProperties)
+    assert answer.success
+    assert {"table", "wood_block", "can", "l_bracket", "ur5_with_ezgripper"} <= set(answer.model_names)
+    table = call("/gazebo/get_model_properties", GetModelProperties, "table")
+    assert (table.success, table.is_static) == (True, True)
+    physics = call("/gazebo/get_physics_properties", GetPhysicsProperties)
+    assert (physics.pause, physics.gravity.z) == (False, -9.81)
+
+
+def test_the_robot_starts_at_its_pose_and_follows_a_trajectory(simulation: Any) -> None:
+    action = "/arm_trajectory_controller/follow_joint_trajectory"
+    client = actionlib.SimpleActionClient(action, FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(20))
+    state = rospy.wait_for_message("/joint_states", JointState, 20.0)
+    positions = dict(zip(state.name, state.position, strict=True))
+    assert [positions[name] for name in ARM] == pytest.approx(START, abs=0.001)
+    assert len(positions) == 10
+    goal = FollowJointTrajectoryGoal()
+    goal.trajectory.joint_names = ARM
+    target = [1.0, -1.6, 1.5, -1.5, -1.5, 0.5]
+    goal.trajectory.points = [JointTrajectoryPoint(positions=target, time_from_start=rospy.Duration(1.5))]
+    client.send_goal_and_wait(goal, rospy.Duration(20))
+    assert client.get_result().error_code == 0
+    state = rospy.wait_for_message("/joint_states", JointState, 20.0)
+    positions = dict(zip(state.name, state.position, strict=True))
+    assert [positions[name] for name in ARM] == pytest.approx(target, abs=0.01)
+
+
+def test_a_model_is_spawned_in_a_frame_read_put_elsewhere_and_deleted(simulation: Any) -> None:
+    assert spawn("ball", 0.3, 0.1, 1.5, "table").success
+    state = call("/gazebo/get_model_state", GetModelState, "ball", "table")
+    assert (state.success, state.header.frame_id) == (True, "table")
+    assert (state.pose.position.x, state.pose.position.y) == pytest.approx((0.3, 0.1), abs=0.005)
+    wanted = ModelState("ball", Pose(Point(0, 0, 0.5), Quaternion(0, 0, 0, 1)), state.twist, "wood_block::link")
+    assert call("/gazebo/set_model_state", SetModelState, wanted).success
+    state = call("/gazebo/get_model_state", GetModelState, "ball", "wood_block")
+    assert state.pose.position.z == pytest.approx(0.5, abs=0.2)
+    link = call("/gazebo/get_link_state", GetLinkState, "ball::link", "world")
+    assert (link.success, link.link_state.reference_frame) == (True, "world")
+    assert call("/gazebo/delete_model", DeleteModel, "ball").success
+    assert not call("/gazebo/get_model_state", GetModelState, "ball", "").success
+
+
+def test_a_model_can_be_put_elsewhere_by_topic(simulation: Any) -> None:
+    assert spawn("ball", 1.0, -1.0, 0.1).success
+    publisher = rospy.Publisher("/gazebo/set_model_state", ModelState, queue_size=1)
+    eventually("a subscriber of set_model_state", lambda: publisher.get_num_connections() > 0)
+    publisher.publish(ModelState("nothing", Pose(), None, ""))
+    publisher.publish(ModelState(model_name="ball", pose=Pose(Point(2.0, -1.0, 0.1), Quaternion(0, 0, 0, 1))))
+    try:
+        read = lambda: call("/gazebo/get_model_state", GetModelState, "ball", "").pose.position.x  # noqa: E731
+        eventually("the ball at its new place", lambda: abs(read() - 2.0) < 0.05)
+    finally:
+        call("/gazebo/delete_model", DeleteModel, "ball")
+
+
+@pytest.mark.parametrize(
+    ("request_it", "said"),
+    [
+        (lambda: spawn("table", 0, 0, 1), "'table' is already"),
+        (lambda: spawn("x", 0, 0, 1, xml="<sdf version='1.6'><model name='x'/></sdf>"), "no <link>"),
+        (lambda: spawn("x", 0, 0, 1, xml="rubbish"), "well-formed"),
+        (lambda: spawn("x", 0, 0, 1, "nowhere"), "no model 'nowhere'"),
+        (lambda: spawn("x", 0, 0, float("nan")), "not finite"),
+        (lambda: call("/gazebo/delete_model", DeleteModel, "mug"), "no model 'mug'"),
+        (lambda: call("/gazebo/delete_model", DeleteModel, "ur5_with_ezgripper"), "the robot"),
+        (lambda: call("/gazebo/get_link_state", GetLinkState, "table::lid", ""), "no link 'table::lid'"),
+        (lambda: call("/gazebo/set_model_state", SetModelState, ModelState(model_name="mug")), "no model 'mug'"),
+    ],
+)
+def test_a_wrong_request_is_answered_with_the_reason(simulation: Any, request_it: Callable[[], Any], said: str) -> None:
+    answer = request_it()
+    assert not answer.success
+    assert said in answer.status_message
+
+
+def test_states_of_models_and_links_are_published(simulation: Any) -> None:
+    models = rospy.wait_for_message("/gazebo/model_states", ModelStates, 10.0)
+    links = rospy.wait_for_message("/gazebo/link_states", LinkStates, 10.0)
+    height = models.pose[models.name.index("wood_block")].position.z
+    assert height == pytest.approx(0.89, abs=0.002)
+    assert "ur5_with_ezgripper::eg_manipulator" in links.name
+    assert rospy.wait_for_message("/gazebo/grasped_object", String, 10.0).data == ""
+
+
+def test_time_stands_still_while_paused(simulation: Any) -> None:
+    call("/gazebo/pause_physics", Empty)
+    try:
+        before = call("/gazebo/get_world_properties", GetWorldProperties).sim_time
+        assert spawn("ball", 1.0, -1.0, 1.0).success
+        time.sleep(0.3)
+        assert call("/gazebo/get_world_properties", GetWorldProperties).sim_time == before
+        assert call("/gazebo/get_model_state", GetModelState, "ball", "").pose.position.z == 1.0
+    finally:
+        call("/gazebo/unpause_physics", Empty)
+    fallen = lambda: call("/gazebo/get_model_state", GetModelState, "ball", "").pose.position.z < 0.9  # noqa: E731
+    eventually("the ball to fall", fallen)
+    call("/gazebo/delete_model", DeleteModel, "ball")
+
+
+def test_reset_world_puts_models_and_robot_back_and_controllers_go_on(simulation: Any) -> None:
+    away = ModelState(model_name="can", pose=Pose(Point(0.2, 0.7, 1.2), Quaternion(0, 0, 0, 1)))
+    assert call("/gazebo/set_model_state", SetModelState, away).success
+    call("/gazebo/reset_world", Empty)
+    state = call("/gazebo/get_model_state", GetModelState, "can", "")
+    assert (state.pose.position.x, state.pose.position.y) == pytest.approx((0.27, 0.45), abs=0.005)
+    rospy.sleep(0.5)
+    joints = rospy.wait_for_message("/joint_states", JointState, 10.0)
+    positions = dict(zip(joints.name, joints.position, strict=True))
+    assert [positions[name] for name in ARM] == pytest.approx(START, abs=0.002)
+
+
+def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -> None:
+    scene = FakePlanningScene()
+    try:
+        expected = {"table__link", "wood_block__link", "can__link", "l_bracket__link", "ground_plane__link"}
+        eventually("the objects of the world", lambda: expected <= scene.objects.keys())
+        block = scene.objects["wood_block__link"]
+        assert block.header.frame_id == "world"
+        assert list(block.primitives[0].dimensions) == pytest.approx([0.05, 0.05, 0.1])
+        assert len(scene.objects["ground_plane__link"].planes) == 1
+        assert spawn("ball", 0.25, 0.65, 0.88).success
+        eventually("the new ball", lambda: "ball__link" in scene.objects)
+        away = ModelState(model_name="ball", pose=Pose(Point(-0.2, 0.7, 0.88), Quaternion(0, 0, 0, 1)))
+        assert call("/gazebo/set_model_state", SetModelState, away).success
+        eventually("the moved ball", lambda: abs(scene.poses["ball__link"].x + 0.2) < 0.02)
+        scene.refuse = True
+        assert call("/gazebo/delete_model", DeleteModel, "ball").success
+        time.sleep(0.5)
+        scene.refuse = False
+        eventually("the ball to vanish", lambda: "ball__link" not in scene.objects)
+    finally:
+        scene.service.shutdown("test")
+
+
+def test_the_node_survived_all_this(simulation: Any) -> None:
+    assert simulation.alive(), simulation.log()
