@@ -2,6 +2,9 @@
 """Lets a task say what the manipulator may touch while the next motions are planned."""
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import rospy
 from moveit_msgs.msg import PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
@@ -29,8 +32,9 @@ class AllowManipulatorCollisions(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, allow, collision_type="", objects=(), outcomes=("success", "fail"), input_keys=(),
-                 output_keys=(), io_keys=()):
+    def __init__(self, allow: bool, collision_type: str = "", objects: Sequence[str] | str = (),
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if collision_type not in MODIFICATIONS:
             raise ValueError(f"AllowManipulatorCollisions: collision_type is '{collision_type}', allowed are "
@@ -38,7 +42,7 @@ class AllowManipulatorCollisions(FrameworkState):
         self._request = GetModifiedACMRequest(modification=MODIFICATIONS[collision_type], allow_collision=bool(allow),
                                               objects=[objects] if isinstance(objects, str) else list(objects))
 
-    def execute(self, userdata):
+    def execute(self, userdata: Any) -> str:
         """Fetches the changed matrix and applies it."""
         get_matrix = rospy.ServiceProxy("get_modified_acm", GetModifiedACM)
         apply_scene = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)

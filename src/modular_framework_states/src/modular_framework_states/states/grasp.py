@@ -2,6 +2,9 @@
 """Lets a task open, close or keep the manipulator as a grasp message says."""
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.msg import GraspCommand, GraspGoal
 from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result
@@ -28,14 +31,16 @@ class Grasp(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, grasp_type, grasp_name="", timeout=60.0, outcomes=("success", "fail"), input_keys=(),
-                 output_keys=(), io_keys=("manipulator_controller_client", "max_torque")):
+    def __init__(self, grasp_type: str, grasp_name: str = "", timeout: float = 60.0,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (),
+                 io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if grasp_type not in GRASP_STATES:
             raise ValueError(f"Grasp: grasp_type is '{grasp_type}', allowed are {list(GRASP_STATES)}")
         self._type, self._name, self._timeout_s = grasp_type, grasp_name, float(timeout)
 
-    def execute(self, userdata):
+    def execute(self, userdata: Any) -> str:
         """Sends the goal and waits for its end."""
         client = userdata.manipulator_controller_client
         if client is None:
@@ -56,7 +61,7 @@ class Grasp(FrameworkState):
         text = client.get_goal_status_text() or f"the server answered status {status} and no reason"
         return self.fail(f"{self._type} of grasp '{grasp.grasp_id}' was not reached: {text}")
 
-    def _grasp(self, userdata):
+    def _grasp(self, userdata: Any) -> Any:
         if "selected_grasp" not in self.get_registered_input_keys():
             return fetch("grasp", self._name)
         if userdata.selected_grasp is None:

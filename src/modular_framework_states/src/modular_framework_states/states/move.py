@@ -2,6 +2,9 @@
 """Lets a task execute a plan, and makes sure that the arm got where the plan ends."""
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_states.manager_clients import ManagerError, fetch
 
@@ -22,13 +25,14 @@ class Move(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, plan_name="", start_tolerance=0.02, goal_tolerance=0.03, outcomes=("success", "fail"),
-                 input_keys=(), output_keys=(), io_keys=("arm_commander",)):
+    def __init__(self, plan_name: str = "", start_tolerance: float = 0.02, goal_tolerance: float = 0.03,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._plan_name = plan_name
         self._start_tolerance, self._goal_tolerance = float(start_tolerance), float(goal_tolerance)
 
-    def execute(self, userdata):
+    def execute(self, userdata: Any) -> str:
         """Executes the plan."""
         commander = userdata.arm_commander
         try:
@@ -57,7 +61,7 @@ class Move(FrameworkState):
                              f"its last point, allowed is {self._goal_tolerance}")
         return self.succeed()
 
-    def _plan(self, userdata):
+    def _plan(self, userdata: Any) -> Any:
         if "selected_plan" not in self.get_registered_input_keys():
             return fetch("plan", self._plan_name)
         if userdata.selected_plan is None:
@@ -65,7 +69,7 @@ class Move(FrameworkState):
         return userdata.selected_plan
 
     @staticmethod
-    def _worst(commander, wanted):
+    def _worst(commander: Any, wanted: Mapping[str, float]) -> tuple[str, float]:
         """Returns the joint farthest from where it should be, and how far it is."""
         current = commander.current_joints()
         distances = {joint: abs(current.get(joint, float("inf")) - position) for joint, position in wanted.items()}

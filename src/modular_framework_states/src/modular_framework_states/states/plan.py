@@ -2,6 +2,9 @@
 """Lets a task plan an arm motion now and execute it later."""
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_states.grasp_stages import StageError, arrival_fingers, near_joints, stage_joints
 from modular_framework_states.manager_clients import GRASP_STAGES, ManagerError, fetch, kind_of, store_plan
@@ -29,9 +32,10 @@ class Plan(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, target_state_type, target_state_name="", plan_name="", starting_state_type="",
-                 starting_state_name="", outcomes=("success", "fail"), input_keys=(), output_keys=(),
-                 io_keys=("arm_commander",)):
+    def __init__(self, target_state_type: str, target_state_name: str = "", plan_name: str = "",
+                 starting_state_type: str = "", starting_state_name: str = "",
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if target_state_type not in STATE_TYPES:
             raise ValueError(f"Plan: target_state_type is '{target_state_type}', allowed are {list(STATE_TYPES)}")
@@ -42,7 +46,7 @@ class Plan(FrameworkState):
         self._start_type, self._start_name = starting_state_type, starting_state_name
         self._plan_name = plan_name
 
-    def execute(self, userdata):
+    def execute(self, userdata: Any) -> str:
         """Plans and stores the plan."""
         try:
             commander = userdata.arm_commander
@@ -62,7 +66,7 @@ class Plan(FrameworkState):
             userdata.selected_plan = result.trajectory
         return self.succeed()
 
-    def _start(self, userdata, commander):
+    def _start(self, userdata: Any, commander: Any) -> dict[str, float] | None:
         """Returns {joint: position} to start from, None for the current state."""
         if not self._start_type:
             return None
@@ -75,7 +79,7 @@ class Plan(FrameworkState):
             case stage:
                 return stage_joints(commander, message, stage) | arrival_fingers(message)
 
-    def _target(self, userdata, commander, start):
+    def _target(self, userdata: Any, commander: Any, start: Mapping[str, float] | None) -> dict[str, float]:
         """Returns {joint: position} to go to."""
         message = self._message(userdata, self._target_type, self._target_name)
         match self._target_type:
@@ -88,7 +92,7 @@ class Plan(FrameworkState):
             case stage:
                 return near_joints(commander, message, stage, start or commander.current_joints())
 
-    def _message(self, userdata, state_type, name):
+    def _message(self, userdata: Any, state_type: str, name: str) -> Any:
         kind = kind_of(state_type)
         if name != FROM_USERDATA:
             return fetch(kind, name)
@@ -102,12 +106,12 @@ class Plan(FrameworkState):
             raise ManagerError(f"userdata '{keys[0]}' is empty; select a message before planning with it")
         return message
 
-    def _describe(self):
+    def _describe(self) -> str:
         start = f"{self._start_type} {self._start_name}".strip() or "the current state"
         return f"plan '{self._plan_name}' from {start} to {self._target_type} {self._target_name}".rstrip()
 
 
-def joint_values(message, name):
+def joint_values(message: Any, name: str) -> dict[str, float]:
     """Returns {joint: position} of a joint state message.
 
     Raises:
@@ -119,7 +123,7 @@ def joint_values(message, name):
     return dict(zip(message.name, message.position, strict=True))
 
 
-def pose_joints(commander, pose, seed):
+def pose_joints(commander: Any, pose: Any, seed: Mapping[str, float] | None) -> dict[str, float]:
     """Returns the joint positions of a pose that are nearest to a seed (None: to the current state).
 
     Raises:

@@ -2,6 +2,9 @@
 """Lets a task choose the message its next states work with."""
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_states.manager_clients import GRASP_STAGES, ManagerError, fetch, kind_of
 
@@ -24,8 +27,9 @@ class Select(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, message_type, message_names=None, outcomes=("success", "fail"), input_keys=(), output_keys=(),
-                 io_keys=()):
+    def __init__(self, message_type: str, message_names: Sequence[str] | str | None = None,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if message_type not in MESSAGE_TYPES:
             raise ValueError(f"Select: message_type is '{message_type}', allowed are {list(MESSAGE_TYPES)}")
@@ -35,7 +39,7 @@ class Select(FrameworkState):
         self._anonymous = not message_names
         self._next = 0
 
-    def execute(self, userdata):
+    def execute(self, userdata: Any) -> str:
         """Takes the next message."""
         if self._key not in self.get_registered_output_keys():
             return self.fail(f"the key '{self._key}' is not among the output keys {sorted(self._output_keys)}; add it, "

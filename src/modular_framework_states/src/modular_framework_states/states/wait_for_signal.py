@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
+from typing import Any
 
 import rospy
 from std_msgs.msg import Bool, String
@@ -27,8 +29,9 @@ class WaitForSignal(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, topic_name, timeout=None, outcomes=("success", "fail"), input_keys=(), output_keys=(),
-                 io_keys=()):
+    def __init__(self, topic_name: str, timeout: float | None = None,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if timeout is not None and not float(timeout) > 0.0:
             raise ValueError(f"WaitForSignal: timeout is {timeout} s, allowed is more than 0, or none for no limit")
@@ -40,7 +43,7 @@ class WaitForSignal(FrameworkState):
         self._subscribers = [rospy.Subscriber(self._topic, Bool, self._on_signal, queue_size=10),
                              rospy.Subscriber(f"{self._topic}/reason", String, self._on_reason, queue_size=10)]
 
-    def execute(self, userdata):
+    def execute(self, userdata: Any) -> str:
         """Waits for a signal that was not read yet."""
         if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
             if self.preempt_requested():
@@ -56,9 +59,9 @@ class WaitForSignal(FrameworkState):
         because = f": {self._explanation}" if self._explanation else ""
         return self.fail(f"topic '{rospy.resolve_name(self._topic)}' signalled failure{because}")
 
-    def _on_signal(self, message):
+    def _on_signal(self, message: Bool) -> None:
         with self._lock:
             self._signal = bool(message.data)
 
-    def _on_reason(self, message):
+    def _on_reason(self, message: String) -> None:
         self._explanation = message.data
