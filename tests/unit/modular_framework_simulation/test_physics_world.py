@@ -39,6 +39,22 @@ def test_a_box_falls_as_newton_says_and_comes_to_rest_on_the_floor(world: Physic
     assert math.dist(body.state().twist.linear, (0, 0, 0)) < 0.01
 
 
+@pytest.mark.parametrize(
+    ("geometry", "height"),
+    [(CUBE, 0.05), (specs.Cylinder(0.03, 0.1), 0.1), (specs.Sphere(0.03), 0.06)],
+)
+def test_an_object_rests_where_its_shape_ends_and_stays_there(
+    world: PhysicsWorld, geometry: specs.Geometry, height: float
+) -> None:
+    world.spawn(solid("table", specs.Box((1, 1, 0.1)), Pose((0, 0, 0.45)), static=True))
+    body = world.spawn(solid("thing", geometry, Pose((0.1, 0, 0.5 + height / 2))))
+    run(world, 0.5)
+    before = body.state().pose
+    assert before.position[2] == pytest.approx(0.5 + height / 2, abs=1e-4)
+    run(world, 4.0)
+    assert before.distance_to(body.state().pose)[0] < 1e-4
+
+
 def test_a_box_slides_on_a_steep_slope_and_sticks_on_a_shallow_one(world: PhysicsWorld) -> None:
     moved = {}
     for name, angle, y in (("shallow", 0.3, 0.0), ("steep", 0.9, 2.0)):

@@ -262,6 +262,8 @@ class PhysicsWorld:
                 restitution=0.0,
                 linearDamping=0.0,
                 angularDamping=0.01,
+                # The engine's default lets cylinders and meshes float a millimetre above what they stand on.
+                collisionMargin=0.0,
                 physicsClientId=self.engine.client,
             )
         for index in body.joint_indices.values():
