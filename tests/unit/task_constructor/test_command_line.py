@@ -57,3 +57,14 @@ def test_a_path_that_is_not_there_gives_1_and_is_named(
 def test_several_directories_are_separated_by_colons() -> None:
     assert directories_from("/a:/b:") == [Path("/a"), Path("/b")]
     assert directories_from("") == []
+
+
+def test_the_frameworks_own_folders_are_taken_when_none_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script = tmp_path / "t.yaml"
+    script.write_text(
+        "name: t\nsource: framework_state_machine\noutcomes: [done, gave_up]\nstates:\n"
+        "  - A: {source: move, plan_name: p, transitions: {success: done, fail: gave_up}}\n"
+    )
+    assert main(["--check", str(script)]) == 0, capsys.readouterr().err

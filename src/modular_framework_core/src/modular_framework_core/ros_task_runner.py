@@ -13,7 +13,6 @@ Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when
 """
 from __future__ import annotations
 
-import importlib.util
 import json
 import signal
 import sys
@@ -24,12 +23,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import rospkg
 import rospy
 from std_msgs.msg import String
 
 import smach
-from modular_framework_core.task_constructor import generator, loading, pipeline
+from modular_framework_core.task_constructor import default_folders, generator, loading, pipeline
 from modular_framework_core.task_constructor.faults import TaskFault
 from modular_framework_core.task_record import StateRecord, TaskRecorder
 from modular_framework_core.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
@@ -216,36 +214,18 @@ def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:
 
 
 def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
-    states = _directories("states_directory", _default_states)
-    templates = _directories("templates_directory", _default_templates)
     try:
+        states = _directories("states_directory", default_folders.states_folder)
+        templates = _directories("templates_directory", default_folders.templates_folder)
         task, path = pipeline.construct_task(script, states, templates, generator.default_output_directory())
-    except (TaskFault, generator.GenerationError, FileNotFoundError, OSError) as error:
+    except (TaskFault, generator.GenerationError, OSError) as error:
         raise TaskNotRun(str(error)) from error
     rospy.loginfo(f"state machine of task '{task.name}' written to {path}")
     return _prepare_machine(path)
 
 
 def _directories(parameter: str, default: Callable[[], Path]) -> list[Path]:
+    """Return the directories of a parameter; the framework's own when it is empty."""
     value = rospy.get_param(f"~{parameter}", "")
     given = [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))
     return given or [default()]
-
-
-def _package(name: str) -> Path:
-    try:
-        return Path(rospkg.RosPack().get_path(name))
-    except rospkg.ResourceNotFound as error:
-        raise TaskNotRun(f"the package {name} is not in ROS_PACKAGE_PATH; source the workspace") from error
-
-
-def _default_templates() -> Path:
-    return _package("modular_framework_core") / "templates"
-
-
-def _default_states() -> Path:
-    """Return the folder of the framework's states, wherever the package is on the Python path."""
-    found = importlib.util.find_spec("modular_framework_states.states")
-    if found is None or not found.submodule_search_locations:
-        raise TaskNotRun("the package modular_framework_states is not on the Python path; source the workspace")
-    return Path(list(found.submodule_search_locations)[0])

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from modular_framework_core.task_constructor import generator
+from modular_framework_core.task_constructor import default_folders, generator
 from modular_framework_core.task_constructor.faults import TaskFault
 from modular_framework_core.task_constructor.generator import GenerationError
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
@@ -56,18 +56,21 @@ def main(arguments: Sequence[str]) -> int:
         description="Checks a task constructor script and writes the state machine it describes.",
     )
     parser.add_argument("script", type=Path, help="the task, a YAML file")
-    parser.add_argument("states", type=directories_from, help="directory of the states; several: separated by ':'")
-    parser.add_argument("templates", type=directories_from, help="directory of the templates; several: by ':'")
+    several = "several are separated by ':'; empty or left out: the framework's"
+    parser.add_argument("states", type=directories_from, nargs="?", help=f"directory of the states; {several}")
+    parser.add_argument("templates", type=directories_from, nargs="?", help=f"directory of the templates; {several}")
     parser.add_argument("output", type=Path, nargs="?", help="directory to write to (default: in $ROS_HOME)")
     parser.add_argument("--check", action="store_true", help="only check; write nothing")
     given = parser.parse_args([argument for argument in arguments if ":=" not in argument])
     try:
+        states = given.states or [default_folders.states_folder()]
+        templates = given.templates or [default_folders.templates_folder()]
         if given.check:
-            task = check_task(given.script, given.states, given.templates)
+            task = check_task(given.script, states, templates)
             print(f"{given.script}: task '{task.name}' is in order, {len(list(task.root.leaf_states()))} states")
         else:
             output = given.output or generator.default_output_directory()
-            _, path = construct_task(given.script, given.states, given.templates, output)
+            _, path = construct_task(given.script, states, templates, output)
             print(path)
     except (TaskFault, GenerationError, FileNotFoundError) as error:
         print(error, file=sys.stderr)
