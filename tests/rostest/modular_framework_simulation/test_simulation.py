@@ -92,10 +92,10 @@ def spawn(name: str, x: float, y: float, z: float, frame: str = "world", xml: st
 
 
 @pytest.fixture(scope="module")
-def simulation(ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("/gazebo/get_world_properties", 40.0)
-    yield session
+def simulation(ros_session: Any) -> Iterator[Any]:
+    launch = ros_session.launch(LAUNCH)
+    ros_session.wait_for_service("/gazebo/get_world_properties", 40.0)
+    yield launch
 
 
 def test_the_clock_runs_at_a_hundred_hertz_of_simulated_time_and_in_real_time(simulation: Any) -> None:
@@ -247,3 +247,9 @@ def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -
 
 def test_the_node_survived_all_this(simulation: Any) -> None:
     assert simulation.alive(), simulation.log()
+
+
+def test_the_node_ends_cleanly_with_its_launch(simulation: Any) -> None:
+    simulation.stop()
+    assert "FATAL" not in simulation.log()
+    assert "Traceback" not in simulation.log()

@@ -40,6 +40,7 @@ _GRASP_RATE_HZ = 50
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30
 _SWITCH_INTERVAL_S = 0.0005
+_STOP_TIMEOUT_S = 5.0
 
 
 class SimulationNode:
@@ -150,6 +151,8 @@ class SimulationNode:
         """
         # Threads that serve messages hand the interpreter back to the loop within this time.
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
+        # Topics close at a shutdown: the loop has to have ended before.
+        rospy.on_shutdown(self._stop_loop)
         self._topics.publish_clock()
         self._thread.start()
         if self._controllers is not None:
@@ -161,12 +164,16 @@ class SimulationNode:
         self.close()
         return 1 if self._failed else 0
 
+    def _stop_loop(self) -> None:
+        self._loop.stop()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=_STOP_TIMEOUT_S)
+
     def close(self) -> None:
         """Ends the loop and gives everything back; may be called twice."""
         self._services.close()
         self._scene.close()
-        self._loop.stop()
-        self._thread.join(timeout=5.0)
+        self._stop_loop()
         if self._controllers is not None:
             self._controllers.close()
             self._controllers = None
