@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from task_folders import GOOD_TASK, World
+from task_folders import GOOD_TASK, TEMPLATES, World
 
 import smach
 from modular_framework_core.task_constructor import loading
@@ -211,3 +211,12 @@ def test_a_faulty_template_is_named(tmp_path: Path, template: str, message: str)
     with pytest.raises(GenerationError, match="polite_machine") as caught:
         world.generate(GOOD_TASK.replace("source: state_machine", "source: polite_machine"))
     assert message in str(caught.value)
+
+
+def test_the_template_in_the_readme_works(tmp_path: Path) -> None:
+    readme = TEMPLATES.parent / "README.md"
+    example = readme.read_text().split("```\n{# userdata: my_key #}")[1].split("```")[0]
+    world = own_world(tmp_path, "{# userdata: my_key #}" + example)
+    made = machine(world, GOOD_TASK.replace("source: state_machine", "source: polite_machine\nmy_key: [1, 2]"))
+    assert made.userdata.my_key == [1, 2]
+    assert made.execute() == "done"

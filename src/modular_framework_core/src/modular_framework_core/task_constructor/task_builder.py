@@ -5,21 +5,15 @@ from __future__ import annotations
 import builtins
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from modular_framework_core.task_constructor import header_fields, located_yaml, machine_checks
 from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.params_scope import ParamsScope, params_of
-from modular_framework_core.task_constructor.state_catalogue import (
-    STATE_KEYS,
-    StateCatalogue,
-    StateSource,
-    StateSourceError,
-    class_name_of,
-)
-from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, StateSpec, TaskSpec
+from modular_framework_core.task_constructor.state_builder import StateBuilder, plain_transitions
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, class_name_of
+from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, TaskSpec
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
 
 DEFAULT_OUTCOMES = ("success", "fail")
@@ -27,7 +21,6 @@ SHARED_USERDATA = "self.userdata"
 _MACHINE_KEYS = ("source", "outcomes", "params", "states", "default_outcome", "outcome_map")
 _ROOT_KEYS = ("name", "node_name", *_MACHINE_KEYS)
 _NESTED_KEYS = ("name", "userdata", "transitions", "input_keys", "output_keys", *_MACHINE_KEYS)
-_STATE_RESERVED = ("source", "params", "transitions")
 
 
 def load_task(script: Path, states: StateCatalogue, templates: TemplateCatalogue) -> TaskSpec:
@@ -52,6 +45,7 @@ class TaskBuilder:
         self._states = states
         self._templates = templates
         self._faults = FaultList()
+        self._state_builder = StateBuilder(states, templates, self._faults)
         self._taken = {class_name_of(name) for name in states.names()} | set(dir(builtins))
 
     def build(self, document: Node, script: str) -> TaskSpec:
@@ -101,7 +95,7 @@ class TaskBuilder:
             type=type_name,
             outcomes=outcomes,
             states=tuple(children),
-            transitions=self._plain_transitions(header),
+            transitions=plain_transitions(header),
             shares_userdata=self._shares_userdata(header),
             default_outcome=self._default_outcome(header, template, outcomes),
             outcome_map=self._outcome_map(header, template, outcomes, links),
@@ -269,7 +263,7 @@ class TaskBuilder:
             spec = self._machine(label, body, scope, parent_type)
             outcomes = None if spec is None else spec.outcomes
         else:
-            spec, outcomes = self._state(label, place, body, scope)
+            spec, outcomes = self._state_builder.build(label, place, body, scope)
         transitions: dict[str, Scalar] | None = {}
         keys: dict[str, Place] = {}
         node = body.entries.get("transitions")
@@ -277,76 +271,6 @@ class TaskBuilder:
             transitions = header_fields.name_map(node, f"state '{label}': transitions", self._faults)
             keys = node.keys if isinstance(node, Mapping) else {}
         return spec, ChildLinks(label, outcomes, transitions, keys, place)
-
-    def _plain_transitions(self, body: Mapping) -> dict[str, str]:
-        node = body.entries.get("transitions")
-        return {} if not isinstance(node, Mapping) else {key: str(value.plain()) for key, value in node.entries.items()}
-
-    # ---- states --------------------------------------------------------------------------------------------
-    def _state(
-        self, label: str, place: Place, body: Mapping, scope: ParamsScope
-    ) -> tuple[StateSpec | None, tuple[str, ...] | None]:
-        source = self._state_source(body, label)
-        if source is None:
-            return None, None
-        given = {key: value for key, value in body.entries.items() if key not in _STATE_RESERVED}
-        options = {**self._options_from_params(label, body, scope, source), **given}
-        what = f"state '{label}' ({source.name}): option"
-        for key in given:
-            if key not in source.options and not (source.takes_any_option and key.isidentifier()):
-                self._faults.add_unknown(body.keys[key], what, key, source.options)
-        for option in source.options.values():
-            if option.required and option.name not in options:
-                self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
-        for key in STATE_KEYS:
-            if key in options:
-                may_be_empty = key != "outcomes"
-                header_fields.names(options[key], f"state '{label}': {key}", self._faults, may_be_empty=may_be_empty)
-        outcomes = self._state_outcomes(options, source)
-        values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
-        return (
-            StateSpec(label, source, source.class_name, values, outcomes or (), self._plain_transitions(body), place),
-            outcomes,
-        )
-
-    def _state_source(self, body: Mapping, label: str) -> StateSource | None:
-        node = body.entries.get("source")
-        name = None if node is None else header_fields.text(node, f"state '{label}': source", self._faults)
-        if node is None or name is None:
-            return None
-        found = self._states.resolve(name)
-        if found is None:
-            if self._templates.get(name) is not None:
-                self._faults.add(node.place, f"'{label}' uses the template '{name}' but has no 'states'")
-            else:
-                self._faults.add_unknown(node.place, f"state '{label}': source", name, self._states.names())
-            return None
-        try:
-            return self._states.get(found)
-        except StateSourceError as error:
-            self._faults.add(node.place, f"state '{label}': {error}")
-            return None
-
-    def _options_from_params(
-        self, label: str, body: Mapping, scope: ParamsScope, source: StateSource
-    ) -> dict[str, Node]:
-        """Return the values of a state's own params that are options of it; note those that are of no use."""
-        params = body.entries.get("params")
-        if not isinstance(params, Mapping):
-            return {}
-        options: dict[str, Node] = {}
-        for key, value in params.entries.items():
-            if key in source.options or source.takes_any_option:
-                options[key] = scope.resolve(value, FaultList())
-            elif key not in scope.used:
-                what = f"state '{label}' ({source.name}): params: option"
-                self._faults.add_unknown(params.keys[key], what, key, source.options)
-        return options
-
-    def _state_outcomes(self, options: dict[str, Node], source: StateSource) -> tuple[str, ...] | None:
-        if "outcomes" in options:
-            return header_fields.names(options["outcomes"], "outcomes", FaultList())
-        return source.default_names("outcomes") or None
 
     def _provided_by(self) -> dict[str, str]:
         """Return userdata key -> template that provides it."""

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks one state of a task: its source, its options, its outcomes."""
+from __future__ import annotations
+
+from typing import Any
+
+from modular_framework_core.task_constructor import header_fields
+from modular_framework_core.task_constructor.faults import FaultList, Place
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node
+from modular_framework_core.task_constructor.params_scope import ParamsScope
+from modular_framework_core.task_constructor.state_catalogue import (
+    STATE_KEYS,
+    StateCatalogue,
+    StateSource,
+    StateSourceError,
+)
+from modular_framework_core.task_constructor.task_spec import StateSpec
+from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
+
+_RESERVED = ("source", "params", "transitions")
+"""Keys of a state that are not options of it."""
+
+
+class StateBuilder:
+    """Builds the states of one task; notes what is wrong with them in the list of faults of the task."""
+
+    def __init__(self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList) -> None:
+        """Use these states; the templates serve to tell a nested machine without states from a misspelt state."""
+        self._states = states
+        self._templates = templates
+        self._faults = faults
+
+    def build(
+        self, label: str, place: Place, body: Mapping, scope: ParamsScope
+    ) -> tuple[StateSpec | None, tuple[str, ...] | None]:
+        """Check a state.
+
+        Args:
+            label: its name.
+            place: where it is defined.
+            body: its fields, references resolved.
+            scope: the params it sees, its own included.
+
+        Returns:
+            The state, None when its source cannot be used; and its outcomes, None when they are not known.
+        """
+        source = self._state_source(body, label)
+        if source is None:
+            return None, None
+        given = {key: value for key, value in body.entries.items() if key not in _RESERVED}
+        options = {**self._options_from_params(label, body, scope, source), **given}
+        what = f"state '{label}' ({source.name}): option"
+        for key in given:
+            if key not in source.options and not (source.takes_any_option and key.isidentifier()):
+                self._faults.add_unknown(body.keys[key], what, key, source.options)
+        for option in source.options.values():
+            if option.required and option.name not in options:
+                self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
+        for key in STATE_KEYS:
+            if key in options:
+                may_be_empty = key != "outcomes"
+                header_fields.names(options[key], f"state '{label}': {key}", self._faults, may_be_empty=may_be_empty)
+        outcomes = self._state_outcomes(options, source)
+        values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
+        return (
+            StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), place),
+            outcomes,
+        )
+
+    def _state_source(self, body: Mapping, label: str) -> StateSource | None:
+        node = body.entries.get("source")
+        name = None if node is None else header_fields.text(node, f"state '{label}': source", self._faults)
+        if node is None or name is None:
+            return None
+        found = self._states.resolve(name)
+        if found is None:
+            if self._templates.get(name) is not None:
+                self._faults.add(node.place, f"'{label}' uses the template '{name}' but has no 'states'")
+            else:
+                self._faults.add_unknown(node.place, f"state '{label}': source", name, self._states.names())
+            return None
+        try:
+            return self._states.get(found)
+        except StateSourceError as error:
+            self._faults.add(node.place, f"state '{label}': {error}")
+            return None
+
+    def _options_from_params(
+        self, label: str, body: Mapping, scope: ParamsScope, source: StateSource
+    ) -> dict[str, Node]:
+        """Return the values of a state's own params that are options of it; note those that are of no use."""
+        params = body.entries.get("params")
+        if not isinstance(params, Mapping):
+            return {}
+        options: dict[str, Node] = {}
+        for key, value in params.entries.items():
+            if key in source.options or source.takes_any_option:
+                options[key] = scope.resolve(value, FaultList())
+            elif key not in scope.used:
+                what = f"state '{label}' ({source.name}): params: option"
+                self._faults.add_unknown(params.keys[key], what, key, source.options)
+        return options
+
+    def _state_outcomes(self, options: dict[str, Node], source: StateSource) -> tuple[str, ...] | None:
+        if "outcomes" in options:
+            return header_fields.names(options["outcomes"], "outcomes", FaultList())
+        return source.default_names("outcomes") or None
+
+
+def plain_transitions(body: Mapping) -> dict[str, str]:
+    """Return the transitions of a state or nested machine as outcome -> target; none when they cannot be read."""
+    node = body.entries.get("transitions")
+    return {} if not isinstance(node, Mapping) else {key: str(value.plain()) for key, value in node.entries.items()}
