@@ -105,8 +105,8 @@ def loads(text: str, file: str) -> Node:
         place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file, 1, 1)
         context = f" {error.context}" if error.context else ""
         raise TaskFault([Fault(place, f"this is not valid YAML: {error.problem}{context}")]) from error
-    except (YAMLError, RecursionError, ValueError) as error:
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
+    except (YAMLError, RecursionError, ValueError, LookupError, TypeError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else (str(error).splitlines() or [""])[0]
         raise TaskFault([Fault(Place(file, 1, 1), f"this is not valid YAML: {reason}")]) from error
     if root is None:
         raise TaskFault([Fault(Place(file, 1, 1), "the file is empty; a task needs name, source, outcomes and states")])
@@ -154,7 +154,7 @@ class _Converter:
     def _scalar(self, node: Any, place: Place) -> Scalar:
         try:
             value = self._reader.constructor.construct_object(node, deep=True)
-        except (YAMLError, ValueError, OverflowError):
+        except Exception:  # for a tag that does not fit the text, the library raises whatever comes first
             self._faults.add(place, f"the tag or value '{node.value}' of type {node.tag} cannot be used here")
             return Scalar(None, place)
         if isinstance(value, _ALLOWED_SCALARS):
