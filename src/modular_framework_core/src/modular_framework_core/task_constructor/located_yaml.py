@@ -106,7 +106,8 @@ def loads(text: str, file: str) -> Node:
         context = f" {error.context}" if error.context else ""
         raise TaskFault([Fault(place, f"this is not valid YAML: {error.problem}{context}")]) from error
     except (YAMLError, RecursionError, ValueError, LookupError, TypeError) as error:
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else (str(error).splitlines() or [""])[0]
+        first_line = (str(error).splitlines() or [""])[0]
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else first_line
         raise TaskFault([Fault(Place(file, 1, 1), f"this is not valid YAML: {reason}")]) from error
     if root is None:
         raise TaskFault([Fault(Place(file, 1, 1), "the file is empty; a task needs name, source, outcomes and states")])
