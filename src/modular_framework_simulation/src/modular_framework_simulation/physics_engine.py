@@ -87,7 +87,11 @@ class PhysicsEngine:
             physicsClientId=self.client,
         )
         if self.has_window:
+            # Side panels and shadows cost more than the physics where the graphics are drawn by software.
             self.api.configureDebugVisualizer(self.api.COV_ENABLE_GUI, 0, physicsClientId=self.client)
+            self.api.configureDebugVisualizer(self.api.COV_ENABLE_SHADOWS, 0, physicsClientId=self.client)
+            distance_m, yaw_deg, pitch_deg, target = 1.8, 50.0, -30.0, (0.0, 0.4, 0.9)
+            self.api.resetDebugVisualizerCamera(distance_m, yaw_deg, pitch_deg, target, physicsClientId=self.client)
 
     def load_urdf(self, text: str, name: str, fixed: bool, flags: int) -> int:
         """Loads a body at the world origin.

@@ -131,6 +131,8 @@ class SimulationNode:
         self._scene.show(take_snapshot(self._world, self._loop.held_object()))
 
     def _report_pace(self) -> None:
+        if self._world.time_ns == 0:
+            return
         pace = self._loop.pacer.report(self._world.time_ns * 1e-9)
         text = "real time factor %.3f, %.0f us a step, busy %.0f %% of the time"
         rospy.loginfo(text, pace.factor, pace.step_cost_s * 1e6, pace.busy_share * 100)
@@ -162,6 +164,7 @@ class SimulationNode:
         rospy.loginfo("simulation is running%s", " (paused)" if self._loop.paused else "")
         rospy.spin()
         self.close()
+        self._report_pace()
         return 1 if self._failed else 0
 
     def _stop_loop(self) -> None:
