@@ -10,8 +10,6 @@ import threading
 import uuid
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import actionlib
 import rospy
@@ -35,6 +33,7 @@ from moveit_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from modular_framework_core.commander_results import ExecutionResult, IkResult, PlanResult
 from modular_framework_core.moveit_requests import (
     StartState,
     describe_pose,
@@ -64,61 +63,6 @@ IK_TIMEOUT_S = 1.0
 
 class CommanderError(RuntimeError):
     """The commander cannot work; the text names what is missing."""
-
-
-class PlanResult(NamedTuple):
-    """Outcome of planning; true only for a plan.
-
-    Attributes:
-        trajectory: The plan; without joint names when there is none.
-        success: True when ``trajectory`` leads to the target.
-        error_code: Value of moveit_msgs/MoveItErrorCodes.
-        reason: Why there is no plan; empty with one.
-    """
-
-    trajectory: RobotTrajectory
-    success: bool
-    error_code: int
-    reason: str
-
-    def __bool__(self) -> bool:
-        return self.success
-
-
-@dataclass(frozen=True, slots=True)
-class IkResult:
-    """Outcome of inverse kinematics; true only with a solution.
-
-    Attributes:
-        joints: {joint: position} of the group; empty without a solution.
-        error_code: Value of moveit_msgs/MoveItErrorCodes.
-        reason: Why there is no solution; empty with one.
-    """
-
-    joints: dict[str, float]
-    error_code: int
-    reason: str
-
-    def __bool__(self) -> bool:
-        return bool(self.joints)
-
-
-@dataclass(frozen=True, slots=True)
-class ExecutionResult:
-    """Outcome of a motion; true only when move_group reports success.
-
-    Attributes:
-        success: True when the trajectory was executed.
-        error_code: Value of moveit_msgs/MoveItErrorCodes.
-        reason: Why it was not; empty on success.
-    """
-
-    success: bool
-    error_code: int = MoveItErrorCodes.SUCCESS
-    reason: str = ""
-
-    def __bool__(self) -> bool:
-        return self.success
 
 
 class ArmCommander:

@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from modular_framework_states.manager_clients import GRASP_STAGES
-
+GRASP_STAGES = ("pregrasp", "grasp", "postgrasp")
 
 class StageError(RuntimeError):
     """A stage of a grasp has no joint positions; the text says which stage and why."""

@@ -9,10 +9,9 @@ from moveit_msgs.msg import RobotTrajectory
 
 from modular_framework_core import srv
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_states.grasp_stages import GRASP_STAGES
 
 SERVICE_TIMEOUT_S = 10.0
-
-GRASP_STAGES = ("pregrasp", "grasp", "postgrasp")
 
 # kind of message: (service, type, field of the name, field of the message)
 _GET: dict[str, tuple[str, Any, str, str]] = {

@@ -6,8 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_states.grasp_stages import StageError, arrival_fingers, near_joints, stage_joints
-from modular_framework_states.manager_clients import GRASP_STAGES, ManagerError, fetch, kind_of, store_plan
+from modular_framework_states.grasp_stages import (
+    GRASP_STAGES,
+    StageError,
+    arrival_fingers,
+    near_joints,
+    stage_joints,
+)
+from modular_framework_states.manager_clients import ManagerError, fetch, kind_of, store_plan
 
 STATE_TYPES = ("pose", "joint_state", *GRASP_STAGES)
 FROM_USERDATA = "userdata"

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_states.manager_clients import GRASP_STAGES, ManagerError, fetch, kind_of
+from modular_framework_states.grasp_stages import GRASP_STAGES
+from modular_framework_states.manager_clients import ManagerError, fetch, kind_of
 
 MESSAGE_TYPES = ("joint_state", "trajectory", "plan", "pose", *GRASP_STAGES)
 
