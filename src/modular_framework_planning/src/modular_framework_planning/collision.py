@@ -110,9 +110,9 @@ class CollisionChecker:
             body = Body(held.name, ATTACHED, held.link, held.touch_links)
             for shape, pose in held.body.shapes:
                 self._add(body, frame.parentJoint, frame.placement * held.body.pose * pose, shape.geometry)
-        for item in self.scene.objects.values():
-            for shape, pose in item.shapes:
-                self._add(Body(item.name, WORLD), 0, item.pose * pose, shape.geometry)
+        for thing in self.scene.objects.values():
+            for shape, pose in thing.shapes:
+                self._add(Body(thing.name, WORLD), 0, thing.pose * pose, shape.geometry)
 
     def _may_touch(self, first: Body, second: Body) -> bool:
         if first.name == second.name and first.kind == second.kind:

@@ -116,7 +116,7 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
         return _pose_goal(scene, item.position_constraints[0], item.orientation_constraints[0], tip, where)
     raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: {len(item.joint_constraints)} joint, "
                         f"{len(item.position_constraints)} position and {len(item.orientation_constraints)} "
-                        "orientation constraints; allowed are joint constraints alone, or one position with one orientation")
+                        "orientation constraints; allowed: joints alone, or one position with one orientation")
 
 
 def _joint_goal(scene: PlanningScene, constraints: Sequence[Any], where: str) -> JointGoal:

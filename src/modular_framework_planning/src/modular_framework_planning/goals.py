@@ -77,9 +77,13 @@ class GoalResolver:
         if not found:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
         free: list[Array] = []
+        verdicts: dict[bytes, bool] = {}  # whole turns of a joint look the same to every obstacle
         for positions in found:
             values = positions[self._group.indices]
-            if self._motion.state_is_free(values):
+            key = np.round(np.exp(1j * values), 4).tobytes()
+            if key not in verdicts:
+                verdicts[key] = self._motion.state_is_free(values)
+            if verdicts[key]:
                 free.append(values)
             if len(free) >= MAX_GOAL_STATES:
                 break

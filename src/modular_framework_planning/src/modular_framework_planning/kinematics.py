@@ -181,12 +181,14 @@ class InverseKinematics:
         lower, upper = self._search_bounds()
         found: list[Array] = []
         start = np.clip(seed[self.group.indices], lower, upper)
-        while len(found) < 8 and (time.monotonic() < deadline or not found and start is None):
+        while len(found) < 8:
             result = self._polish(data, seed, start, target, steps=60)
             if result is not None:
                 values = result[self.group.indices]
-                if np.all((values >= lower - 1e-9) & (values <= upper + 1e-9)) or self._wraps(values):
+                if np.all((values >= lower - 1e-9) & (values <= upper + 1e-9)) or len(self._wraps(values)):
                     found.append(result)
+            if time.monotonic() > deadline:
+                break
             start = rng.uniform(lower, upper)
         return found
 
@@ -195,33 +197,38 @@ class InverseKinematics:
         upper = np.minimum(self.model.upper[self.group.indices], 2.0 * np.pi)
         return lower, upper
 
-    def _wraps(self, values: Array) -> list[Array]:
-        """Returns the vector and all turns of its rotary joints that are within bounds."""
-        choices = []
-        for number, value in zip(self.group.indices, values, strict=True):
-            lower, upper = self.model.lower[number] - 1e-9, self.model.upper[number] + 1e-9
-            if self.model.document.joint_kinds[self.model.joint_names[number]] == "prismatic":
-                options = [value] if lower <= value <= upper else []
-            elif self.model.is_continuous(int(number)):
-                options = [value + turn * 2.0 * np.pi for turn in (-1, 0, 1)]
-            else:
-                first = int(np.ceil((lower - value) / (2.0 * np.pi)))
-                last = int(np.floor((upper - value) / (2.0 * np.pi)))
-                options = [float(np.clip(value + turn * 2.0 * np.pi, lower + 1e-9, upper - 1e-9))
-                           for turn in range(first, last + 1)]
-            choices.append(options)
-        return [np.array(item) for item in itertools.islice(itertools.product(*choices), MAX_WRAPS)]
+    def _wraps(self, values: Array) -> Array:
+        """Returns the vector and all turns of its rotary joints that are within bounds, shape (n, joints)."""
+        choices = [self._turns(int(number), float(value))
+                   for number, value in zip(self.group.indices, values, strict=True)]
+        rows = list(itertools.islice(itertools.product(*choices), MAX_WRAPS))
+        return np.array(rows, dtype=float).reshape(len(rows), len(values))
+
+    def _turns(self, number: int, value: float) -> list[float]:
+        """Returns a joint's value and what differs from it by whole turns, within bounds."""
+        lower, upper = self.model.lower[number] - 1e-9, self.model.upper[number] + 1e-9
+        if self.model.document.joint_kinds[self.model.joint_names[number]] == "prismatic":
+            return [value] if lower <= value <= upper else []
+        if self.model.is_continuous(number):
+            return [value + turn * 2.0 * np.pi for turn in (-1, 0, 1)]
+        first = int(np.ceil((lower - value) / (2.0 * np.pi)))
+        last = int(np.floor((upper - value) / (2.0 * np.pi)))
+        return [float(np.clip(value + turn * 2.0 * np.pi, lower + 1e-9, upper - 1e-9))
+                for turn in range(first, last + 1)]
 
     def _ranked(self, found: list[Array], seed: Array) -> list[Array]:
-        """Adds turns, drops duplicates and puts the nearest to the seed first."""
+        """Drops duplicates, adds turns and puts the nearest to the seed first."""
         indices = self.group.indices
         unique: list[Array] = []
         for positions in found:
-            for values in self._wraps(positions[indices]):
-                if all(np.abs(values - other).max() > SAME_SOLUTION for other in unique):
-                    unique.append(values)
-        unique.sort(key=lambda values: float(np.linalg.norm(values - seed[indices])))
-        return [self._embed(seed, values) for values in unique]
+            values = positions[indices]
+            if all(np.abs(np.angle(np.exp(1j * (values - other)))).max() > SAME_SOLUTION for other in unique):
+                unique.append(values)
+        if not unique:
+            return []
+        rows = np.vstack([self._wraps(values) for values in unique])
+        order = np.argsort(np.linalg.norm(rows - seed[indices], axis=1), kind="stable")
+        return [self._embed(seed, values) for values in rows[order]]
 
     def explain_unreachable(self, tip_link: str, target: Transform, seed: Array) -> str:
         """Says why a pose has no solution: too far away, or only out of joint bounds."""

@@ -22,6 +22,7 @@ PLANNERS: dict[str, type] = {
     "RRTConnect": og.RRTConnect, "RRTstar": og.RRTstar, "SORRTstar": og.SORRTstar,
 }
 DEFAULT_PLANNER = "RRTConnect"
+DEFAULT_RANGE = 1.0  # [rad or m]; a fifth of the space, OMPL's own choice, makes edges so long that few are free
 _SETTERS = {"range": "setRange", "goal_bias": "setGoalBias", "border_fraction": "setBorderFraction",
             "num_samples": "setNumSamples", "radius_multiplier": "setRadiusMultiplier"}
 
@@ -96,10 +97,12 @@ def _version() -> str:
 
 def _make_planner(kind: str, settings: Mapping[str, Any], information: Any) -> Any:
     planner = PLANNERS[kind](information)
+    if hasattr(planner, "setRange"):
+        planner.setRange(DEFAULT_RANGE)
     for key, value in settings.items():
         setter = getattr(planner, _SETTERS.get(key, ""), None)
         number = float(value) if isinstance(value, int | float | str) and str(value).strip() else 0.0
-        if setter is not None and not (key == "range" and number <= 0.0):
+        if setter is not None and not (key == "range" and number <= 0.0):  # range 0: the default below stays
             setter(int(number) if key == "num_samples" else number)
     return planner
 

@@ -22,6 +22,7 @@ from modular_framework_planning.time_parameterization import parameterize
 from modular_framework_planning.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
+FINE_STEPS = 2.5  # shortening looks at states this many times further apart than the last check does
 
 
 def describe_contacts(contacts: Sequence[Contact], most: int = 4) -> str:
@@ -73,7 +74,7 @@ class _Attempt:
         self._begun, self._deadline = begun, deadline
         self._model = request.scene.model
         self._rng = np.random.default_rng(self._settings.seed)
-        self._steps = (self._settings.search_step, self._settings.motion_step)
+        self._steps = (self._settings.search_step, 0.4 * self._settings.search_step, self._settings.motion_step)
 
     def run(self) -> PlanningAnswer:
         """Plans; a path that fails the last check is searched again on a finer grid."""
@@ -114,7 +115,7 @@ class _Attempt:
         fixed = checker.fixed_contacts(start)
         if fixed:
             raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
-                                f"joint of group '{self._group.name}' can change that; allow the pair or move the object")
+                                f"joint of group '{self._group.name}' can change that; allow the pair or move it")
         if checker.is_free(start):
             return checker, []
         contacts = checker.contacts(start, include_fixed=False)
@@ -131,14 +132,16 @@ class _Attempt:
             return start[None, :]
         low, high = self._model.lower[self._group.indices], self._model.upper[self._group.indices]
         reach = self._settings.jiggle_fraction * np.minimum(high - low, 2.0 * np.pi)
-        for number in range(self._settings.max_sampling_attempts):
+        shallow = all(item.depth <= self._settings.start_state_collision_depth for item in contacts)
+        for number in range(self._settings.max_sampling_attempts if shallow else 0):
             share = (number + 1) / self._settings.max_sampling_attempts
             moved = np.clip(start + share * self._rng.uniform(-reach, reach), low, high)
             if motion.state_is_free(moved):
                 return np.vstack([start, moved])
         raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, "start state in collision: "
-                            f"{describe_contacts(contacts)}; no free state within {self._settings.jiggle_fraction:.0%} "
-                            "of the joints' ranges")
+                            f"{describe_contacts(contacts)}; " + (
+                                f"no free state within {self._settings.jiggle_fraction:.0%} of the joints' ranges"
+                                if shallow else "too deep to move out of; allow the pair or move the object"))
 
     def _best_path(self, motion: MotionChecker, start: Array, goals: Array, step: float) -> Array:
         def edge(first: Array, second: Array) -> bool:
@@ -172,8 +175,14 @@ class _Attempt:
                              "is blocked or narrow: allow more time or choose another goal")
 
     def _shortened(self, motion: MotionChecker, path: Array, step: float) -> Array:
+        """Shortens; what it accepts was also looked at on the fine grid."""
         limit = min(max(self._deadline, time.monotonic() + 0.05), time.monotonic() + MAX_SHORTENING_S)
-        return shorten(path, lambda first, second: motion.edge_is_free(first, second, step), limit, self._rng)
+        fine = min(step, FINE_STEPS * self._settings.motion_step)
+
+        def edge(first: Array, second: Array) -> bool:
+            return motion.edge_is_free(first, second, step) and motion.edge_is_free(first, second, fine)
+
+        return shorten(path, edge, limit, self._rng)
 
     def _timed(self, motion: MotionChecker, path: Array, lead_in: Array) -> Trajectory | None:
         """Rounds, times and checks a path; None where it touches something on the fine grid."""

@@ -35,6 +35,7 @@ class PipelineSettings:
     Attributes:
         start_state_max_bounds_error: how far out of bounds a start is pulled back [rad or m].
         jiggle_fraction: how far from a colliding start a free one is looked for (share of the joint's range).
+        start_state_collision_depth: a start that collides deeper than this is refused at once [m].
         start_state_contact_tolerance: depth of a held body's contact tolerated at the start [m].
         motion_step: distance of collision checks on the returned motion [rad or m].
         blend_deviation: most distance a rounded corner keeps from the corner [rad or m].
@@ -43,8 +44,9 @@ class PipelineSettings:
     start_state_max_bounds_error: float = 0.1
     jiggle_fraction: float = 0.02
     max_sampling_attempts: int = 100
+    start_state_collision_depth: float = 0.01
     start_state_contact_tolerance: float = 0.003
-    search_step: float = 0.02
+    search_step: float = 0.05
     motion_step: float = 0.004
     blend_deviation: float = 0.1
     default_velocity_scaling_factor: float = 0.1

@@ -79,7 +79,7 @@ class TrajectoryExecution:
         if not motion.points:
             return
         if not self._busy.acquire(blocking=False):
-            raise PlanningError(ErrorCode.CONTROL_FAILED, "another motion is being executed; wait for its end or stop it")
+            raise PlanningError(ErrorCode.CONTROL_FAILED, "another motion is under way; wait for its end or stop it")
         try:
             self._stop.clear()
             parts = self._split(motion)
@@ -94,9 +94,9 @@ class TrajectoryExecution:
         owners = {joint: spec for spec in self.controllers for joint in spec.joints}
         orphans = [joint for joint in motion.joint_names if joint not in owners]
         if orphans:
+            listed = ", ".join(f"{spec.name} ({' '.join(spec.joints)})" for spec in self.controllers)
             raise PlanningError(ErrorCode.CONTROL_FAILED, f"no controller in {rospy.resolve_name('~controller_list')} "
-                                f"moves {', '.join(orphans)}; listed: "
-                                f"{', '.join(f'{s.name} ({chr(32).join(s.joints)})' for s in self.controllers) or 'none'}")
+                                f"moves {', '.join(orphans)}; listed: {listed or 'none'}")
         parts = []
         for spec in self.controllers:
             columns = [i for i, joint in enumerate(motion.joint_names) if owners[joint] is spec]

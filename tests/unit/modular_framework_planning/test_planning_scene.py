@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scene: snapshots never change, attaching and detaching keep the place, bad geometry is refused."""
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.errors import GeometryError, PlanningError, UnknownNameError
+from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from modular_framework_planning.spatial import make_transform, pose_difference
+
+PALM = "ezgripper_palm_link"
+
+
+def at(x: float, y: float, z: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([x, y, z]))
+
+
+def box(name: str, pose: pin.SE3, size: float = 0.1) -> CollisionObject:
+    return CollisionObject(name, pose, ((Box(size, size, size), pin.SE3.Identity()),))
+
+
+def upright(model: RobotModel) -> PlanningScene:
+    positions = model.merge(model.default_positions(), {"shoulder_lift_joint": -1.57})
+    return empty_scene(model, positions)
+
+
+def test_a_change_makes_a_new_version_and_leaves_the_old_snapshot_alone(model: RobotModel) -> None:
+    before = upright(model)
+    after = before.with_object(box("b", at(1, 0, 1)))
+    assert "b" not in before.objects and "b" in after.objects
+    assert after.version > before.version
+
+
+def test_move_append_and_remove_do_what_they_say(model: RobotModel) -> None:
+    scene = upright(model).with_object(box("b", at(1, 0, 1)))
+    scene = scene.with_shapes_appended(CollisionObject("b", at(1, 1, 1), ((Sphere(0.1), pin.SE3.Identity()),)))
+    assert len(scene.objects["b"].shapes) == 2
+    assert np.allclose((scene.objects["b"].pose * scene.objects["b"].shapes[1][1]).translation, [1, 1, 1])
+    scene = scene.with_object_moved("b", at(0, 2, 0))
+    assert np.allclose(scene.frame_transform("b").translation, [0, 2, 0])
+    assert not scene.without_object("b").objects
+    with pytest.raises(UnknownNameError, match="known: b"):
+        scene.without_object("c")
+
+
+def test_an_attached_object_follows_its_link_and_stays_where_it_is_put_down(model: RobotModel) -> None:
+    scene = upright(model)
+    link = model.link_transforms(scene.positions)[PALM]
+    body = box("held", pin.SE3.Identity(), 0.04)
+    scene = scene.with_object(box("held", link)).with_attached(AttachedObject(body, PALM, frozenset({PALM})))
+    assert "held" not in scene.objects
+    moved = scene.with_positions(model.merge(scene.positions, {"shoulder_pan_joint": 1.0}))
+    expected = model.link_transforms(moved.positions)[PALM]
+    assert pose_difference(moved.attached_pose("held"), expected) == pytest.approx((0.0, 0.0), abs=1e-9)
+    released = moved.with_detached("held")
+    assert not released.attached
+    assert np.allclose(released.objects["held"].pose.homogeneous, expected.homogeneous)
+
+
+def test_touch_links_may_touch_and_others_may_not(model: RobotModel) -> None:
+    scene = upright(model)
+    gripper = frozenset(name for name in model.frame_ids if "ezgripper" in name)
+    body = box("held", at(0, 0, 0.06), 0.03)
+    with_touch = scene.with_attached(AttachedObject(body, PALM, gripper))
+    without = scene.with_attached(AttachedObject(box("held", at(0, 0, 0.06), 0.3), PALM, frozenset()))
+    assert not CollisionChecker(with_touch).contacts(with_touch.positions)
+    touching = CollisionChecker(without).contacts(without.positions)
+    assert touching, "a body around the fingers touches them"
+
+
+def test_a_state_that_touches_an_object_says_which_link_touches_what_and_how_deep(model: RobotModel) -> None:
+    scene = upright(model)
+    wrist = model.link_transforms(scene.positions)["wrist_3_link"].translation
+    scene = scene.with_object(box("wall", at(wrist[0], wrist[1], wrist[2] + 0.02)))
+    contacts = CollisionChecker(scene).contacts(scene.positions)
+    assert any("wrist_3_link" in item.describe() and "'wall'" in item.describe() for item in contacts)
+    assert all(item.depth > 0 for item in contacts)
+    allowed = scene.with_acm(AllowedCollisionMatrix(scene.acm.entries, {"wall": True}, scene.acm.names))
+    assert CollisionChecker(allowed).is_free(scene.positions)
+
+
+@pytest.mark.parametrize("shape", [
+    Sphere(0.06), Cylinder(0.1, 0.05), Plane(0, 0, 1, 0),
+    Mesh(np.array([[0, 0, -0.1], [0.1, 0, 0.1], [-0.1, 0.1, 0.1], [-0.1, -0.1, 0.1]], float),
+         np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])),
+], ids=["sphere", "cylinder", "plane", "mesh"])
+def test_every_kind_of_shape_is_hit_and_missed(model: RobotModel, shape: object) -> None:
+    scene = upright(model)
+    tip = model.link_transforms(scene.positions)["wrist_2_link"].translation
+    for offset, free in ((0.0, False), (1.0, True)):
+        placed = scene.with_object(CollisionObject("thing", at(*tip + [0, 0, offset]), ((shape, at(0, 0, 0)),)))
+        assert CollisionChecker(placed).is_free(scene.positions) is free
+
+
+def test_defaults_hold_only_where_no_entry_speaks_and_both_must_allow() -> None:
+    acm = AllowedCollisionMatrix({frozenset("ab"): False}, {"a": True, "c": True, "d": False})
+    assert not acm.allows("a", "b")
+    assert acm.allows("a", "x") and acm.allows("a", "c")
+    assert not acm.allows("a", "d") and not acm.allows("x", "y")
+    assert acm.with_entry("a", "b", True).allows("b", "a")
+
+
+def test_a_matrix_that_is_not_square_is_refused() -> None:
+    with pytest.raises(ValueError, match="one row per name"):
+        matrix_from_rows(["a", "b"], [[True]], {})
+
+
+@pytest.mark.parametrize(("build", "text"), [
+    (lambda: Box(0.1, -1.0, 0.1), "y is -1.0"), (lambda: Sphere(float("nan")), "radius is nan"),
+    (lambda: Cylinder(0.0, 0.1), "height is 0.0"), (lambda: Plane(0, 0, 0, 1), "no normal"),
+    (lambda: Mesh(np.zeros((3, 3)), np.array([[0, 1, 7]])), "names vertex 7"),
+    (lambda: Mesh(np.zeros((0, 3)), np.zeros((0, 3))), "0 vertices"),
+    (lambda: make_transform((0, 0, 0), (0, 0, 0, 0)), "length 0"),
+    (lambda: make_transform((0, float("nan"), 0), (0, 0, 0, 1)), "not finite"),
+])
+def test_bad_geometry_is_refused_with_what_was_got(build: object, text: str) -> None:
+    with pytest.raises(GeometryError, match=text):
+        build()
+
+
+def test_objects_without_shape_or_name_or_with_a_links_name_are_refused(model: RobotModel) -> None:
+    scene = upright(model)
+    for body in (CollisionObject("x", at(0, 0, 0), ()), box("", at(0, 0, 0)), box("forearm_link", at(0, 0, 0))):
+        with pytest.raises(GeometryError):
+            scene.with_object(body)
+    with pytest.raises(PlanningError, match="link 'nowhere' does not exist"):
+        scene.with_attached(AttachedObject(box("x", at(0, 0, 0)), "nowhere", frozenset()))
+    with pytest.raises(UnknownNameError, match="frame 'nowhere'"):
+        scene.frame_transform("nowhere")
