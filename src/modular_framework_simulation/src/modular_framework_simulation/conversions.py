@@ -18,6 +18,10 @@ from modular_framework_simulation.mesh_files import TriangleMesh, load_mesh
 from modular_framework_simulation.poses import Pose, normalised_quaternion
 from modular_framework_simulation.simulated_body import BodyState, Twist
 
+LARGEST_COORDINATE_M = 1e4
+LARGEST_VELOCITY = 1e3
+"""Beyond these the physics engine loses its numbers; larger ones in requests are refused [m/s, rad/s]."""
+
 
 def pose_to_msg(pose: Pose) -> PoseMsg:
     """Returns a geometry_msgs/Pose."""
@@ -28,13 +32,17 @@ def pose_from_msg(message: PoseMsg) -> Pose:
     """Returns the pose of a message; an orientation of four zeros is the identity.
 
     Raises:
-        ValueError: A number is not finite, or the quaternion is far from unit length.
+        ValueError: A number is not finite or beyond all reason, or the quaternion is far from unit length.
     """
     p, q = message.position, message.orientation
     position = (p.x, p.y, p.z)
-    if not all(math.isfinite(value) for value in position):
-        raise ValueError(f"position {list(position)} is not finite; give finite numbers [m]")
+    _check(position, "position", LARGEST_COORDINATE_M, "m")
     return Pose(position, normalised_quaternion((q.x, q.y, q.z, q.w)))
+
+
+def _check(values: tuple[float, float, float], what: str, bound: float, unit: str) -> None:
+    if not all(math.isfinite(value) and abs(value) <= bound for value in values):
+        raise ValueError(f"{what} {list(values)} is not allowed; give finite numbers of at most {bound:g} {unit}")
 
 
 def twist_to_msg(twist: Twist) -> TwistMsg:
@@ -46,12 +54,12 @@ def twist_from_msg(message: TwistMsg) -> Twist:
     """Returns the twist of a message.
 
     Raises:
-        ValueError: A number is not finite.
+        ValueError: A number is not finite or beyond all reason.
     """
     linear = (message.linear.x, message.linear.y, message.linear.z)
     angular = (message.angular.x, message.angular.y, message.angular.z)
-    if not all(math.isfinite(value) for value in linear + angular):
-        raise ValueError(f"twist {list(linear + angular)} is not finite; give finite numbers")
+    _check(linear, "linear velocity", LARGEST_VELOCITY, "m/s")
+    _check(angular, "angular velocity", LARGEST_VELOCITY, "rad/s")
     return Twist(linear, angular)
 
 

@@ -11,7 +11,7 @@ import struct
 from dataclasses import dataclass, replace
 
 from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.body_urdf import STATIC_LINK, model_to_urdf
+from modular_framework_simulation.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
 from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
 from modular_framework_simulation.mesh_files import ConvexParts
 from modular_framework_simulation.physics_engine import Log, PhysicsEngine
@@ -105,8 +105,20 @@ class PhysicsWorld:
         """Returns the name of the model that has this number in the engine."""
         return self._names_by_number[number]
 
-    def spawn(self, model: specs.Model) -> SimulatedBody:
+    def prepare(self, model: specs.Model) -> BodyUrdf:
+        """Translates a model for the engine, which may take seconds for a large mesh; any thread may do it.
+
+        Raises:
+            DescriptionError: A mesh cannot be used.
+        """
+        return model_to_urdf(model, self._convex_parts, self.engine.has_window)
+
+    def spawn(self, model: specs.Model, prepared: BodyUrdf | None = None) -> SimulatedBody:
         """Adds a model at its pose.
+
+        Args:
+            model: What to add.
+            prepared: What `prepare` made of it, if that was called before.
 
         Raises:
             DuplicateModelError: Its name is taken.
@@ -115,7 +127,7 @@ class PhysicsWorld:
         if model.name in self._bodies:
             raise DuplicateModelError(model.name)
         api = self.engine.api
-        written = model_to_urdf(model, self._convex_parts, self.engine.has_window)
+        written = prepared if prepared is not None else self.prepare(model)
         flags = api.URDF_USE_INERTIA_FROM_FILE if written.inertia_from_file else 0
         fixed = model.static or any(joint.parent == "world" for joint in model.joints)
         number = self.engine.load_urdf(written.text, model.name, fixed, flags)

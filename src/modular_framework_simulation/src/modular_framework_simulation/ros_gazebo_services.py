@@ -46,18 +46,21 @@ class GazeboServices:
 
     def connect(self) -> None:
         """Advertises everything."""
-        for name, kind, work, response in (
-            (ros_names.SPAWN_SDF_MODEL, srv.SpawnModel, self._spawn_sdf, srv.SpawnModelResponse),
-            (ros_names.SPAWN_URDF_MODEL, srv.SpawnModel, self._spawn_urdf, srv.SpawnModelResponse),
-            (ros_names.DELETE_MODEL, srv.DeleteModel, self._delete, srv.DeleteModelResponse),
-            (ros_names.GET_MODEL_STATE, srv.GetModelState, self._get_model_state, srv.GetModelStateResponse),
-            (ros_names.SET_MODEL_STATE, srv.SetModelState, self._set_model_state, srv.SetModelStateResponse),
-            (ros_names.GET_LINK_STATE, srv.GetLinkState, self._get_link_state, srv.GetLinkStateResponse),
-            (ros_names.GET_MODEL_PROPERTIES, srv.GetModelProperties, self._model, srv.GetModelPropertiesResponse),
-            (ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties, self._all, srv.GetWorldPropertiesResponse),
-            (ros_names.GET_PHYSICS_PROPERTIES, srv.GetPhysicsProperties, self._phys, srv.GetPhysicsPropertiesResponse),
+        for name, read in (
+            (ros_names.SPAWN_SDF_MODEL, read_model_text),
+            (ros_names.SPAWN_URDF_MODEL, read_urdf_model),
         ):
-            self._endpoints.append(rospy.Service(name, kind, self._handler(name, work, response)))
+            self._advertise(name, srv.SpawnModel, self._spawner(name, read))
+        for name, kind, work in (
+            (ros_names.DELETE_MODEL, srv.DeleteModel, self._delete),
+            (ros_names.GET_MODEL_STATE, srv.GetModelState, self._get_model_state),
+            (ros_names.SET_MODEL_STATE, srv.SetModelState, self._set_model_state),
+            (ros_names.GET_LINK_STATE, srv.GetLinkState, self._get_link_state),
+            (ros_names.GET_MODEL_PROPERTIES, srv.GetModelProperties, self._get_model_properties),
+            (ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties, self._get_world_properties),
+            (ros_names.GET_PHYSICS_PROPERTIES, srv.GetPhysicsProperties, self._get_physics_properties),
+        ):
+            self._advertise(name, kind, self._looped(name, work))
         for name, action in (
             (ros_names.PAUSE_PHYSICS, self._loop.pause),
             (ros_names.UNPAUSE_PHYSICS, self._loop.unpause),
@@ -77,10 +80,19 @@ class GazeboServices:
             else:
                 endpoint.unregister()
 
+    def _in_loop(self, what: str, work: Callable[[], Any]) -> Any:
+        return self._loop.requests.call(what, work, _ANSWER_TIMEOUT_S)
+
+    def _looped(self, name: str, work: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        return lambda request: self._in_loop(name, lambda: work(request))
+
+    def _advertise(self, name: str, kind: Any, work: Callable[[Any], Any]) -> None:
+        self._endpoints.append(rospy.Service(name, kind, self._handler(name, work, kind._response_class)))
+
     def _handler(self, name: str, work: Callable[[Any], Any], response: Any) -> Callable[[Any], Any]:
         def handle(request: Any) -> Any:
             try:
-                return self._loop.requests.call(name, lambda: work(request), _ANSWER_TIMEOUT_S)
+                return work(request)
             except (SimulationError, ValueError) as error:
                 rospy.logerr("%s: %s", name, error)
                 return response(success=False, status_message=f"{name}: {error}")
@@ -93,7 +105,7 @@ class GazeboServices:
     def _command_handler(self, name: str, action: Callable[[], None]) -> Callable[[Any], Any]:
         def handle(_request: Any) -> EmptyResponse | None:
             try:
-                self._loop.requests.call(name, action, _ANSWER_TIMEOUT_S)
+                self._in_loop(name, action)
             except SimulationError as error:
                 rospy.logerr("%s: %s", name, error)
                 return None  # std_srvs/Empty has no field for a failure: rospy tells the caller that the call failed
@@ -101,20 +113,22 @@ class GazeboServices:
 
         return handle
 
-    def _spawn_sdf(self, request: Any) -> Any:
-        source = f"spawn request of '{request.model_name}'"
-        return self._spawn(request, read_model_text(request.model_xml, source, self._resources))
+    def _spawner(self, name: str, read: Callable[[str, str, Resources], Model]) -> Callable[[Any], Any]:
+        def spawn(request: Any) -> Any:
+            # Reading and cutting meshes may take seconds: that is done here, while the world goes on.
+            model = read(request.model_xml, f"spawn request of '{request.model_name}'", self._resources)
+            model = dataclasses.replace(model, name=request.model_name or model.name)
+            prepared = self._world.prepare(model)
+            initial = conversions.pose_from_msg(request.initial_pose)
 
-    def _spawn_urdf(self, request: Any) -> Any:
-        source = f"spawn request of '{request.model_name}'"
-        return self._spawn(request, read_urdf_model(request.model_xml, source, self._resources))
+            def add() -> None:
+                pose = self._world.pose_in_world(initial, request.reference_frame)
+                self._world.spawn(dataclasses.replace(model, pose=pose), prepared)
 
-    def _spawn(self, request: Any, model: Model) -> Any:
-        initial = conversions.pose_from_msg(request.initial_pose)
-        pose = self._world.pose_in_world(initial, request.reference_frame)
-        name = request.model_name or model.name
-        self._world.spawn(dataclasses.replace(model, name=name, pose=pose))
-        return srv.SpawnModelResponse(True, f"spawned model '{name}'")
+            self._in_loop(name, add)
+            return srv.SpawnModelResponse(True, f"spawned model '{model.name}'")
+
+        return spawn
 
     def _delete(self, request: Any) -> Any:
         if self._world.body(request.model_name).spec is None:
@@ -162,7 +176,7 @@ class GazeboServices:
         answer.link_state.reference_frame = ros_names.WORLD_FRAME if reference in WORLD_FRAMES else reference
         return answer
 
-    def _model(self, request: Any) -> Any:
+    def _get_model_properties(self, request: Any) -> Any:
         body = self._world.body(request.model_name)
         answer = srv.GetModelPropertiesResponse(success=True, status_message="read the properties of the model")
         answer.body_names = body.link_names()
@@ -173,7 +187,7 @@ class GazeboServices:
             answer.geom_names = [each.name for link in body.spec.links for each in link.collisions]
         return answer
 
-    def _all(self, _request: Any) -> Any:
+    def _get_world_properties(self, _request: Any) -> Any:
         return srv.GetWorldPropertiesResponse(
             sim_time=self._world.time_ns * 1e-9,
             model_names=self._world.names(),
@@ -182,7 +196,7 @@ class GazeboServices:
             status_message="read the properties of the world",
         )
 
-    def _phys(self, _request: Any) -> Any:
+    def _get_physics_properties(self, _request: Any) -> Any:
         settings = self._world.settings
         answer = srv.GetPhysicsPropertiesResponse(success=True, status_message="read the properties of the physics")
         answer.time_step = settings.time_step_s
