@@ -22,6 +22,12 @@ def test_a_module_is_loaded_once(tmp_path: Path) -> None:
     assert module(tmp_path, "x = []") is loading.load_module(tmp_path / "m.py")
 
 
+def test_loading_leaves_nothing_beside_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.dont_write_bytecode", False)
+    module(tmp_path, "x = 1")
+    assert [file.name for file in tmp_path.iterdir()] == ["m.py"]
+
+
 def test_the_function_create_state_machine_comes_first(tmp_path: Path) -> None:
     found = module(tmp_path, MACHINE + "def create_state_machine():\n    return 'made'\n")
     assert loading.machine_factory(found)() == "made"  # type: ignore[arg-type]

@@ -6,6 +6,7 @@ Parameters (used where there is no argument):
     ``~task_constructor_script``: path of the task script.
     ``~state_machine_to_load``: path of an existing state machine, or its name in the folder of generated ones; when it
         is not empty, nothing is generated.
+    ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
     ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list).
     ``/run_id``: written by roslaunch; tells when the launch began.
 Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched).
@@ -221,6 +222,9 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
     except (TaskFault, generator.GenerationError, OSError) as error:
         raise TaskNotRun(str(error)) from error
     rospy.loginfo(f"state machine of task '{task.name}' written to {path}")
+    expected = str(rospy.get_param("~generated_state_machine_name", "") or path.name)
+    if expected != path.name:
+        rospy.loginfo(f"generated_state_machine_name is '{expected}'; the file has the task's name: '{path.name}'")
     return _prepare_machine(path)
 
 

@@ -20,6 +20,8 @@ class LoadingError(Exception):
 def load_module(file: str | Path) -> ModuleType:
     """Import a Python file by its path, once: a second call returns the same module.
 
+    No bytecode is kept: generated files are written again and again, and a cache decides by size and second.
+
     Raises:
         LoadingError: the file is not there, or raises while it is imported.
     """
@@ -33,7 +35,7 @@ def load_module(file: str | Path) -> ModuleType:
     module = importlib.util.module_from_spec(found)
     sys.modules[name] = module
     try:
-        found.loader.exec_module(module)
+        exec(compile(path.read_bytes(), str(path), "exec"), module.__dict__)
     except Exception as error:
         del sys.modules[name]
         raise LoadingError(f"{path} raised {type(error).__name__} while it was imported: {error}") from error
