@@ -1,0 +1,405 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The move_group node on the wire: it plans, keeps the scene, executes, cancels, and survives malformed requests."""
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import actionlib
+import numpy as np
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryResult
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    Constraints,
+    ExecuteTrajectoryAction,
+    ExecuteTrajectoryGoal,
+    JointConstraint,
+    MotionPlanRequest,
+    MoveGroupAction,
+    MoveGroupGoal,
+    MoveItErrorCodes,
+    OrientationConstraint,
+    PlanningScene,
+    PlanningSceneComponents,
+    PositionConstraint,
+    PositionIKRequest,
+    RobotState,
+)
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    GetMotionPlan,
+    GetPlanningScene,
+    GetPositionFK,
+    GetPositionIK,
+    GetStateValidity,
+    QueryPlannerInterfaces,
+)
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header, String
+
+LAUNCH = """<launch>
+  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
+    <arg name="load_robot_description" value="true"/>
+  </include>
+</launch>"""
+GROUP = "arm_and_manipulator"
+ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
+GRIPPER = "ezgripper_knuckle_palm_L1_1"
+START = [1.57, -1.57, 1.2, -1.2, -1.57, 0.0]
+DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
+OK = MoveItErrorCodes.SUCCESS
+
+
+class FakeArm:
+    """Joint states and an arm controller that jumps from point to point in the trajectory's time."""
+
+    def __init__(self) -> None:
+        self.positions = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}
+        self.cancelled = threading.Event()
+        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
+        self._server = actionlib.SimpleActionServer("arm_trajectory_controller/follow_joint_trajectory",
+                                                    FollowJointTrajectoryAction, self._follow, auto_start=False)
+        self._server.start()
+        self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
+
+    def _publish(self, _: Any) -> None:
+        self._publisher.publish(JointState(Header(stamp=rospy.Time.now()), list(self.positions),
+                                           list(self.positions.values()), [], []))
+
+    def _follow(self, goal: Any) -> None:
+        begun = time.monotonic()
+        for point in goal.trajectory.points:
+            while time.monotonic() - begun < point.time_from_start.to_sec():
+                if self._server.is_preempt_requested():
+                    self.cancelled.set()
+                    self._server.set_preempted(FollowJointTrajectoryResult())
+                    return
+                time.sleep(0.002)
+            self.positions.update(zip(goal.trajectory.joint_names, point.positions, strict=True))
+        self._server.set_succeeded(FollowJointTrajectoryResult())
+
+
+@pytest.fixture(scope="module")
+def session(ros_launch: Callable[..., Any]) -> Any:
+    session = ros_launch(LAUNCH)
+    session.wait_for_service("plan_kinematic_path", 60.0)
+    return session
+
+
+@pytest.fixture(scope="module")
+def arm(session: Any) -> FakeArm:
+    return FakeArm()
+
+
+@pytest.fixture(autouse=True)
+def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
+    arm.positions.update(zip(ARM, START, strict=True))
+    time.sleep(0.2)  # ten joint states: the node has heard of the jump
+    scene = PlanningScene(is_diff=False)
+    assert call("apply_planning_scene", ApplyPlanningScene, scene).success
+    yield
+    assert session.alive(), session.log()
+
+
+def call(name: str, kind: Any, *args: Any) -> Any:
+    rospy.wait_for_service(name, 10.0)
+    return rospy.ServiceProxy(name, kind)(*args)
+
+
+def box(name: str, x: float, y: float, z: float, size: tuple[float, float, float]) -> CollisionObject:
+    message = CollisionObject(id=name, primitives=[SolidPrimitive(SolidPrimitive.BOX, list(size))],
+                              primitive_poses=[Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))])
+    message.header.frame_id = "world"
+    return message
+
+
+def add(*objects: CollisionObject) -> bool:
+    scene = PlanningScene(is_diff=True)
+    scene.world.collision_objects = list(objects)
+    return bool(call("apply_planning_scene", ApplyPlanningScene, scene).success)
+
+
+def table() -> CollisionObject:
+    return box("table", 0.0, 0.56, 0.82, (1.2, 0.8, 0.04))
+
+
+def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOWN, frame: str = "world") -> Constraints:
+    position = PositionConstraint(link_name="eg_manipulator", weight=1.0)
+    position.header.frame_id = frame
+    position.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [0.001])]
+    position.constraint_region.primitive_poses = [Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))]
+    turn = OrientationConstraint(link_name="eg_manipulator", orientation=orientation, weight=1.0)
+    turn.header.frame_id = frame
+    return Constraints(name="goal", position_constraints=[position], orientation_constraints=[turn])
+
+
+def request(goal: Constraints | None = None, **changes: Any) -> MotionPlanRequest:
+    message = MotionPlanRequest(group_name=GROUP, allowed_planning_time=5.0, num_planning_attempts=1,
+                                max_velocity_scaling_factor=0.5, max_acceleration_scaling_factor=0.5,
+                                goal_constraints=[goal or pose_constraints(0.1, 0.5, 0.95)])
+    for name, value in changes.items():
+        setattr(message, name, value)
+    return message
+
+
+def plan(message: MotionPlanRequest) -> Any:
+    return call("plan_kinematic_path", GetMotionPlan, message).motion_plan_response
+
+
+def report_of(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
+    """What the work returned and the planning report it caused."""
+    reports: list[dict[str, Any]] = []
+    subscriber = rospy.Subscriber("move_group/planning_report", String, lambda m: reports.append(json.loads(m.data)))
+    deadline = time.monotonic() + 5.0
+    while subscriber.get_num_connections() == 0 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    result = work()
+    while not reports and time.monotonic() < deadline:
+        time.sleep(0.01)
+    subscriber.unregister()
+    assert reports, "no planning report within 5 s"
+    return result, reports[-1]
+
+
+def test_a_plan_starts_at_the_current_state_and_ends_at_the_pose() -> None:
+    add(table())
+    answer, report = report_of(lambda: plan(request()))
+    assert answer.error_code.val == OK and report["error_code"] == OK and report["request_name"] == "goal"
+    points = answer.trajectory.joint_trajectory.points
+    assert np.allclose(points[0].positions, START, atol=1e-6)
+    stamps = [point.time_from_start.to_sec() for point in points]
+    assert all(later > earlier for earlier, later in zip(stamps[:-1], stamps[1:], strict=True))
+    state = RobotState(is_diff=True)
+    state.joint_state.name, state.joint_state.position = ARM, points[-1].positions
+    pose = call("compute_fk", GetPositionFK, Header(frame_id="world"), ["eg_manipulator"], state).pose_stamped[0].pose
+    assert np.allclose([pose.position.x, pose.position.y, pose.position.z], [0.1, 0.5, 0.95], atol=1e-5)
+
+
+def test_a_scene_change_is_in_the_next_answer() -> None:
+    add(table())
+    assert plan(request()).error_code.val == OK
+    add(box("lid", 0.1, 0.5, 0.95, (0.2, 0.2, 0.1)))
+    answer, report = report_of(lambda: plan(request()))
+    assert answer.error_code.val == MoveItErrorCodes.GOAL_IN_COLLISION
+    assert "'lid'" in report["reason"] and "mm deep" in report["reason"]
+    add(CollisionObject(id="lid", operation=CollisionObject.REMOVE))
+    assert plan(request()).error_code.val == OK
+
+
+def test_get_planning_scene_answers_what_is_asked_for() -> None:
+    add(table())
+    parts = PlanningSceneComponents
+    names = call("get_planning_scene", GetPlanningScene, parts(parts.WORLD_OBJECT_NAMES)).scene
+    assert [item.id for item in names.world.collision_objects] == ["table"]
+    assert not names.world.collision_objects[0].primitives and not names.allowed_collision_matrix.entry_names
+    full = call("get_planning_scene", GetPlanningScene, parts(1023)).scene
+    assert list(full.world.collision_objects[0].primitives[0].dimensions) == [1.2, 0.8, 0.04]
+    assert "forearm_link" in full.allowed_collision_matrix.entry_names and full.robot_state.joint_state.name
+
+
+def test_attaching_takes_an_object_out_of_the_world_and_detaching_puts_it_back() -> None:
+    add(table(), box("block", 0.3, 0.5, 0.90, (0.04, 0.04, 0.08)))
+    scene = PlanningScene(is_diff=True)
+    scene.robot_state.is_diff = True
+    attached = AttachedCollisionObject(link_name="ezgripper_palm_link", touch_links=["ezgripper_palm_link"])
+    attached.object.id = "block"
+    scene.robot_state.attached_collision_objects = [attached]
+    assert call("apply_planning_scene", ApplyPlanningScene, scene).success
+    state = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
+    assert [item.id for item in state.world.collision_objects] == ["table"]
+    assert [item.object.id for item in state.robot_state.attached_collision_objects] == ["block"]
+    attached.object.operation = CollisionObject.REMOVE
+    assert call("apply_planning_scene", ApplyPlanningScene, scene).success
+    state = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
+    back = {item.id: item.pose.position for item in state.world.collision_objects}["block"]
+    assert np.allclose([back.x, back.y, back.z], [0.0, 0.0, 0.0], atol=1e-6), "the object's frame is where it was"
+
+
+def test_an_allowed_pair_may_touch() -> None:
+    add(table(), box("lid", 0.1, 0.5, 0.95, (0.2, 0.2, 0.1)))
+    scene = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
+    diff = PlanningScene(is_diff=True, allowed_collision_matrix=scene.allowed_collision_matrix)
+    diff.allowed_collision_matrix.default_entry_names = ["lid"]
+    diff.allowed_collision_matrix.default_entry_values = [True]
+    assert call("apply_planning_scene", ApplyPlanningScene, diff).success
+    assert plan(request()).error_code.val == OK
+
+
+def test_state_validity_names_the_bodies_and_the_depth() -> None:
+    assert call("check_state_validity", GetStateValidity, RobotState(), GROUP, Constraints()).valid
+    add(box("wall", -0.11, 0.46, 1.3, (0.3, 0.3, 0.3)))
+    answer = call("check_state_validity", GetStateValidity, RobotState(), GROUP, Constraints())
+    assert not answer.valid and answer.contacts[0].depth > 0
+    assert "wall" in {answer.contacts[0].contact_body_1, answer.contacts[0].contact_body_2}
+
+
+def test_planners_are_listed() -> None:
+    answer = call("query_planner_interface", QueryPlannerInterfaces)
+    assert "RRTConnect" in answer.planner_interfaces[0].planner_ids
+
+
+def ik(**changes: Any) -> PositionIKRequest:
+    message = PositionIKRequest(group_name=GROUP, ik_link_name="eg_manipulator", avoid_collisions=True)
+    message.pose_stamped = PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 0.5, 0.95), DOWN))
+    for name, value in changes.items():
+        setattr(message, name, value)
+    return message
+
+
+def test_ik_honours_frames_and_says_what_is_out_of_reach() -> None:
+    add(table())
+    assert call("compute_ik", GetPositionIK, ik()).error_code.val == OK
+    on_table = PoseStamped(Header(frame_id="table"), Pose(Point(0.1, 0.5, 0.95), DOWN))
+    assert call("compute_ik", GetPositionIK, ik(pose_stamped=on_table)).error_code.val == OK
+    far = PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 2.5, 0.95), DOWN))
+    answer, report = report_of(lambda: call("compute_ik", GetPositionIK, ik(pose_stamped=far)))
+    assert answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and "out of reach" in report["reason"]
+    low = PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 0.5, 0.80), DOWN))
+    answer, report = report_of(lambda: call("compute_ik", GetPositionIK, ik(pose_stamped=low)))
+    assert answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and "'table'" in report["reason"]
+
+
+def joint_goal(name: str, value: float) -> Constraints:
+    return Constraints(joint_constraints=[JointConstraint(joint_name=name, position=value)])
+
+
+NAN = float("nan")
+BAD_STATE = RobotState(joint_state=JointState(name=["no_such_joint"], position=[0.0]))
+NAN_STATE = RobotState(joint_state=JointState(name=ARM, position=[NAN] * 6))
+SHORT_STATE = RobotState(joint_state=JointState(name=ARM, position=[0.0]))
+CODES = MoveItErrorCodes
+
+
+@pytest.mark.parametrize(("message", "codes"), [
+    (MotionPlanRequest(), {CODES.INVALID_GROUP_NAME}),
+    (request(group_name="nobody"), {CODES.INVALID_GROUP_NAME}),
+    (request(joint_goal("no_such_joint", 0.0)), {CODES.INVALID_GOAL_CONSTRAINTS}),
+    (request(joint_goal("elbow_joint", NAN)), {CODES.INVALID_GOAL_CONSTRAINTS}),
+    (request(joint_goal("elbow_joint", 100.0)), {-27}),
+    (request(pose_constraints(NAN, 0.5, 0.95)), {CODES.FAILURE}),
+    (request(pose_constraints(0.1, 0.5, 0.95, Quaternion(0, 0, 0, 0))), {CODES.FAILURE}),
+    (request(pose_constraints(0.1, 0.5, 0.95, frame="nowhere")), {CODES.FRAME_TRANSFORM_FAILURE}),
+    (request(Constraints()), {CODES.INVALID_GOAL_CONSTRAINTS}),
+    (request(goal_constraints=[]), {CODES.INVALID_GOAL_CONSTRAINTS}),
+    (request(start_state=BAD_STATE), {CODES.INVALID_ROBOT_STATE}),
+    (request(start_state=NAN_STATE), {CODES.INVALID_ROBOT_STATE}),
+    (request(start_state=SHORT_STATE), {CODES.INVALID_ROBOT_STATE}),
+    (request(allowed_planning_time=NAN), {CODES.TIMED_OUT}),
+    (request(max_velocity_scaling_factor=NAN), {CODES.INVALID_MOTION_PLAN}),
+    (request(planner_id="BiTRRT"), {CODES.PLANNING_FAILED}),
+    (request(pipeline_id="nobody"), {CODES.PLANNING_FAILED}),
+])
+def test_malformed_plan_requests_get_a_code(message: MotionPlanRequest, codes: set[int]) -> None:
+    assert plan(message).error_code.val in codes
+
+
+def test_malformed_ik_and_fk_requests_get_a_code() -> None:
+    zero = PoseStamped(Header(frame_id="world"), Pose())
+    lost = PoseStamped(Header(frame_id="nowhere"), Pose(Point(0, 0.5, 1), DOWN))
+    for message, code in ((PositionIKRequest(), CODES.INVALID_GROUP_NAME), (ik(pose_stamped=zero), CODES.FAILURE),
+                          (ik(pose_stamped=lost), CODES.FRAME_TRANSFORM_FAILURE),
+                          (ik(ik_link_name="nobody"), CODES.INVALID_LINK_NAME),
+                          (ik(robot_state=NAN_STATE), CODES.INVALID_ROBOT_STATE)):
+        assert call("compute_ik", GetPositionIK, message).error_code.val == code
+    for header, links, code in ((Header(), ["nobody"], CODES.INVALID_LINK_NAME),
+                                (Header(), [], CODES.INVALID_LINK_NAME),
+                                (Header(frame_id="nowhere"), ["tool0"], CODES.FRAME_TRANSFORM_FAILURE)):
+        assert call("compute_fk", GetPositionFK, header, links, RobotState()).error_code.val == code
+
+
+def test_malformed_scenes_are_refused_whole_and_leave_the_scene_alone() -> None:
+    bad = [box("", 0, 0, 3, (1, 1, 1)), box("x", NAN, 0, 3, (1, 1, 1)), box("x", 0, 0, 3, (1, -1, 1)),
+           box("forearm_link", 0, 0, 3, (1, 1, 1)), CollisionObject(id="empty"),
+           CollisionObject(id="nobody", operation=CollisionObject.MOVE)]
+    for item in bad:
+        assert not add(box("good", 0, 0, 3, (0.1, 0.1, 0.1)), item)
+    scene = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
+    assert not scene.world.collision_objects
+
+
+def execute_client() -> Any:
+    client = actionlib.SimpleActionClient("execute_trajectory", ExecuteTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(10.0))
+    return client
+
+
+def test_a_plan_is_executed_and_the_arm_is_there(arm: FakeArm) -> None:
+    answer = plan(request())
+    client = execute_client()
+    client.send_goal(ExecuteTrajectoryGoal(answer.trajectory))
+    assert client.wait_for_result(rospy.Duration(30.0))
+    assert client.get_result().error_code.val == OK and client.get_state() == GoalStatus.SUCCEEDED
+    end = answer.trajectory.joint_trajectory.points[-1].positions
+    assert np.allclose([arm.positions[name] for name in ARM], end, atol=1e-9)
+
+
+def test_a_cancel_reaches_the_controller_while_the_motion_runs(arm: FakeArm) -> None:
+    answer = plan(request(max_velocity_scaling_factor=0.02, max_acceleration_scaling_factor=0.02))
+    arm.cancelled.clear()
+    client = execute_client()
+    client.send_goal(ExecuteTrajectoryGoal(answer.trajectory))
+    time.sleep(0.5)
+    client.cancel_goal()
+    assert client.wait_for_result(rospy.Duration(5.0))
+    assert client.get_result().error_code.val == CODES.PREEMPTED
+    assert arm.cancelled.wait(2.0)
+
+
+def test_a_motion_from_elsewhere_is_refused_with_the_joint_that_is_off(arm: FakeArm) -> None:
+    answer = plan(request())
+    arm.positions["elbow_joint"] += 0.3
+    time.sleep(0.2)
+    client = execute_client()
+    _, report = report_of(lambda: client.send_goal_and_wait(ExecuteTrajectoryGoal(answer.trajectory),
+                                                            rospy.Duration(10.0)))
+    assert client.get_result().error_code.val == CODES.INVALID_MOTION_PLAN
+    assert "elbow_joint" in report["reason"] and "allowed_start_tolerance" in report["reason"]
+
+
+def test_a_controller_that_is_not_there_is_named() -> None:
+    goal = ExecuteTrajectoryGoal()
+    goal.trajectory.joint_trajectory.joint_names = [GRIPPER]
+    goal.trajectory.joint_trajectory.points = [plan(request()).trajectory.joint_trajectory.points[0]]
+    goal.trajectory.joint_trajectory.points[0].positions = [0.3]
+    client = execute_client()
+    _, report = report_of(lambda: client.send_goal_and_wait(goal, rospy.Duration(20.0)))
+    assert client.get_result().error_code.val == CODES.CONTROL_FAILED
+    assert "ezgripper_controller/gripper_cmd" in report["reason"]
+
+
+def test_the_move_group_action_plans_and_moves(arm: FakeArm) -> None:
+    client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+    assert client.wait_for_server(rospy.Duration(10.0))
+    goal = MoveGroupGoal(request=request())
+    goal.planning_options.plan_only = True
+    client.send_goal_and_wait(goal, rospy.Duration(20.0))
+    assert client.get_result().error_code.val == OK and arm.positions["elbow_joint"] == START[2]
+    goal.planning_options.plan_only = False
+    client.send_goal_and_wait(goal, rospy.Duration(30.0))
+    assert client.get_result().error_code.val == OK
+    assert arm.positions["elbow_joint"] != START[2]
+
+
+def test_several_plans_at_a_time_do_not_disturb_each_other() -> None:
+    add(table())
+    codes: list[int] = []
+
+    def work(x: float) -> None:
+        answer = plan(request(pose_constraints(x, 0.5, 0.95)))
+        codes.append(answer.error_code.val)
+
+    threads = [threading.Thread(target=work, args=(0.05 * number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60.0)
+    assert codes == [OK] * 4
