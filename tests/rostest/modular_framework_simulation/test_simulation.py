@@ -19,6 +19,7 @@ from gazebo_msgs.srv import (
     GetModelState,
     GetPhysicsProperties,
     GetWorldProperties,
+    SetModelConfiguration,
     SetModelState,
     SpawnModel,
 )
@@ -221,6 +222,19 @@ def test_reset_world_puts_models_and_robot_back_and_controllers_go_on(simulation
     joints = rospy.wait_for_message("/joint_states", JointState, 10.0)
     positions = dict(zip(joints.name, joints.position, strict=True))
     assert [positions[name] for name in ARM] == pytest.approx(START, abs=0.002)
+
+
+def test_joints_are_put_somewhere_and_the_controllers_hold_them_there(simulation: Any) -> None:
+    wanted = [0.8, -1.4, 1.3, -1.3, -1.4, 0.2]
+    service = "/gazebo/set_model_configuration"
+    answer = call(service, SetModelConfiguration, "ur5_with_ezgripper", "robot_description", ARM, wanted)
+    assert answer.success, answer.status_message
+    rospy.sleep(0.5)
+    joints = rospy.wait_for_message("/joint_states", JointState, 10.0)
+    positions = dict(zip(joints.name, joints.position, strict=True))
+    assert [positions[name] for name in ARM] == pytest.approx(wanted, abs=0.005)
+    answer = call(service, SetModelConfiguration, "ur5_with_ezgripper", "", ["knee"], [1.0])
+    assert (answer.success, "no joint" in answer.status_message) == (False, True)
 
 
 def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -> None:

@@ -26,7 +26,7 @@ class UnknownEntityError(SimulationError):
     """A model, link or frame was asked for that the world does not have.
 
     Args:
-        kind: What was looked for: "model", "link" or "frame".
+        kind: What was looked for: "model", "link" or "joint".
         name: The name that was asked for.
         known: The names that exist.
     """

@@ -8,6 +8,7 @@ Each handler runs in a thread of its own, has its work done by the simulation lo
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -55,6 +56,7 @@ class GazeboServices:
             (ros_names.DELETE_MODEL, srv.DeleteModel, self._delete),
             (ros_names.GET_MODEL_STATE, srv.GetModelState, self._get_model_state),
             (ros_names.SET_MODEL_STATE, srv.SetModelState, self._set_model_state),
+            (ros_names.SET_MODEL_CONFIGURATION, srv.SetModelConfiguration, self._set_configuration),
             (ros_names.GET_LINK_STATE, srv.GetLinkState, self._get_link_state),
             (ros_names.GET_MODEL_PROPERTIES, srv.GetModelProperties, self._get_model_properties),
             (ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties, self._get_world_properties),
@@ -165,6 +167,13 @@ class GazeboServices:
                 rospy.logerr("%s (topic): %s", ros_names.SET_MODEL_STATE_TOPIC, error)
 
         self._loop.requests.post(put)
+
+    def _set_configuration(self, request: Any) -> Any:
+        names, values = request.joint_names, request.joint_positions
+        if len(names) != len(values) or not all(math.isfinite(value) for value in values):
+            raise ValueError(f"got {len(names)} joints and positions {list(values)}; give each joint one finite number")
+        self._loop.set_joints(request.model_name, dict(zip(names, values, strict=True)))
+        return srv.SetModelConfigurationResponse(True, f"set {len(names)} joints of model '{request.model_name}'")
 
     def _get_link_state(self, request: Any) -> Any:
         reference = request.reference_frame

@@ -126,11 +126,22 @@ class SimulatedBody:
             twist = _moved_twist(state.twist, state.pose, centre)
             api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
 
+    def set_joints(self, positions: dict[str, float]) -> None:
+        """Puts joints at positions [rad or m], at rest; joints that are not named stay.
+
+        Raises:
+            UnknownEntityError: The model has no such movable joint.
+        """
+        api, client = self._engine.api, self._engine.client
+        unknown = sorted(set(positions) - set(self.joint_indices))
+        if unknown:
+            raise UnknownEntityError("joint", f"{self.name}::{unknown[0]}", list(self.joint_indices))
+        for name, position in positions.items():
+            api.resetJointState(self.number, self.joint_indices[name], position, 0.0, physicsClientId=client)
+
     def reset_joints(self, positions: dict[str, float]) -> None:
         """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
-        api, client = self._engine.api, self._engine.client
-        for name, index in self.joint_indices.items():
-            api.resetJointState(self.number, index, positions.get(name, 0.0), 0.0, physicsClientId=client)
+        self.set_joints({name: positions.get(name, 0.0) for name in self.joint_indices})
 
     def fingerprint(self) -> list[float]:
         """Returns every number of the body's state, for comparing whole worlds."""

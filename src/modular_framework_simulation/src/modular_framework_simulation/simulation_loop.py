@@ -103,6 +103,22 @@ class SimulationLoop:
         self.grasp_watch.reset()
         if self._actors is not None:
             self._actors.robot.reset()
+        self._take_over_joints()
+
+    def set_joints(self, name: str, positions: dict[str, float]) -> None:
+        """Puts joints of a model or of the robot at positions [rad or m], at rest.
+
+        Raises:
+            UnknownEntityError: There is no such model, or it has no such joint.
+        """
+        body = self.world.body(name)
+        body.set_joints(positions)
+        if self._actors is not None and body is self._actors.robot.body:
+            self._take_over_joints()
+
+    def _take_over_joints(self) -> None:
+        """Has hardware and controllers start from where the joints now are."""
+        if self._actors is not None:
             self._actors.hardware.read(self._time_s(), 0.0)
             self._actors.hardware.hold()
         self._reset_controllers = True
