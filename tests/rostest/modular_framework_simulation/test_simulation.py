@@ -2,6 +2,7 @@
 """The simulation as its users see it on the wire: clock, controllers, Gazebo's services and topics, planning scene."""
 from __future__ import annotations
 
+import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -186,6 +187,22 @@ def test_a_wrong_request_is_answered_with_the_reason(simulation: Any, request_it
     answer = request_it()
     assert not answer.success
     assert said in answer.status_message
+
+
+def test_spawn_model_works_from_the_command_line(simulation: Any, ros_session: Any) -> None:
+    def spawn_model(*words: str) -> int:
+        command = ["rosrun", "gazebo_ros", "spawn_model", *words]
+        return subprocess.run(command, env=ros_session.env, timeout=60, check=False, capture_output=True).returncode
+
+    place = ("-x", "1", "-y", "-1", "-z", "0.1", "-Y", "0.5")
+    assert spawn_model("-sdf", "-database", "cube", "-model", "dice", *place) == 0
+    try:
+        state = call("/gazebo/get_model_state", GetModelState, "dice", "")
+        assert (state.success, state.pose.position.x) == (True, pytest.approx(1.0, abs=0.01))
+        assert spawn_model("-sdf", "-database", "cube", "-model", "dice") == 1
+        assert spawn_model("-sdf", "-file", "/nowhere.sdf", "-model", "x") == 1
+    finally:
+        call("/gazebo/delete_model", DeleteModel, "dice")
 
 
 def test_states_of_models_and_links_are_published(simulation: Any) -> None:
