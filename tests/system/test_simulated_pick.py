@@ -49,4 +49,4 @@ def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSessi
 def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None:
     launch = session.run_framework(robot_packag="ur5_ezgripper_robot")
     assert launch.wait(30.0) == 2
-    assert "robot_packag" in launch.log()
+    assert "unknown argument 'robot_packag'; did you mean 'robot_package'" in launch.log()

@@ -6,11 +6,13 @@ node when a node died instead.
 """
 from __future__ import annotations
 
+import difflib
 import sys
 from dataclasses import dataclass, field
 
 import rosgraph
 import roslaunch
+import roslaunch.arg_dump
 import roslaunch.core
 import roslaunch.parent
 import roslaunch.pmon
@@ -72,6 +74,7 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
     watcher = EndWatcher(task_name)
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([package, launch_file])[0]
+        _check_arguments(path, arguments)
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
         roslaunch.configure_logging(uuid)
         parent = roslaunch.parent.ROSLaunchParent(
@@ -84,6 +87,26 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         print(f"run_framework: {error}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
     return _verdict(watcher)
+
+
+def _check_arguments(path: str, arguments: list[str]) -> None:
+    """Refuses what roslaunch would silently ignore: an argument that the launch file does not have.
+
+    Raises:
+        roslaunch.core.RLException: it names every wrong argument and what was probably meant.
+    """
+    known = roslaunch.arg_dump.get_args([path])
+    faults = []
+    for argument in arguments:
+        name, assignment, _ = argument.partition(":=")
+        if not assignment:
+            faults.append(f"argument '{argument}' is not of the form name:=value")
+        elif name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"; did you mean '{near[0]}'" if near else ""
+            faults.append(f"unknown argument '{name}'{hint}; allowed: {', '.join(sorted(known))}")
+    if faults:
+        raise roslaunch.core.RLException(f"{path}: " + "; ".join(faults))
 
 
 def _master_port() -> int | None:
