@@ -140,6 +140,7 @@ class SimulationNode:
     def _run_loop(self) -> None:
         try:
             self._loop.run()
+            self._report_pace()
         except Exception as error:  # whatever ends the loop ends the node, and says why
             rospy.logfatal("the simulation loop ended with %s: %s", type(error).__name__, error)
             self._failed = True
@@ -164,7 +165,6 @@ class SimulationNode:
         rospy.loginfo("simulation is running%s", " (paused)" if self._loop.paused else "")
         rospy.spin()
         self.close()
-        self._report_pace()
         return 1 if self._failed else 0
 
     def _stop_loop(self) -> None:
