@@ -163,6 +163,7 @@ def report_of(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
     while subscriber.get_num_connections() == 0 and time.monotonic() < deadline:
         time.sleep(0.01)
     result = work()
+    deadline = time.monotonic() + 5.0
     while not reports and time.monotonic() < deadline:
         time.sleep(0.01)
     subscriber.unregister()

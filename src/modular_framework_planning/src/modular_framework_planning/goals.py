@@ -6,7 +6,7 @@ import numpy as np
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.kinematics import KinematicsPool, first_free
 from modular_framework_planning.motion_check import MotionChecker
 from modular_framework_planning.planning_request import JointGoal, PlanningRequest, PoseGoal
 from modular_framework_planning.robot_model import JointGroup
@@ -76,18 +76,9 @@ class GoalResolver:
         found = solver.solutions(goal.link, goal.target, seed, IK_TIMEOUT_S, self._rng)
         if not found:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
-        free: list[Array] = []
-        verdicts: dict[bytes, bool] = {}  # whole turns of a joint look the same to every obstacle
-        for positions in found:
-            values = positions[self._group.indices]
-            key = np.round(np.exp(1j * values), 4).tobytes()
-            if key not in verdicts:
-                verdicts[key] = self._motion.state_is_free(values)
-            if verdicts[key]:
-                free.append(values)
-            if len(free) >= MAX_GOAL_STATES:
-                break
+        candidates = [positions[self._group.indices] for positions in found]
+        free = first_free(candidates, self._motion.state_is_free, MAX_GOAL_STATES)
         if not free:
-            self._require_free(found[0][self._group.indices], f"goal: all {len(found)} inverse kinematics solutions "
+            self._require_free(candidates[0], f"goal: all {len(found)} inverse kinematics solutions "
                                f"for '{goal.link}' collide; the nearest is")
         return free

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -206,15 +208,14 @@ class InverseKinematics:
 
     def _turns(self, number: int, value: float) -> list[float]:
         """Returns a joint's value and what differs from it by whole turns, within bounds."""
-        lower, upper = self.model.lower[number] - 1e-9, self.model.upper[number] + 1e-9
+        lower, upper = float(self.model.lower[number]) - 1e-9, float(self.model.upper[number]) + 1e-9
         if self.model.document.joint_kinds[self.model.joint_names[number]] == "prismatic":
             return [value] if lower <= value <= upper else []
         if self.model.is_continuous(number):
             return [value + turn * 2.0 * np.pi for turn in (-1, 0, 1)]
-        first = int(np.ceil((lower - value) / (2.0 * np.pi)))
-        last = int(np.floor((upper - value) / (2.0 * np.pi)))
-        return [float(np.clip(value + turn * 2.0 * np.pi, lower + 1e-9, upper - 1e-9))
-                for turn in range(first, last + 1)]
+        first = math.ceil((lower - value) / (2.0 * math.pi))
+        last = math.floor((upper - value) / (2.0 * math.pi))
+        return [min(max(value + turn * 2.0 * math.pi, lower + 1e-9), upper - 1e-9) for turn in range(first, last + 1)]
 
     def _ranked(self, found: list[Array], seed: Array) -> list[Array]:
         """Drops duplicates, adds turns and puts the nearest to the seed first."""
@@ -228,7 +229,12 @@ class InverseKinematics:
             return []
         rows = np.vstack([self._wraps(values) for values in unique])
         order = np.argsort(np.linalg.norm(rows - seed[indices], axis=1), kind="stable")
-        return [self._embed(seed, values) for values in rows[order]]
+        result = np.tile(np.asarray(seed, dtype=float), (len(order), 1))
+        result[:, indices] = rows[order]
+        for follower, leader, multiplier, offset in self.model.mimics:
+            if leader in self._members:
+                result[:, follower] = multiplier * result[:, leader] + offset
+        return list(result)
 
     def explain_unreachable(self, tip_link: str, target: Transform, seed: Array) -> str:
         """Says why a pose has no solution: too far away, or only out of joint bounds."""
@@ -243,6 +249,24 @@ class InverseKinematics:
         return (f"no inverse kinematics for '{tip_link}' at {where} m: '{self._last_link}' would be {distance:.3f} m "
                 f"from the shoulder (at most {self.reach:.3f} m), but no joint positions within the bounds of group "
                 f"'{self.group.name}' give this orientation there")
+
+
+def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: int = 1) -> list[Array]:
+    """Returns the first candidates that are free, in their order.
+
+    Whole turns of a joint look the same to every obstacle, so each posture is checked once.
+    """
+    verdicts: dict[bytes, bool] = {}
+    free: list[Array] = []
+    for values in candidates:
+        key = np.round(np.exp(1j * values), 4).tobytes()
+        if key not in verdicts:
+            verdicts[key] = is_free(values)
+        if verdicts[key]:
+            free.append(values)
+            if len(free) >= most:
+                break
+    return free
 
 
 class KinematicsPool:

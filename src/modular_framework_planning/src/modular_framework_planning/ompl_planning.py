@@ -22,7 +22,7 @@ PLANNERS: dict[str, type] = {
     "RRTConnect": og.RRTConnect, "RRTstar": og.RRTstar, "SORRTstar": og.SORRTstar,
 }
 DEFAULT_PLANNER = "RRTConnect"
-DEFAULT_RANGE = 1.0  # [rad or m]; a fifth of the space, OMPL's own choice, makes edges so long that few are free
+DEFAULT_RANGE = 0.5  # [rad or m]; a fifth of the space, OMPL's own choice, makes edges so long that few are free
 _SETTERS = {"range": "setRange", "goal_bias": "setGoalBias", "border_fraction": "setBorderFraction",
             "num_samples": "setNumSamples", "radius_multiplier": "setRadiusMultiplier"}
 

@@ -17,6 +17,7 @@ from modular_framework_planning import capability_names as names
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.conversions import pose_message, scene_with_state, stamped_in_scene, state_message
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.kinematics import first_free
 from modular_framework_planning.pipeline import describe_contacts
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.ros_context import MoveGroupContext
@@ -73,9 +74,9 @@ class KinematicsService:
         if not request.avoid_collisions:
             return found[0]
         checker = CollisionChecker(scene, group.indices)
-        for positions in found:
-            if checker.is_free(positions):
-                return positions
+        free = first_free(found, checker.is_free)
+        if free:
+            return free[0]
         contacts = describe_contacts(checker.contacts(found[0], include_fixed=False))
         raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(found)} inverse kinematics solutions for '{link}' "
                             f"collide; the nearest: {contacts}")
