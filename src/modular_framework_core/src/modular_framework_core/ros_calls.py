@@ -110,17 +110,19 @@ def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,
     Returns:
         The final goal status, PREEMPTED after a stop, LOST out of time.
     """
-    ended = (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.RECALLED,
-             GoalStatus.LOST)
     stopped = False
+
+    def ended() -> bool:
+        # the status of the goal is final some time before its result is here; DONE means that both are
+        return bool(client.simple_state == actionlib.SimpleGoalState.DONE)
 
     def finished() -> bool:
         nonlocal stopped
         stopped = stopped or stop_requested()
-        return stopped or client.get_state() in ended
+        return stopped or ended()
 
     if wait_until(finished, timeout_s) and not stopped:
         return int(client.get_state())
     client.cancel_goal()
-    wait_until(lambda: client.get_state() in ended, 2.0)
+    wait_until(ended, 2.0)
     return int(GoalStatus.PREEMPTED if stopped else GoalStatus.LOST)

@@ -156,9 +156,10 @@ class TrajectoryExecution:
 
     def _is_done(self, part: _Part) -> bool:
         client = self._clients[part.controller.name]
-        state = client.get_state()
-        if state in (GoalStatus.PENDING, GoalStatus.ACTIVE):
+        # the status of the goal is final some time before its result is here; DONE means that both are
+        if client.simple_state != actionlib.SimpleGoalState.DONE:
             return False
+        state = client.get_state()
         result = client.get_result()
         if state == GoalStatus.SUCCEEDED and getattr(result, "error_code", 0) == 0:
             return True
