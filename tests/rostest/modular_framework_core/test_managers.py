@@ -6,8 +6,15 @@ from pathlib import Path
 
 import pytest
 import rospy
+from gazebo_msgs.srv import GetModelProperties, GetModelPropertiesResponse
 from geometry_msgs.msg import PoseStamped
-from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
+from moveit_msgs.msg import (
+    AllowedCollisionEntry,
+    AllowedCollisionMatrix,
+    AttachedCollisionObject,
+    CollisionObject,
+)
+from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneResponse
 from sensor_msgs.msg import JointState
 
 from modular_framework_core import srv
@@ -149,3 +156,40 @@ def test_the_links_of_the_manipulator_are_read_again_with_every_reference_matrix
     rospy.set_param("manipulator_links_indices", [7])
     assert not call("set_init_acm", srv.SetInitACM, matrix(names, [])).success
     assert managers.alive()
+
+
+def test_loose_objects_of_the_simulation_are_known_without_being_added_and_static_ones_are_not(managers):
+    def scene(request):
+        answer = GetPlanningSceneResponse()
+        answer.scene.world.collision_objects = [CollisionObject(id=name) for name in
+                                                ("wood_block__link", "table__link", "early__link", "drawn_by_hand")]
+        answer.scene.robot_state.attached_collision_objects = [
+            AttachedCollisionObject(object=CollisionObject(id="can__link"))]
+        return answer
+
+    def properties(request):
+        loose = request.model_name in ("wood_block", "can", "early")
+        return GetModelPropertiesResponse(success=loose or request.model_name == "table", is_static=not loose)
+
+    touch = GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION
+    rospy.set_param("manipulator_links_indices", [1])
+    assert call("set_init_acm", srv.SetInitACM, matrix(["arm", "palm"], [])).success
+    rospy.set_param("simulation", True)
+    try:
+        before = call("get_modified_acm", srv.GetModifiedACM, touch, [], True)
+        assert before.success
+        assert "cannot be looked up" in managers.log()
+        services = [rospy.Service("get_planning_scene", GetPlanningScene, scene),
+                    rospy.Service("gazebo/get_model_properties", GetModelProperties, properties)]
+        answer = call("get_modified_acm", srv.GetModifiedACM, touch, [], True)
+        assert {"wood_block__link", "can__link", "early__link"} <= set(answer.acm.entry_names)
+        assert not {"table__link", "drawn_by_hand"} & set(answer.acm.entry_names)
+        for name in ("wood_block__link", "can__link", "early__link"):
+            assert allowed(answer.acm, "palm", name)
+            assert not allowed(answer.acm, "arm", name)
+        restored = call("get_modified_acm", srv.GetModifiedACM, touch, [], False)
+        assert not allowed(restored.acm, "palm", "wood_block__link")
+        for service in services:
+            service.shutdown()
+    finally:
+        rospy.set_param("simulation", False)

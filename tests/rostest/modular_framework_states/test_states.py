@@ -392,3 +392,28 @@ def test_collisions_are_allowed_only_when_the_scene_takes_them() -> None:
     assert run(state)[0] == "fail"
     assert "apply_planning_scene" in state.reason
     service.shutdown()
+
+
+def test_the_object_of_the_selected_grasp_is_the_only_one_that_may_be_touched() -> None:
+    scenes = []
+    service = rospy.Service("apply_planning_scene", ApplyPlanningScene,
+                            lambda request: scenes.append(request.scene) or ApplyPlanningSceneResponse(success=True))
+    rows = [AllowedCollisionEntry(enabled=[False, False]) for _ in range(2)]
+    call("set_init_acm", srv.SetInitACM, acm=AllowedCollisionMatrix(entry_names=["arm", "palm"], entry_values=rows))
+    for name in ("held", "beside"):
+        call("update_acm_entry", srv.UpdateACMEntry, action=0, entry_name=name)
+    grasp = grasp_message()
+    grasp.object_id = "held__link"
+    state = AllowManipulatorCollisions(True, "object-collision", "userdata", input_keys=["selected_grasp"])
+    assert run(state, selected_grasp=grasp)[0] == "success"
+    matrix = scenes[-1].allowed_collision_matrix
+    palm = matrix.entry_values[matrix.entry_names.index("palm")].enabled
+    assert palm[matrix.entry_names.index("held__link")]
+    assert not palm[matrix.entry_names.index("beside__link")]
+    for nothing in (None, grasp_message()):
+        assert run(state, selected_grasp=nothing)[0] == "fail"
+        assert "names no object" in state.reason
+    unkeyed = AllowManipulatorCollisions(True, "object-collision", "userdata")
+    assert run(unkeyed, selected_grasp=grasp)[0] == "fail"
+    assert "input keys" in unkeyed.reason
+    service.shutdown()

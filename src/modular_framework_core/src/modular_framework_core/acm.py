@@ -137,6 +137,12 @@ class AcmManager:
             self._restore()
             return replaced
 
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Ids of the objects added so far."""
+        with self._lock:
+            return tuple(self._objects)
+
     def add_object(self, entry_name: str) -> str:
         """Adds an object that may touch nothing yet.
 

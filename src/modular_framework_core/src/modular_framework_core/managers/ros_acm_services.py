@@ -8,6 +8,8 @@ import rospy
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
 
 from modular_framework_core.acm import AcmAnswer, AcmError, AcmManager, CollisionMatrix
+from modular_framework_core.managers.ros_simulated_objects import new_loose_objects
+from modular_framework_core.ros_calls import CallError
 from modular_framework_core.srv import (
     GetModifiedACM,
     GetModifiedACMRequest,
@@ -50,9 +52,11 @@ class AcmServices:
         ``manipulator_links_indices`` (list of int): rows of the manipulator's links in the matrix of ``set_init_acm``.
         ``manipulator_prefix`` (string): text in the names of the manipulator's links; used without the indices.
         Both are read each time a reference matrix is set.
+        ``simulation`` (bool): True adds the loose objects of the simulation before a request about objects is served.
 
     Services:
         ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM).
+    Services called in simulation: ``get_planning_scene``, ``gazebo/get_model_properties``.
     """
 
     def __init__(self) -> None:
@@ -124,7 +128,17 @@ class AcmServices:
             case GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION:
                 return self.manager.allow_self_collision(request.allow_collision)
             case GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION:
+                self._add_simulated_objects()
                 return self.manager.allow_object_collision(request.objects, request.allow_collision)
             case _:
                 raise AcmError(f"got modification {request.modification}, allowed are NOTHING=0, "
                                "MANIPULATOR_SELF_COLLISION=1, MANIPULATOR_OBJECT_COLLISION=2")
+
+    def _add_simulated_objects(self) -> None:
+        """Adds what a world file or another node has put into the simulation since the last request."""
+        try:
+            for name in new_loose_objects(self.manager.objects):
+                self.manager.add_object(name)
+        except CallError as error:
+            rospy.logwarn("get_modified_acm: the objects of the simulation cannot be looked up, only those that were "
+                          "added are known: %s", error)
