@@ -71,6 +71,16 @@ as_root() {
   fi
 }
 
+# A bare root (a chroot, say) may lack what every running system has; the build and roslaunch need both.
+mount_what_a_bare_root_lacks() {
+  if [ ! -e /proc/self/stat ]; then
+    as_root mount -t proc proc /proc || fail "/proc is not mounted" "mount -t proc proc /proc"
+  fi
+  if ! /usr/bin/python3 -c 'import os; os.openpty()' 2>/dev/null; then
+    as_root mount -t devpts devpts /dev/pts || fail "there are no pseudo-terminals" "mount -t devpts devpts /dev/pts"
+  fi
+}
+
 missing_debian_packages() {
   local package
   while read -r package; do
@@ -169,7 +179,7 @@ run_catkin_build() {  # --install or --no-install
       .catkin_tools/profiles/default/config.yaml >.catkin_tools/profiles/install/config.yaml
   fi
   catkin build --profile "$profile" --no-status --summarize --force-cmake \
-    --cmake-args -DCMAKE_BUILD_TYPE=Release "-DPYTHON_EXECUTABLE=$VENV/bin/python3"
+    --cmake-args -DCMAKE_BUILD_TYPE=Release "-DPYTHON_EXECUTABLE=$VENV/bin/python3" || return
   # byte code of the generated messages: without it every node compiles them anew, a second and a half each
   "$VENV/bin/python3" -m compileall -q src "$space/lib/python3/dist-packages"
 }
@@ -191,6 +201,7 @@ set_up_packages() {
 
 set_up() {
   set_up_packages
+  mount_what_a_bare_root_lacks
   find_underlay
   build_workspace
 }
