@@ -71,14 +71,16 @@ as_root() {
   fi
 }
 
-# A bare root (a chroot, say) may lack what every running system has; the build and roslaunch need both.
+# A bare root (a chroot, say) may lack what every running system has and the build, roslaunch and shells need.
 mount_what_a_bare_root_lacks() {
   if [ ! -e /proc/self/stat ]; then
     as_root mount -t proc proc /proc || fail "/proc is not mounted" "mount -t proc proc /proc"
   fi
-  if ! /usr/bin/python3 -c 'import os; os.openpty()' 2>/dev/null; then
+  if [ ! -e /dev/pts/ptmx ]; then
+    as_root mkdir -p /dev/pts
     as_root mount -t devpts devpts /dev/pts || fail "there are no pseudo-terminals" "mount -t devpts devpts /dev/pts"
   fi
+  [ -e /dev/fd ] || as_root ln -s /proc/self/fd /dev/fd
 }
 
 missing_debian_packages() {
@@ -91,7 +93,7 @@ missing_debian_packages() {
 
 install_debian_packages() {
   local missing
-  mapfile -t missing < <(missing_debian_packages)
+  read -ra missing <<<"$(missing_debian_packages | tr '\n' ' ')"
   if [ ${#missing[@]} = 0 ]; then
     say "[1/3] Debian packages: all there"
     return
@@ -195,13 +197,13 @@ set_up_packages() {
   check_system
   mkdir -p "$ROOT/logs"
   : >"$LOG"
+  mount_what_a_bare_root_lacks
   install_debian_packages
   make_python_environment
 }
 
 set_up() {
   set_up_packages
-  mount_what_a_bare_root_lacks
   find_underlay
   build_workspace
 }
