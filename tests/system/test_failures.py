@@ -19,9 +19,11 @@ NODES = (
     "move_group",
     "managers",
     "sensors_tf2_broadcaster",
+    "launch_grasp_action_server",
     "moveit_grasp_action_server",
     "top_down_grasp_generator",
     "task",
+    "rosout",
 )
 
 

@@ -80,7 +80,7 @@ def test_an_object_enters_and_leaves_the_simulation(simulation: FakeSimulation) 
     assert object_type("mine") == "box"
     code, text = manage(simulation, "-t", "box", "-n", "mine")
     assert code == 1
-    assert "add_gazebo_mapping" in text
+    assert "there is an object 'mine' already" in text
     assert manage(simulation, "-d", "true", "-n", "mine")[0] == 0
     assert not simulation.models
     assert object_type("mine") == ""
@@ -97,6 +97,12 @@ def test_what_the_simulation_refuses_leaves_no_trace(simulation: FakeSimulation)
     assert object_type("box") == "box"
     simulation.refuse_delete = False
     assert manage(simulation, "-d", "true", "-t", "box")[0] == 0
+
+
+def test_an_object_that_came_with_the_world_can_be_deleted_too(simulation: FakeSimulation) -> None:
+    simulation.models["of_the_world"] = None
+    assert manage(simulation, "-d", "true", "-n", "of_the_world")[0] == 0
+    assert "of_the_world" not in simulation.models
 
 
 def test_arguments_without_sense_end_with_their_own_code(simulation: FakeSimulation) -> None:

@@ -25,22 +25,40 @@ class RefusedError(RuntimeError):
     """A service said no; the text says which and why."""
 
 
-def call(name: str, service_type: Any, request: Any) -> Any:
+def call(name: str, service_type: Any, request: Any, refusal: str = "its node logged the reason") -> Any:
     """Calls a service.
+
+    Args:
+        name: Name of the service.
+        service_type: Its type.
+        request: Its request.
+        refusal: What it means when the service says no and gives no reason.
+
+    Returns:
+        The answer.
 
     Raises:
         RefusedError: It is absent, fails, or answers without success.
     """
+    answer = ask(name, service_type, request)
+    if not answer.success:
+        text = getattr(answer, "status_message", "") or refusal
+        raise RefusedError(f"service '{rospy.resolve_name(name)}' refused: {text}")
+    return answer
+
+
+def ask(name: str, service_type: Any, request: Any) -> Any:
+    """Calls a service whose "no" is an answer like any other.
+
+    Raises:
+        RefusedError: It is absent or fails.
+    """
     proxy = rospy.ServiceProxy(name, service_type)
     try:
         wait_for_service(proxy, SERVICE_TIMEOUT_S)
-        answer = call_service(proxy, request, SERVICE_TIMEOUT_S)
+        return call_service(proxy, request, SERVICE_TIMEOUT_S)
     except CallError as error:
         raise RefusedError(str(error)) from error
-    if not answer.success:
-        text = getattr(answer, "status_message", "") or "its node logged the reason"
-        raise RefusedError(f"service '{proxy.resolved_name}' refused: {text}")
-    return answer
 
 
 def spawn(request: ObjectRequest) -> None:
@@ -57,7 +75,8 @@ def spawn(request: ObjectRequest) -> None:
         raise RefusedError(f"'{request.sdf_file}' cannot be read: {error}") from error
     pose = Pose(Point(*request.position_m), Quaternion(*quaternion_from_rpy(*request.rpy_rad)))
     call("add_gazebo_mapping", srv.AddGazeboMapping,
-         srv.AddGazeboMappingRequest(object_name=request.name, object_type=request.object_type))
+         srv.AddGazeboMappingRequest(object_name=request.name, object_type=request.object_type),
+         f"there is an object '{request.name}' already; choose another name (-n), or delete that one first")
     try:
         call("gazebo/spawn_sdf_model", SpawnModel,
              SpawnModelRequest(model_name=request.name, model_xml=xml, initial_pose=pose,
@@ -74,20 +93,17 @@ def spawn(request: ObjectRequest) -> None:
 
 
 def delete(request: ObjectRequest) -> None:
-    """Deletes an object, or leaves everything as it was.
+    """Deletes an object, also one that came with the world file; or leaves everything as it was.
+
+    The simulation decides whether the object exists: only objects that were spawned here are in the map of types.
 
     Raises:
         RefusedError: A service said no.
     """
-    object_type = call("get_object_type", srv.GetGazeboType,
-                       srv.GetGazeboTypeRequest(object_name=request.name)).object_type
-    call("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
-    try:
-        call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
-    except RefusedError:
-        _take_back("add_gazebo_mapping", srv.AddGazeboMapping,
-                   srv.AddGazeboMappingRequest(object_name=request.name, object_type=object_type))
-        raise
+    call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
+    mapping = srv.GetGazeboTypeRequest(object_name=request.name)
+    if ask("get_object_type", srv.GetGazeboType, mapping).success:
+        call("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
     call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.DELETE_ENTRY, request.name))
 
 
