@@ -100,9 +100,10 @@ def delete(request: ObjectRequest) -> None:
     Raises:
         RefusedError: A service said no.
     """
-    call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
     mapping = srv.GetGazeboTypeRequest(object_name=request.name)
-    if ask("get_object_type", srv.GetGazeboType, mapping).success:
+    was_spawned_here = ask("get_object_type", srv.GetGazeboType, mapping).success
+    call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
+    if was_spawned_here:
         call("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
     call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.DELETE_ENTRY, request.name))
 
