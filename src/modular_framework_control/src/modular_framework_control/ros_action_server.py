@@ -2,6 +2,7 @@
 """The action server of a controller: goals become tickets, and what becomes of a ticket is told to the client."""
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -15,8 +16,11 @@ from modular_framework_control.ros_outbox import Outbox
 Submit = Callable[[Any, GoalTicket[Any]], None]
 MakeResult = Callable[[GoalTicket[Any]], Any]
 
+# actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
+REFUSAL_DELAY_S = 0.05
 
-class _SteadyActionServer(ActionServer):
+
+class SteadyActionServer(ActionServer):
     """An action server whose status topic survives a reset of the simulated clock."""
 
     def initialize(self) -> None:
@@ -55,7 +59,7 @@ class ControllerActionServer:
         self._make_result = make_result
         self._outbox = outbox
         self._goals: dict[GoalTicket[Any], ServerGoalHandle] = {}
-        self._server = _SteadyActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
+        self._server = SteadyActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
         self._server.start()
 
     def close(self) -> None:
@@ -76,10 +80,12 @@ class ControllerActionServer:
         except GoalRefusedError as error:
             del self._goals[ticket]
             rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)
+            time.sleep(REFUSAL_DELAY_S)
             goal.set_rejected(error.result, str(error))
         except Exception as error:  # whatever is in the message, its sender gets an answer
             del self._goals[ticket]
             rospy.logerr("%s: goal rejected: %s: %s", self._server.ns, type(error).__name__, error)
+            time.sleep(REFUSAL_DELAY_S)
             goal.set_rejected(None, f"{type(error).__name__}: {error}")
 
     def _on_cancel(self, goal: ServerGoalHandle) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import actionlib
 import rospy
+from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
 POLL_PERIOD_S = 0.01
@@ -113,8 +114,9 @@ def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,
     stopped = False
 
     def ended() -> bool:
-        # the status of the goal is final some time before its result is here; DONE means that both are
-        return bool(client.simple_state == actionlib.SimpleGoalState.DONE)
+        # The status of the goal is final some time before its result is here; DONE means that both are. The goal
+        # handle knows, while the client itself misses an end that comes before send_goal() returns.
+        return bool(client.gh is not None and client.gh.get_comm_state() == CommState.DONE)
 
     def finished() -> bool:
         nonlocal stopped

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -123,13 +124,17 @@ class TrajectoryExecution:
                                 f"{tolerance}); plan again from the current state")
 
     def _require_servers(self, parts: list[_Part]) -> None:
-        timeout = rospy.Duration(self.settings.controller_connection_timeout)
+        timeout_s = self.settings.controller_connection_timeout
         for part in parts:
-            client = self._clients[part.controller.name]
-            if not client.wait_for_server(timeout):
-                raise PlanningError(ErrorCode.CONTROL_FAILED, f"action {rospy.resolve_name(part.controller.action)} of "
-                                    f"controller '{part.controller.name}' did not answer within "
-                                    f"{timeout.to_sec():.1f} s; is the controller running?")
+            # real time: while a simulation is paused, simulated time never runs out
+            deadline = time.monotonic() + timeout_s
+            while not _is_connected(self._clients[part.controller.name].action_client):
+                if time.monotonic() > deadline or rospy.is_shutdown():
+                    raise PlanningError(ErrorCode.CONTROL_FAILED, "action "
+                                        f"{rospy.resolve_name(part.controller.action)} of controller "
+                                        f"'{part.controller.name}' did not answer within {timeout_s:.1f} s; is the "
+                                        "controller running?")
+                rospy.rostime.wallsleep(POLL_S)
 
     def _run(self, parts: list[_Part], duration_s: float, cancelled: threading.Event) -> None:
         begun = rospy.Time.now()
@@ -156,8 +161,9 @@ class TrajectoryExecution:
 
     def _is_done(self, part: _Part) -> bool:
         client = self._clients[part.controller.name]
-        # the status of the goal is final some time before its result is here; DONE means that both are
-        if client.simple_state != actionlib.SimpleGoalState.DONE:
+        # The status of the goal is final some time before its result is here; DONE means that both are. The goal
+        # handle knows, while the client itself misses an end that comes before send_goal() returns.
+        if client.gh.get_comm_state() != actionlib.CommState.DONE:
             return False
         state = client.get_state()
         result = client.get_result()
@@ -182,6 +188,12 @@ class TrajectoryExecution:
             if np.abs(now - before).max() < SETTLED_RAD:
                 return
             before = now
+
+
+def _is_connected(client: actionlib.ActionClient) -> bool:
+    """Whether an action server listens to all that a client says, and the client to all that it says."""
+    ends = (client.pub_goal, client.pub_cancel, client.result_sub, client.feedback_sub, client.status_sub)
+    return all(end.get_num_connections() > 0 for end in ends)
 
 
 def _check_message(motion: JointTrajectory) -> None:
