@@ -2,6 +2,7 @@
 """Builds the messages move_group understands, and names its error codes."""
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 
 from geometry_msgs.msg import Pose, PoseStamped
@@ -44,7 +45,9 @@ def robot_state(state: StartState) -> RobotState:
         case None:
             return RobotState(is_diff=True)
         case RobotState():
-            return state
+            kept = copy.copy(state)  # the caller's message stays as it is
+            kept.is_diff = True
+            return kept
         case JointState():
             return RobotState(joint_state=state, is_diff=True)
         case _:
