@@ -6,8 +6,9 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import actionlib
 import rospy
+
+from modular_framework_control.ros_action_server import SteadyActionServer
 
 PREVIOUS_GOAL_TIMEOUT_S = 10.0
 
@@ -24,7 +25,7 @@ class GoalRunner:
         self._lock = threading.Lock()
         self._turn = threading.Lock()
         self._cancels: dict[str, threading.Event] = {}
-        self._server = actionlib.ActionServer(name, kind, self._on_goal, self._on_cancel, auto_start=False)
+        self._server = SteadyActionServer(name, kind, self._on_goal, self._on_cancel, auto_start=False)
 
     def connect(self) -> None:
         """Starts the server."""
@@ -46,9 +47,13 @@ class GoalRunner:
 
     def _run(self, handle: Any, cancelled: threading.Event) -> None:
         if not self._turn.acquire(timeout=PREVIOUS_GOAL_TIMEOUT_S):
+            self._forget(handle)
             handle.set_rejected(None, f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s")
             return
         try:
+            if cancelled.is_set():
+                handle.set_canceled(None, "cancelled before it was begun")
+                return
             handle.set_accepted()
             result, succeeded, text = self._work(handle.get_goal(), cancelled, handle.publish_feedback)
             if succeeded:
@@ -62,5 +67,8 @@ class GoalRunner:
             handle.set_aborted(None, f"unexpected {type(error).__name__}: {error}")
         finally:
             self._turn.release()
-            with self._lock:
-                self._cancels.pop(handle.get_goal_id().id, None)
+            self._forget(handle)
+
+    def _forget(self, handle: Any) -> None:
+        with self._lock:
+            self._cancels.pop(handle.get_goal_id().id, None)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Goals of an action run one after the other, and one that was given up meanwhile never begins."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from moveit_msgs.msg import ExecuteTrajectoryAction
+
+from modular_framework_planning.ros_goal_runner import GoalRunner
+
+
+class Handle:
+    """A goal as the action server hands it over; remembers how it ended."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.outcome = ""
+        self.accepted = False
+        self.ended = threading.Event()
+
+    def get_goal_id(self) -> Any:
+        return SimpleNamespace(id=self.name)
+
+    def get_goal(self) -> str:
+        return self.name
+
+    def publish_feedback(self, _: Any) -> None:
+        return
+
+    def set_accepted(self) -> None:
+        self.accepted = True
+
+    def _end(self, outcome: str) -> None:
+        self.outcome = outcome
+        self.ended.set()
+
+    def set_succeeded(self, _: Any, __: str = "") -> None:
+        self._end("succeeded")
+
+    def set_canceled(self, _: Any, __: str = "") -> None:
+        self._end("canceled")
+
+    def set_aborted(self, _: Any, __: str = "") -> None:
+        self._end("aborted")
+
+    set_rejected = set_aborted
+
+
+def run(work: Callable[..., Any], *names: str) -> list[Handle]:
+    """Sends goals one right after the other and waits for their ends."""
+    runner = GoalRunner("some_action", ExecuteTrajectoryAction, work)
+    handles = [Handle(name) for name in names]
+    for handle in handles:
+        runner._on_goal(handle)
+    for handle in handles:
+        assert handle.ended.wait(5.0), f"goal '{handle.name}' did not end within 5 s"
+    return handles
+
+
+def test_a_new_goal_ends_the_one_before_and_one_given_up_while_waiting_never_begins() -> None:
+    begun = []
+
+    def work(goal: str, cancelled: threading.Event, _: Any) -> tuple[None, bool, str]:
+        begun.append(goal)
+        if goal == "first":
+            assert cancelled.wait(5.0)
+            third_is_here.wait(0.2)  # the first takes a while to stop; second and third wait for their turn
+            return None, False, "stopped"
+        return None, True, "done"
+
+    third_is_here = threading.Event()
+    first, second, third = run(work, "first", "second", "third")
+    assert (first.outcome, second.outcome, third.outcome) == ("canceled", "canceled", "succeeded")
+    assert begun == ["first", "third"] and not second.accepted
