@@ -268,12 +268,19 @@ def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -
         away = ModelState(model_name="ball", pose=Pose(Point(-0.2, 0.7, 0.88), Quaternion(0, 0, 0, 1)))
         assert call("/gazebo/set_model_state", SetModelState, away).success
         eventually("the moved ball", lambda: abs(scene.poses["ball__link"].x + 0.2) < 0.02)
+        call("/gazebo/pause_physics", Empty)
+        assert spawn("cube", 0.25, 0.75, 0.88).success
+        eventually("the cube spawned while time stands still", lambda: "cube__link" in scene.objects)
+        assert call("/gazebo/delete_model", DeleteModel, "cube").success
+        eventually("the cube to vanish while time stands still", lambda: "cube__link" not in scene.objects)
+        call("/gazebo/unpause_physics", Empty)
         scene.refuse = True
         assert call("/gazebo/delete_model", DeleteModel, "ball").success
         time.sleep(0.5)
         scene.refuse = False
         eventually("the ball to vanish", lambda: "ball__link" not in scene.objects)
     finally:
+        call("/gazebo/unpause_physics", Empty)
         scene.service.shutdown("test")
 
 

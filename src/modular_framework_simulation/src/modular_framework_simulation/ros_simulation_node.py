@@ -68,7 +68,7 @@ class SimulationNode:
         actors = self._build_robot(parameters)
         self._topics = WorldTopics(self._world)
         self._loop = SimulationLoop(
-            self._world, Pacer(parameters.real_time_factor), RequestQueue(), actors, self._topics.publish_clock
+            self._world, Pacer(parameters.real_time_factor), RequestQueue(), actors, self._on_paused_tick
         )
         if parameters.paused:
             self._loop.pause()
@@ -122,10 +122,15 @@ class SimulationNode:
         before = self._loop.grasp_watch.held
         self._loop.watch_grasp()
         held = self._loop.grasp_watch.held
+        self._topics.publish_grasped(held or "")  # also after a reset, which forgets what was held
         if held != before:
             rospy.loginfo("the gripper %s", f"holds '{held}'" if held else f"let go of '{before}'")
-            self._topics.publish_grasped(held or "")
             self._show_snapshot()
+
+    def _on_paused_tick(self) -> None:
+        """Models may be spawned, moved and deleted while time stands still."""
+        self._topics.publish_clock()
+        self._show_snapshot()
 
     def _show_snapshot(self) -> None:
         self._scene.show(take_snapshot(self._world, self._loop.held_object()))
