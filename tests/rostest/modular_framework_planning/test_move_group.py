@@ -207,6 +207,32 @@ def test_get_planning_scene_answers_what_is_asked_for() -> None:
     assert "forearm_link" in full.allowed_collision_matrix.entry_names and full.robot_state.joint_state.name
 
 
+def test_an_object_of_one_shape_without_a_pose_of_its_own_is_where_its_shape_is() -> None:
+    add(box("crate", 0.5, 0.4, 1.5, (0.1, 0.1, 0.1)))
+    geometry = PlanningSceneComponents(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+    crate = call("get_planning_scene", GetPlanningScene, geometry).scene.world.collision_objects[0]
+    assert np.allclose([crate.pose.position.x, crate.pose.position.y, crate.pose.position.z], [0.5, 0.4, 1.5])
+    move = CollisionObject(id="crate", operation=CollisionObject.MOVE)
+    move.pose = Pose(Point(0, 0, 2), Quaternion(0, 0, 0, 1))
+    move.header.frame_id = "world"
+    assert add(move)
+    crate = call("get_planning_scene", GetPlanningScene, geometry).scene.world.collision_objects[0]
+    shape = crate.primitive_poses[0].position
+    assert np.allclose([crate.pose.position.x + shape.x, crate.pose.position.z + shape.z], [0.0, 2.0])
+
+
+def test_constraints_of_ik_and_validity_requests_are_refused_rather_than_ignored() -> None:
+    upright = Constraints(orientation_constraints=[OrientationConstraint(link_name="eg_manipulator", weight=1.0)])
+    state = RobotState(is_diff=True)
+    validity, report = report_of(lambda: call("check_state_validity", GetStateValidity, state, GROUP, upright))
+    assert not validity.valid and "constraints" in report["reason"]
+    ask = PositionIKRequest(group_name=GROUP, robot_state=state, constraints=upright)
+    ask.pose_stamped.header.frame_id = "world"
+    ask.pose_stamped.pose = Pose(Point(0.1, 0.5, 0.95), DOWN)
+    answer, report = report_of(lambda: call("compute_ik", GetPositionIK, ask))
+    assert answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and "constraints" in report["reason"]
+
+
 def test_attaching_takes_an_object_out_of_the_world_and_detaching_puts_it_back() -> None:
     add(table(), box("block", 0.3, 0.5, 0.90, (0.04, 0.04, 0.08)))
     scene = PlanningScene(is_diff=True)
@@ -222,7 +248,7 @@ def test_attaching_takes_an_object_out_of_the_world_and_detaching_puts_it_back()
     assert call("apply_planning_scene", ApplyPlanningScene, scene).success
     state = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
     back = {item.id: item.pose.position for item in state.world.collision_objects}["block"]
-    assert np.allclose([back.x, back.y, back.z], [0.0, 0.0, 0.0], atol=1e-6), "the object's frame is where it was"
+    assert np.allclose([back.x, back.y, back.z], [0.3, 0.5, 0.9], atol=1e-6), "the object's frame is where it was"
 
 
 def test_an_allowed_pair_may_touch() -> None:
@@ -259,7 +285,7 @@ def ik(**changes: Any) -> PositionIKRequest:
 def test_ik_honours_frames_and_says_what_is_out_of_reach() -> None:
     add(table())
     assert call("compute_ik", GetPositionIK, ik()).error_code.val == OK
-    on_table = PoseStamped(Header(frame_id="table"), Pose(Point(0.1, 0.5, 0.95), DOWN))
+    on_table = PoseStamped(Header(frame_id="table"), Pose(Point(0.1, -0.06, 0.13), DOWN))
     assert call("compute_ik", GetPositionIK, ik(pose_stamped=on_table)).error_code.val == OK
     far = PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 2.5, 0.95), DOWN))
     answer, report = report_of(lambda: call("compute_ik", GetPositionIK, ik(pose_stamped=far)))

@@ -157,6 +157,13 @@ def _pose_goal(scene: PlanningScene, position: Any, orientation: Any, tip: str, 
     return PoseGoal(link, pin.SE3(rotation, point.translation - rotation @ shift))
 
 
+def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
+    """Raises PlanningError unless the constraints are empty: an answer that left them out would claim too much."""
+    if any((constraints.joint_constraints, constraints.position_constraints, constraints.orientation_constraints,
+            constraints.visibility_constraints)):
+        raise PlanningError(code, f"{where}: constraints are not supported here; leave them empty")
+
+
 def trajectory_message(trajectory: Trajectory, frame: str) -> RobotTrajectory:
     """Writes a trajectory with positions, velocities and accelerations."""
     message = RobotTrajectory()

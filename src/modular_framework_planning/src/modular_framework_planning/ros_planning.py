@@ -10,6 +10,7 @@ from moveit_msgs.msg import MotionPlanResponse
 
 from modular_framework_planning.conversions import (
     goals_from_constraints,
+    refuse_constraints,
     scene_with_state,
     state_message,
     trajectory_message,
@@ -26,11 +27,9 @@ def _core_request(context: MoveGroupContext, scene: PlanningScene, message: Any,
                   cancelled: Callable[[], bool]) -> PlanningRequest:
     """Reads the message; raises PlanningError."""
     group = context.model.group(message.group_name)
-    path = message.path_constraints
-    if any((path.joint_constraints, path.position_constraints, path.orientation_constraints,
-            path.visibility_constraints, message.trajectory_constraints.constraints)):
-        raise PlanningError(ErrorCode.PLANNING_FAILED, "path_constraints and trajectory_constraints are not supported; "
-                            "leave them empty")
+    refuse_constraints("path_constraints", message.path_constraints, ErrorCode.PLANNING_FAILED)
+    for constraints in message.trajectory_constraints.constraints:
+        refuse_constraints("trajectory_constraints", constraints, ErrorCode.PLANNING_FAILED)
     if message.pipeline_id not in ("", context.pipeline_name):
         raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{message.pipeline_id}' is not loaded; "
                             f"available: {context.pipeline_name}")

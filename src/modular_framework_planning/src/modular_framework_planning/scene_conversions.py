@@ -74,7 +74,7 @@ def _shapes(message: Any, where: str) -> tuple[tuple[Shape, Transform], ...]:
 
 
 def _object_pose(scene: PlanningScene, message: Any, where: str) -> Transform:
-    """Pose of the object's frame in the planning frame; an object pose left at its defaults is the identity."""
+    """Pose of the object's frame in the planning frame; a pose left at its defaults is that of the header's frame."""
     frame = scene.frame_transform(message.header.frame_id)
     return frame if _is_unset(message.pose) else frame * _transform(message.pose, where)
 
@@ -86,7 +86,11 @@ def _body(scene: PlanningScene, message: Any) -> core.CollisionObject:
                             f"{len(message.subframe_poses)} poses; one pose a name")
     subframes = {name: _transform(pose, f"{where} subframe '{name}'")
                  for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)}
-    return core.CollisionObject(message.id, _object_pose(scene, message, where), _shapes(message, where), subframes)
+    pose, shapes = _object_pose(scene, message, where), _shapes(message, where)
+    if len(shapes) == 1 and _is_unset(message.pose):  # as in MoveIt: the only shape says where the object is
+        shape, pose_in_header = shapes[0]
+        pose, shapes = pose * pose_in_header, ((shape, pin.SE3.Identity()),)
+    return core.CollisionObject(message.id, pose, shapes, subframes)
 
 
 def apply_collision_object(scene: PlanningScene, message: CollisionObject) -> PlanningScene:

@@ -15,7 +15,13 @@ from moveit_msgs.srv import (
 
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.conversions import pose_message, scene_with_state, stamped_in_scene, state_message
+from modular_framework_planning.conversions import (
+    pose_message,
+    refuse_constraints,
+    scene_with_state,
+    stamped_in_scene,
+    state_message,
+)
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.kinematics import first_free
 from modular_framework_planning.pipeline import describe_contacts
@@ -64,6 +70,7 @@ class KinematicsService:
         if request.ik_link_names or request.pose_stamped_vector:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, "several tips at once are not supported; ask for one link "
                                 "with ik_link_name and pose_stamped")
+        refuse_constraints("ik_request.constraints", request.constraints, ErrorCode.NO_IK_SOLUTION)
         solver = self._context.kinematics.solver(group.name)
         link = request.ik_link_name or group.tip_link
         target = stamped_in_scene(scene, request.pose_stamped, "pose_stamped")

@@ -10,8 +10,8 @@ from moveit_msgs.srv import GetStateValidity, GetStateValidityResponse
 
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.collision import CollisionChecker, Contact
-from modular_framework_planning.conversions import BODY_TYPES, scene_with_state
-from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.conversions import BODY_TYPES, refuse_constraints, scene_with_state
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.ros_context import MoveGroupContext
 
 
@@ -28,6 +28,7 @@ class StateValidationService:
     def _serve(self, request: Any) -> GetStateValidityResponse:
         response = GetStateValidityResponse(valid=False)
         try:
+            refuse_constraints("constraints", request.constraints, ErrorCode.INVALID_GOAL_CONSTRAINTS)
             if not request.robot_state.joint_state.name or request.robot_state.is_diff:
                 self._context.monitor.wait_for_state()
             scene = scene_with_state(self._context.monitor.snapshot(), request.robot_state)
