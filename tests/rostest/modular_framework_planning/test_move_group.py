@@ -207,6 +207,36 @@ def test_get_planning_scene_answers_what_is_asked_for() -> None:
     assert "forearm_link" in full.allowed_collision_matrix.entry_names and full.robot_state.joint_state.name
 
 
+def test_a_subscriber_gets_the_whole_scene_first_and_then_every_change(arm: FakeArm) -> None:
+    add(table())
+    heard: list[PlanningScene] = []
+
+    def wait_for(what: str, condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + 5.0
+        while not condition():
+            assert time.monotonic() < deadline, f"{what} did not come within 5 s"
+            time.sleep(0.01)
+
+    subscriber = rospy.Subscriber("move_group/monitored_planning_scene", PlanningScene, heard.append)
+    try:
+        wait_for("the scene", lambda: bool(heard))
+        assert not heard[0].is_diff and [item.id for item in heard[0].world.collision_objects] == ["table"]
+        assert heard[0].robot_model_name == "ur5_with_ezgripper" and heard[0].robot_state.joint_state.name
+        add(box("crate", 0.5, 0.4, 1.5, (0.1, 0.1, 0.1)))
+        wait_for("the crate", lambda: any(item.id == "crate" for m in heard for item in m.world.collision_objects))
+        arm.positions[ARM[5]] = 0.5
+
+        def tells_of_the_wrist() -> bool:
+            states = [m.robot_state.joint_state for m in heard]
+            return any(dict(zip(s.name, s.position, strict=True)).get(ARM[5]) == 0.5 for s in states)
+
+        wait_for("the wrist's new position", tells_of_the_wrist)
+        assert all(message.is_diff for message in heard[1:])
+        assert all(m.robot_state.is_diff for m in heard[1:] if m.robot_state.joint_state.name), "held objects stay"
+    finally:
+        subscriber.unregister()
+
+
 def test_an_object_of_one_shape_without_a_pose_of_its_own_is_where_its_shape_is() -> None:
     add(box("crate", 0.5, 0.4, 1.5, (0.1, 0.1, 0.1)))
     geometry = PlanningSceneComponents(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)

@@ -21,12 +21,17 @@ from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.scene_conversions import apply_attached_object, apply_collision_object
 from modular_framework_planning.scene_messages import apply_scene, apply_world, scene_message
 
+STATE_UPDATE_PERIOD_S = 0.1
+STATE_UPDATE_RAD = 1.0e-4  # [rad or m]
+
 
 class SceneMonitor:
     """The one place that changes the scene; readers get immutable snapshots.
 
     Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object.
-    Publishes: ~monitored_planning_scene (the whole scene once, then diffs).
+    Publishes: ~monitored_planning_scene: to each new subscriber the whole scene, to all the changes, among them the
+    joint positions while they change.
+    Parameters: ~planning_scene_monitor/publish_planning_scene and publish_state_updates (both true).
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -41,10 +46,16 @@ class SceneMonitor:
         self._needed = [number for number, name in enumerate(model.joint_names) if name not in followers]
         self.listeners: list[Callable[[PlanningScene], None]] = []
         self._publisher: Any = None
+        self._publishes_state = False
+        self._told_positions = self._positions
+        self._next_state_s = 0.0
 
     def connect(self) -> None:
         """Starts to listen and to publish."""
-        self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, queue_size=100, latch=True)
+        if rospy.get_param("~planning_scene_monitor/publish_planning_scene", True):
+            self._publishes_state = bool(rospy.get_param("~planning_scene_monitor/publish_state_updates", True))
+            self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _Greeter(self),
+                                              queue_size=100)
         rospy.Subscriber(names.JOINT_STATES_TOPIC, JointState, self._on_joint_state, queue_size=5, tcp_nodelay=True)
         for topic, kind, change in (
                 (names.SCENE_TOPIC, SceneMessage, apply_scene),
@@ -52,7 +63,11 @@ class SceneMonitor:
                 (names.OBJECT_TOPIC, CollisionObject, apply_collision_object),
                 (names.ATTACHED_OBJECT_TOPIC, AttachedCollisionObject, apply_attached_object)):
             rospy.Subscriber(topic, kind, self._on_change, callback_args=(topic, change), queue_size=100)
-        self._publisher.publish(scene_message(self._scene, 0))
+
+    def greet(self, publish: Callable[[Any], None]) -> None:
+        """Hands the whole scene to a new subscriber; the lock keeps changes from coming in between."""
+        with self._lock:
+            publish(scene_message(self.snapshot(), 0))
 
     def _on_change(self, message: Any, context: tuple[str, Callable[[PlanningScene, Any], PlanningScene]]) -> None:
         topic, change = context
@@ -102,9 +117,24 @@ class SceneMonitor:
                 self._stamps[number] = message.header.stamp
         with self._lock:
             self._positions = self.model.merge(self._positions, changed)
+            self._publish_state(message.header.stamp)
         with self._arrived:
             self._arrivals += 1
             self._arrived.notify_all()
+
+    def _publish_state(self, stamp: rospy.Time) -> None:
+        """Publishes the joint positions when they changed, every STATE_UPDATE_PERIOD_S of real time at most."""
+        now = time.monotonic()
+        if not self._publishes_state or now < self._next_state_s or not self._publisher.get_num_connections():
+            return
+        if np.abs(self._positions - self._told_positions).max() < STATE_UPDATE_RAD:
+            return
+        self._told_positions, self._next_state_s = self._positions, now + STATE_UPDATE_PERIOD_S
+        update = SceneMessage(is_diff=True, robot_model_name=self.model.name, name=self._scene.name)
+        update.robot_state = state_message(self._scene, self._positions, with_attached=False)
+        update.robot_state.is_diff = True
+        update.robot_state.joint_state.header.stamp = stamp
+        self._publisher.publish(update)
 
     def missing_joints(self) -> list[str]:
         """Returns joints never heard of on joint_states (mimic and passive ones are not needed)."""
@@ -143,3 +173,15 @@ class SceneMonitor:
         message = state_message(self.snapshot())
         message.joint_state.header.stamp = rospy.Time.now()
         return message
+
+
+class _Greeter(rospy.SubscribeListener):
+    """Tells a new subscriber of the monitored scene what it missed."""
+
+    def __init__(self, monitor: SceneMonitor) -> None:
+        super().__init__()
+        self._monitor = monitor
+
+    def peer_subscribe(self, _topic: str, _publish: Any, peer_publish: Callable[[Any], None]) -> None:
+        """Called by rospy with a function that publishes to the new subscriber alone."""
+        self._monitor.greet(peer_publish)
