@@ -70,4 +70,4 @@ elif [ -d /dev/dri ]; then
 fi
 
 echo "Making and starting the container '$container_name'"
-exec docker run "${options[@]}" "$IMAGE" run "${launch_arguments[@]}"
+exec docker run "${options[@]}" "$IMAGE" run ${launch_arguments[@]+"${launch_arguments[@]}"}
