@@ -44,7 +44,10 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
             rospy.wait_for_service(proxy.resolved_name, max(0.05, min(1.0, end - time.monotonic())))
             return
         except rospy.ROSException as error:
-            if rospy.is_shutdown() or time.monotonic() >= end:
+            if rospy.is_shutdown():
+                raise CallError(f"service '{proxy.resolved_name}' was not advertised before this node was shut down"
+                                ) from error
+            if time.monotonic() >= end:
                 raise CallError(f"service '{proxy.resolved_name}' was not advertised within {timeout_s:.1f} s; "
                                 "start the node that offers it") from error
 

@@ -115,6 +115,8 @@ class GraspServer:
         torque = command.grasp.torque_intensity
         intensities = dict(zip(torque.joint_names, torque.torque_intensity, strict=False))
         share = min(1.0, command.max_torque / self._full_scale)
+        if stop.is_set():
+            raise GraspCommandError("stopped on request, before anything moved")
         motion = Motion(targets, effort_limits(targets, intensities, self._group, share), self._timeout_s, stop.is_set)
         outcome = self._move(handle, motion)
         return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)

@@ -26,6 +26,10 @@ from modular_framework_core.robot_controllers_spawner import (
     read_controller_file,
     ready_topics,
 )
+from modular_framework_core.ros_calls import CallError, call_service
+
+CALL_TIMEOUT_S = 30.0
+"""Longest wait for the answer of the controller manager [s]; it waits 10 s itself for a loop that stands still."""
 
 
 class SpawnError(Exception):
@@ -96,9 +100,9 @@ class RobotControllersSpawner:
         self._wait(lambda: self._available(proxy), lambda: f"service {service}",
                    "is the simulation or the node robot_hw running?")
         try:
-            return proxy(*arguments)
-        except rospy.ServiceException as error:
-            raise SpawnError(f"service {service} failed: {error}") from error
+            return call_service(proxy, kind._request_class(*arguments), CALL_TIMEOUT_S)
+        except CallError as error:
+            raise SpawnError(str(error)) from error
 
     @staticmethod
     def _available(proxy: rospy.ServiceProxy) -> bool:
