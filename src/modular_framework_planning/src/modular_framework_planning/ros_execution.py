@@ -28,6 +28,7 @@ from modular_framework_planning.ros_scene_monitor import SceneMonitor
 POLL_S = 0.01
 SETTLE_TIMEOUT_S = 1.0
 SETTLED_RAD = 1.0e-4
+STOP_TIMEOUT_S = 1.0
 START_STATE_TIMEOUT_S = 0.5
 ACTION_TYPES = {"FollowJointTrajectory": FollowJointTrajectoryAction, "GripperCommand": GripperCommandAction}
 
@@ -61,6 +62,12 @@ class TrajectoryExecution:
         rospy.Subscriber(names.EXECUTION_EVENT_TOPIC, String, self._on_event, queue_size=5)
         for spec in self.controllers:
             self._clients[spec.name] = actionlib.SimpleActionClient(spec.action, ACTION_TYPES[spec.kind])
+
+    def close(self) -> None:
+        """Stops a motion under way and waits for that; to be called while topics are still open."""
+        self._stop.set()
+        if self._busy.acquire(timeout=STOP_TIMEOUT_S):
+            self._busy.release()
 
     def _on_event(self, message: String) -> None:
         if message.data == "stop":

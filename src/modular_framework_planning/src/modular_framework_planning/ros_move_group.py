@@ -48,6 +48,7 @@ def advertise(context: MoveGroupContext) -> None:
     context.monitor.connect()
     context.markers.show_scene(context.monitor.snapshot())
     context.execution.connect()
+    rospy.on_shutdown(context.execution.close)
     for capability in (PlanService, KinematicsService, StateValidationService, PlanningSceneServices,
                        QueryPlannersService, MoveAction, ExecuteTrajectory):
         capability(context).connect()
