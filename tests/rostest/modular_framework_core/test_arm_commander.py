@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 
 from modular_framework_core.arm_commander import ArmCommander, CommanderError
@@ -137,3 +138,9 @@ def test_a_stop_cancels_the_motion(commander) -> None:
 def test_settings_out_of_range_are_refused(commander, method: str, value: float) -> None:
     with pytest.raises(CommanderError, match="allowed"):
         getattr(commander, method)(value)
+
+
+def test_a_motion_that_does_not_end_because_time_stands_still_says_so(commander, monkeypatch) -> None:
+    assert "stands still" not in commander._execution_result(GoalStatus.LOST, 1.0).reason
+    monkeypatch.setattr(rospy, "get_time", lambda: 5.0)
+    assert "stands still at 5.000 s" in commander._execution_result(GoalStatus.LOST, 1.0).reason

@@ -56,6 +56,7 @@ from modular_framework_core.ros_calls import (
 EXECUTE_ACTION = "execute_trajectory"
 REPORT_TOPIC = "move_group/planning_report"
 REPORT_WAIT_S = 0.3
+CLOCK_WAIT_S = 0.3
 REPORTS_KEPT = 64
 SERVICE_TIMEOUT_S = 10.0
 IK_TIMEOUT_S = 1.0
@@ -273,6 +274,9 @@ class ArmCommander:
             return ExecutionResult(False, MoveItErrorCodes.PREEMPTED, "the motion was stopped on request")
         if status == GoalStatus.LOST:
             reason = f"action '{rospy.resolve_name(EXECUTE_ACTION)}' did not end within {timeout_s:.1f} s"
+            now_s = rospy.get_time()
+            if not wait_until(lambda: rospy.get_time() != now_s, CLOCK_WAIT_S):
+                reason += f": simulated time stands still at {now_s:.3f} s; is the simulation paused?"
             return ExecutionResult(False, MoveItErrorCodes.TIMED_OUT, reason)
         result = self._execute_client.get_result()
         code = result.error_code.val if result is not None else MoveItErrorCodes.FAILURE
@@ -332,7 +336,8 @@ class ArmCommander:
         request = GetStateValidityRequest(group_name=self.group_name)
         state = robot_state(seed)
         merged = dict(zip(state.joint_state.name, state.joint_state.position, strict=False)) | dict(joints)
-        request.robot_state = robot_state(merged)
+        state.joint_state = JointState(name=list(merged), position=list(merged.values()))
+        request.robot_state = state
         proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
         response = call_service(proxy, request, SERVICE_TIMEOUT_S)
         pairs = sorted({f"'{contact.contact_body_1}' with '{contact.contact_body_2}'" for contact in response.contacts})
