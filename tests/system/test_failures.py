@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import time
+from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import pytest
@@ -52,6 +53,19 @@ def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str
     assert launch.wait(STOP_TIMEOUT_S) == 3, launch.log()
     assert time.monotonic() - killed < STOP_TIMEOUT_S
     assert re.search(rf"[Nn]ode '{node}'.* (died|ended)", launch.log()), launch.log()
+
+
+def test_manipulator_node_ends_with_the_spawner_that_started_it(session: RosSession) -> None:
+    launch = session.run_framework(gui="false", rviz="false")
+    _wait_for_text(launch, "first state running", 60.0)
+    server, spawner = (_pid_of(session, node) for node in ("moveit_grasp_action_server", "launch_grasp_action_server"))
+    subprocess.run(["kill", "-KILL", str(spawner)], check=True)
+    assert launch.wait(STOP_TIMEOUT_S) == 3, launch.log()
+    assert "node 'launch_grasp_action_server' died" in launch.log()
+    end = time.monotonic() + 10.0
+    while Path(f"/proc/{server}").exists():
+        assert time.monotonic() < end, "the manipulator's node outlived the launch"
+        time.sleep(0.1)
 
 
 def _wait_for_text(launch: Launch, text: str, timeout_s: float) -> None:

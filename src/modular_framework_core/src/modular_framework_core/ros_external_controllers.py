@@ -15,6 +15,8 @@ from modular_framework_core.external_controllers import (
 )
 
 POLL_PERIOD_S = 0.2
+END_WITH_SPAWNER = "setpriv --pdeathsig TERM"
+"""Put before the node's command: the node is told to end when the spawner is killed, which could not stop it itself."""
 
 
 def main() -> int:
@@ -44,7 +46,8 @@ def run_until_it_ends(node: ControllerNode) -> int:
     launch = roslaunch.scriptapi.ROSLaunch()
     launch.start()
     try:
-        process = launch.launch(roslaunch.core.Node(node.package, node.node_type, name=node.name, output="screen"))
+        process = launch.launch(roslaunch.core.Node(node.package, node.node_type, name=node.name, output="screen",
+                                                    launch_prefix=END_WITH_SPAWNER))
         while not rospy.is_shutdown():
             if not process.is_alive():
                 rospy.logfatal("Node '%s' (%s/%s) ended with exit code %s; the manipulator cannot be driven any more.",
