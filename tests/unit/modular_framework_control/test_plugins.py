@@ -13,10 +13,10 @@ from modular_framework_control.plugins import (
     ROBOT_HW_BASE,
     PluginError,
     PluginIndex,
-    packages_of_workspace,
     read_description,
 )
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.ros_packages import packages_of_workspace
 
 CLASS = '<class name="{name}" type="{cls}" base_class_type="{base}"/>'
 MODULE = """

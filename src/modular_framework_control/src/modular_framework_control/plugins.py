@@ -48,12 +48,11 @@ class Plugin:
     origin: Path
 
 
-def packages_of_workspace() -> dict[str, Path]:
-    """Folders of all packages of the sourced workspace, by name."""
-    import rospkg  # only whoever looks for plugins needs it
+def _packages_of_workspace() -> Mapping[str, Path]:
+    # Imported here, as only who looks for plugins needs to know the workspace.
+    from modular_framework_control.ros_packages import packages_of_workspace
 
-    ros_packages = rospkg.RosPack()
-    return {name: Path(ros_packages.get_path(name)) for name in ros_packages.list()}
+    return packages_of_workspace()
 
 
 class PluginIndex:
@@ -64,9 +63,9 @@ class PluginIndex:
         packages: gives the folder of each package by name; those of the sourced workspace when not given.
     """
 
-    def __init__(self, base: str, packages: Callable[[], Mapping[str, Path]] = packages_of_workspace) -> None:
+    def __init__(self, base: str, packages: Callable[[], Mapping[str, Path]] | None = None) -> None:
         self._base = base
-        self._packages = packages
+        self._packages = packages if packages is not None else _packages_of_workspace
         self._found: dict[str, Plugin] | None = None
         self._faults: list[str] = []
 

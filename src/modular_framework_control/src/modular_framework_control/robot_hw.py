@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from enum import Enum
-from typing import Any, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 from modular_framework_control.hardware_interface import (
     ControllerInfo,
@@ -33,9 +33,15 @@ class SwitchState(Enum):
 class RobotHW:
     """Base of all robot hardware; as it stands it has no joints.
 
+    Attributes:
+        announces_ready: whether this hardware itself says True on its `topic_to_wait_for`; when not, whoever runs it
+            says so on its behalf once its loop runs.
+
     `init`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `do_switch` and
     `switch_result` run in the control loop and must neither block nor raise for an expected condition.
     """
+
+    announces_ready: ClassVar[bool] = False
 
     def __init__(self) -> None:
         self._interfaces: dict[type[HardwareInterface[Any]], HardwareInterface[Any]] = {}

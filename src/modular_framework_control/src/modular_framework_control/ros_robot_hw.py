@@ -3,84 +3,109 @@
 from __future__ import annotations
 
 import threading
+import traceback
 
 import rospy
-from std_msgs.msg import Bool
 
-from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.combined_robot_hw import robot_hw_of_type
 from modular_framework_control.node_handle import ParameterError, read_number
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.plugins import PluginError
 from modular_framework_control.ros_controller_manager import RosControllerManager
+from modular_framework_control.ros_hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
 from modular_framework_control.ros_node_handle import RosNodeHandle
 
-HARDWARE_TYPES: dict[str, type[RobotHW]] = {"modular_framework_control/MockRobotHW": MockRobotHW}
+COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
+MOCK_TYPE = "modular_framework_control/MockRobotHW"
 
 
 class RobotHwNode:
     """Node `robot_hw`.
 
-    Parameters: `~type` ("modular_framework_control/MockRobotHW"); `~rate` [1/s] 125; `~topic_to_wait_for`: topic
-    (std_msgs/Bool, latched) that says True once controllers can be loaded, none when empty; the parameters of the
-    hardware, also private.
+    Parameters: `/robot_hardware`: a list of hardware, each with its parameters in the namespace of that name, which is
+    combined to one robot; without it, `~type` (MockRobotHW of this package) is one hardware, with private parameters.
+    `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
+    says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
+    itself may take for that.
+
+    Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
+    `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning.
     """
 
     def __init__(self) -> None:
         self._nh = RosNodeHandle("~")
         self._period_s = 1.0 / read_number(self._nh, "rate", 125.0, 1.0)
-        type_name = self._nh.get_param("type", "modular_framework_control/MockRobotHW")
-        if type_name not in HARDWARE_TYPES:
-            raise ParameterError(f"parameter {self._nh.namespace}/type: unknown hardware type {type_name!r}; known: "
-                                 f"{', '.join(sorted(HARDWARE_TYPES))}")
-        self._robot_hw = HARDWARE_TYPES[type_name]()
+        self._ready_timeout_s = read_number(self._nh, "ready_timeout", 60.0)
+        listed = RosNodeHandle("/").has_param("robot_hardware") and not self._nh.has_param("type")
+        self._hw_nh = RosNodeHandle("/") if listed else self._nh
+        type_name = COMBINED_TYPE if listed else self._nh.get_param("type", MOCK_TYPE)
+        try:
+            self._robot_hw = robot_hw_of_type(type_name)
+        except PluginError as error:
+            raise ParameterError(f"parameter {self._nh.namespace}/type: unknown hardware type {type_name!r}: "
+                                 f"{error}") from error
         self._manager: RosControllerManager | None = None
+        self._connected = threading.Event()
+        self._failure = ""
 
     def connect(self) -> None:
-        """Initialise the hardware and advertise the services.
+        """Initialise the hardware.
 
         Raises:
             ParameterError: the hardware refused its parameters.
         """
-        if not self._robot_hw.init(RosNodeHandle("/"), self._nh):
+        if not self._robot_hw.init(RosNodeHandle("/"), self._hw_nh):
             raise ParameterError(f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
                                  "its own message above says why")
+        self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
+        self._readiness.connect()
         self._manager = RosControllerManager(self._robot_hw)
-        self._manager.connect()
 
-    def run(self) -> None:
-        """Run the control loop until the node is shut down; then stop all controllers."""
+    def run(self) -> bool:
+        """Run the control loop until the node is shut down; then stop all controllers.
+
+        Returns:
+            Whether it ended because it was told to; otherwise the log says why.
+        """
         if self._manager is None:
             raise RuntimeError("connect() comes before run()")
-        ready = _Ready(self._nh.get_param("topic_to_wait_for", ""))
-        last_s = rospy.get_time()
-        rate = rospy.Rate(1.0 / self._period_s, reset=True)
+        starter = threading.Thread(target=self._get_ready, args=(self._manager,), name="get_ready", daemon=True)
+        starter.start()
         try:
-            while not rospy.is_shutdown():
-                time_s = rospy.get_time()
-                period_s = max(0.0, time_s - last_s)
-                last_s = time_s
-                self._robot_hw.read(time_s, period_s)
-                self._manager.update(time_s, period_s)
-                self._robot_hw.write(time_s, period_s)
-                ready.say_once()
-                rate.sleep()
+            self._loop(self._manager)
         except rospy.ROSInterruptException:
             rospy.loginfo("control loop ends: the node is shut down")
         finally:
+            starter.join(timeout=2.0)
+            self._readiness.close()
             self._manager.close()
+        return not self._failure
 
+    def _loop(self, manager: RosControllerManager) -> None:
+        last_s = rospy.get_time()
+        rate = rospy.Rate(1.0 / self._period_s, reset=True)
+        while not rospy.is_shutdown() and not self._failure:
+            time_s = rospy.get_time()
+            period_s = max(0.0, time_s - last_s)
+            last_s = time_s
+            self._robot_hw.read(time_s, period_s)
+            if self._connected.is_set():
+                manager.update(time_s, period_s)
+            self._robot_hw.write(time_s, period_s)
+            rate.sleep()
 
-class _Ready:
-    """Says once, on a latched topic, that controllers can be loaded."""
-
-    def __init__(self, topic: str) -> None:
-        self._publisher = rospy.Publisher(topic, Bool, queue_size=1, latch=True) if topic else None
-        self._said = threading.Event()
-
-    def say_once(self) -> None:
-        """Publish True if that has not been done."""
-        if self._publisher is not None and not self._said.is_set():
-            self._said.set()
-            self._publisher.publish(True)
+    def _get_ready(self, manager: RosControllerManager) -> None:
+        """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
+        try:
+            self._readiness.wait(self._ready_timeout_s)
+            if rospy.is_shutdown():
+                return
+            manager.connect()
+            self._connected.set()
+            self._readiness.announce()
+        except Exception as error:  # on this thread nobody else would see it, and the node would run without services
+            if not rospy.is_shutdown():
+                self._failure = str(error) or type(error).__name__
+                rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())
 
 
 def main() -> int:
@@ -92,5 +117,4 @@ def main() -> int:
     except ParameterError as error:
         rospy.logfatal("%s", error)
         return 1
-    node.run()
-    return 0
+    return 0 if node.run() else 1
