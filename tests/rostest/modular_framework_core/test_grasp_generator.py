@@ -118,3 +118,16 @@ def test_grasps_can_be_stored_under_names(scene) -> None:
     proxy = rospy.ServiceProxy("get_grasp", srv.GetStandardisedGrasp)
     assert proxy("box_1").grasp_message.grasp_id == "box_1"
     assert proxy("box_3").success
+
+
+def test_an_object_that_comes_back_under_its_name_gives_grasps_again(scene) -> None:
+    rospy.set_param("top_down_grasp_generator/object_name", "")
+    rospy.set_param("top_down_grasp_generator/name_prefix", "again_")
+    scene.objects = [item for item in scene.objects if item.id != "box__link"]
+    count = len(scene.watcher.signals)
+    time.sleep(0.8)  # three looks of the generator at the scene
+    scene.add_box("box__link", (0.04, 0.07, 0.1), (0.1, 0.45, 0.89))
+    signal, reason = scene.watcher.wait(count + 1)
+    assert signal, reason
+    grasp = rospy.ServiceProxy("get_grasp", srv.GetStandardisedGrasp)("again_1").grasp_message
+    assert grasp.grasp.pose.pose.position.x == pytest.approx(0.1, abs=1e-6)

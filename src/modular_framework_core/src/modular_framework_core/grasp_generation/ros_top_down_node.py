@@ -2,6 +2,7 @@
 """Watches the planning scene, generates top-down grasps for what stands there, and hands them to the grasp manager."""
 from __future__ import annotations
 
+import threading
 import time
 from collections import Counter
 from typing import Any
@@ -38,6 +39,10 @@ class NoGraspError(RuntimeError):
     """No grasp can be offered; the text says why."""
 
 
+class NoObjectError(NoGraspError):
+    """The planning scene was read, and what is to be grasped is not in it."""
+
+
 class TopDownGraspGenerator:
     """Generates grasps when an object appears in the crop box, or on demand.
 
@@ -49,6 +54,7 @@ class TopDownGraspGenerator:
     def __init__(self) -> None:
         """Stores nothing but names; :meth:`connect` talks to the other nodes."""
         self._seen: set[str] = set()
+        self._generating = threading.Lock()
 
     def connect(self, timeout_s: float = START_TIMEOUT_S) -> None:
         """Measures the gripper and waits for the nodes it needs.
@@ -73,7 +79,7 @@ class TopDownGraspGenerator:
         self._service = rospy.Service("~generate", Trigger, self._on_demand)
 
     def watch(self) -> None:
-        """Generates once for each object that appears, until ROS shuts down."""
+        """Generates once for each object that appears, also when it was there before, until ROS shuts down."""
         deadline = time.monotonic() + read_settings().scene_timeout_s
         before: set[str] = set()
         told = False
@@ -81,6 +87,7 @@ class TopDownGraspGenerator:
             settings = read_settings()
             try:
                 names = {found.name for found in self._candidates(settings)}
+                self._seen &= names
                 new = names - self._seen
                 if new and names == before:
                     self._seen |= names
@@ -88,6 +95,8 @@ class TopDownGraspGenerator:
                 before, told = names, told or bool(new)
             except NoGraspError as error:
                 before = set()
+                if isinstance(error, NoObjectError):
+                    self._seen.clear()
                 if not told and time.monotonic() > deadline:
                     self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s)")
                     told = True
@@ -98,6 +107,10 @@ class TopDownGraspGenerator:
         return TriggerResponse(success, text)
 
     def _generate_and_signal(self, settings: GeneratorSettings) -> tuple[bool, str]:
+        with self._generating:  # a request by service may come while an object is looked at
+            return self._generate_once(settings)
+
+    def _generate_once(self, settings: GeneratorSettings) -> tuple[bool, str]:
         try:
             grasps = self._generate(settings)
             for number, grasp in enumerate(grasps, start=1):
@@ -179,20 +192,21 @@ class TopDownGraspGenerator:
         """Objects to grasp: the named one, or all in the crop box.
 
         Raises:
-            NoGraspError: There is none.
+            NoObjectError: There is none.
+            NoGraspError: move_group does not answer.
         """
         objects = self._scene_objects()
         if settings.object_name:
             named = [found for found in objects if is_named(found.name, settings.object_name)]
             if not named:
-                raise NoGraspError(f"the planning scene has no object '{settings.object_name}'; "
-                                   f"it has {sorted(found.name for found in objects)}")
+                raise NoObjectError(f"the planning scene has no object '{settings.object_name}'; "
+                                    f"it has {sorted(found.name for found in objects)}")
             return named
         inside = [found for found in objects if settings.crop.holds(found.centre)]
         if not inside:
-            raise NoGraspError(f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
-                               f"frame '{settings.frame}'; there are "
-                               f"{[_place(found) for found in objects] or 'no objects'}")
+            raise NoObjectError(f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
+                                f"frame '{settings.frame}'; there are "
+                                f"{[_place(found) for found in objects] or 'no objects'}")
         return inside
 
     def _scene_objects(self) -> list[SceneObject]:
