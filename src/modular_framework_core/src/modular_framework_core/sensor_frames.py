@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, read_entries
+from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
 
 FRAME_KEYS = ("frame_id", "origin_frame_id", "frame_x", "frame_y", "frame_z", "frame_roll", "frame_pitch", "frame_yaw")
 POSITION_KEYS = ("x", "y", "z")
@@ -114,23 +114,16 @@ def load_sensor_frames(path: Path) -> tuple[list[SensorFrame], list[EntryError]]
         The usable frames in file order, and one error for each sensor (or for the file) that is not usable.
     """
     frames: dict[str, SensorFrame] = {}
-    faults: list[EntryError] = []
-    try:
-        for entry in read_entries(path):
-            if isinstance(entry, EntryError):
-                faults.append(entry)
-                continue
-            if isinstance(entry.node, yaml.ScalarNode):
-                continue
-            try:
-                frame = parse_sensor(entry)
-                if frame.frame in frames:
-                    raise entry.fault(f"frame '{frame.frame}' belongs to sensor '{frames[frame.frame].sensor}' already")
-                if frame.frame == frame.parent_frame:
-                    raise entry.fault(f"frame '{frame.frame}' is its own origin; name another origin frame")
-                frames[frame.frame] = frame
-            except EntryError as error:
-                faults.append(error)
-    except EntryError as error:
-        faults.append(error)
+
+    def take(entry: Entry) -> None:
+        if isinstance(entry.node, yaml.ScalarNode):
+            return
+        frame = parse_sensor(entry)
+        if frame.frame in frames:
+            raise entry.fault(f"frame '{frame.frame}' belongs to sensor '{frames[frame.frame].sensor}' already")
+        if frame.frame == frame.parent_frame:
+            raise entry.fault(f"frame '{frame.frame}' is its own origin; name another origin frame")
+        frames[frame.frame] = frame
+
+    faults = take_entries(path, take)
     return list(frames.values()), faults

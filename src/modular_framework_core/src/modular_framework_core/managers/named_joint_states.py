@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, read_entries
+from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +51,5 @@ def load_joint_states(path: Path) -> tuple[list[NamedJointState], list[EntryErro
         The usable states in file order, and one error for each entry (or for the file) that is not usable.
     """
     states: list[NamedJointState] = []
-    faults: list[EntryError] = []
-    try:
-        for entry in read_entries(path):
-            if isinstance(entry, EntryError):
-                faults.append(entry)
-                continue
-            try:
-                states.append(parse_joint_state(entry))
-            except EntryError as error:
-                faults.append(error)
-    except EntryError as error:
-        faults.append(error)
+    faults = take_entries(path, lambda entry: states.append(parse_joint_state(entry)))
     return states, faults

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, read_entries
+from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
 
 WAYPOINT_KEYS = ("name", "interpolate_time", "pause_time")
 
@@ -120,19 +120,12 @@ def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajec
         The usable trajectories in file order, and one error for each entry (or for the file) that is not usable.
     """
     trajectories: list[TimedTrajectory] = []
-    faults: list[EntryError] = []
-    try:
-        for entry in read_entries(path):
-            if isinstance(entry, EntryError):
-                faults.append(entry)
-                continue
-            try:
-                waypoints = [parse_waypoint(item) for item in entry.items()]
-                if not waypoints:
-                    raise entry.fault("holds no waypoint; write at least one")
-                trajectories.append(time_trajectory(entry.key, waypoints, lookup))
-            except EntryError as error:
-                faults.append(error)
-    except EntryError as error:
-        faults.append(error)
+
+    def take(entry: Entry) -> None:
+        waypoints = [parse_waypoint(item) for item in entry.items()]
+        if not waypoints:
+            raise entry.fault("holds no waypoint; write at least one")
+        trajectories.append(time_trajectory(entry.key, waypoints, lookup))
+
+    faults = take_entries(path, take)
     return trajectories, faults

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -149,3 +149,27 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
             continue
         seen.add(entry.key)
         yield entry
+
+
+def take_entries(path: Path, take: Callable[[Entry], None]) -> list[EntryError]:
+    """Hands every entry of a file to a function and goes on when one is not usable.
+
+    Args:
+        path: File to read.
+        take: Gets one entry after the other; raises EntryError for one it cannot use.
+
+    Returns:
+        One error for each entry (or for the file) that is not usable, in file order.
+    """
+    faults: list[EntryError] = []
+    try:
+        for entry in read_entries(path):
+            try:
+                if isinstance(entry, EntryError):
+                    raise entry
+                take(entry)
+            except EntryError as error:
+                faults.append(error)
+    except EntryError as error:
+        faults.append(error)
+    return faults
