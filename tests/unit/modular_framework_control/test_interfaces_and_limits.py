@@ -151,9 +151,9 @@ def test_a_number_that_is_none_is_refused_with_its_full_name(value: object) -> N
 
 def test_every_built_in_type_can_be_made() -> None:
     types = ControllerTypes()
-    assert set(types.names) == set(BUILT_IN_TYPES)
-    for name in types.names:
-        assert type(types.create(name)).__name__ == name.split("/")[1]
+    assert set(types.names) >= set(BUILT_IN_TYPES)
+    for name in BUILT_IN_TYPES:
+        assert type(types.create(name)).__name__.endswith(name.split("/")[1])
     types.reload()
     with pytest.raises(ControllerError, match="package/Class"):
         types.register("NoSlash", ControllerTypes().create)  # type: ignore[arg-type]

@@ -6,33 +6,50 @@ import importlib
 from collections.abc import Callable
 
 from modular_framework_control.controller import Controller, ControllerError
+from modular_framework_control.plugins import CONTROLLER_BASE, PluginError, PluginIndex
 
-BASE_CLASS = "controller_interface::ControllerBase"
+BASE_CLASS = CONTROLLER_BASE
 
 _PACKAGE = "modular_framework_control"
+_JOINT_COMMAND = f"{_PACKAGE}.joint_command_controllers"
+_CLOSED_LOOP = f"{_PACKAGE}.closed_loop_trajectory_controllers"
 BUILT_IN_TYPES: dict[str, str] = {
     "joint_state_controller/JointStateController": f"{_PACKAGE}.joint_state_controller:JointStateController",
     "position_controllers/JointTrajectoryController":
         f"{_PACKAGE}.joint_trajectory_controller:JointTrajectoryController",
+    "velocity_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:VelocityJointTrajectoryController",
+    "effort_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:EffortJointTrajectoryController",
     "position_controllers/GripperActionController": f"{_PACKAGE}.gripper_action_controller:GripperActionController",
+    "position_controllers/JointPositionController": f"{_JOINT_COMMAND}:PositionJointPositionController",
+    "position_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:PositionJointGroupPositionController",
+    "velocity_controllers/JointPositionController": f"{_JOINT_COMMAND}:VelocityJointPositionController",
+    "velocity_controllers/JointVelocityController": f"{_JOINT_COMMAND}:VelocityJointVelocityController",
+    "velocity_controllers/JointGroupVelocityController": f"{_JOINT_COMMAND}:VelocityJointGroupVelocityController",
+    "effort_controllers/JointPositionController": f"{_JOINT_COMMAND}:EffortJointPositionController",
+    "effort_controllers/JointVelocityController": f"{_JOINT_COMMAND}:EffortJointVelocityController",
+    "effort_controllers/JointEffortController": f"{_JOINT_COMMAND}:EffortJointEffortController",
+    "effort_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:EffortJointGroupPositionController",
+    "effort_controllers/JointGroupEffortController": f"{_JOINT_COMMAND}:EffortJointGroupEffortController",
 }
 
 
 class ControllerTypes:
-    """Controller classes by type name.
+    """Controller classes by type name: those registered, those built in, then those that packages offer.
 
     Args:
         locations: type name -> "module:Class"; the built-in ones when not given.
+        plugins: classes that packages offer; those of the sourced workspace when not given.
     """
 
-    def __init__(self, locations: dict[str, str] | None = None) -> None:
+    def __init__(self, locations: dict[str, str] | None = None, plugins: PluginIndex | None = None) -> None:
         self._locations = dict(BUILT_IN_TYPES if locations is None else locations)
+        self._plugins = plugins if plugins is not None else PluginIndex(CONTROLLER_BASE)
         self._factories: dict[str, Callable[[], Controller]] = {}
 
     @property
     def names(self) -> list[str]:
         """Known type names, sorted."""
-        return sorted({*self._locations, *self._factories})
+        return sorted({*self._locations, *self._factories, *self._plugins.names})
 
     def register(self, type_name: str, factory: Callable[[], Controller]) -> None:
         """Make a class known under `type_name` ("package/Class"); an earlier one of that name is replaced."""
@@ -49,7 +66,7 @@ class ControllerTypes:
         if type_name in self._factories:
             return self._factories[type_name]()
         if type_name not in self._locations:
-            raise ControllerError(f"unknown controller type '{type_name}'; known types: {', '.join(self.names)}")
+            return self._create_plugin(type_name)
         module_name, _, class_name = self._locations[type_name].partition(":")
         try:
             controller_class = getattr(importlib.import_module(module_name), class_name)
@@ -59,6 +76,20 @@ class ControllerTypes:
         controller: Controller = controller_class()
         return controller
 
+    def _create_plugin(self, type_name: str) -> Controller:
+        if type_name not in self._plugins:
+            faults = "".join(f"; {fault}" for fault in self._plugins.faults)
+            raise ControllerError(f"unknown controller type '{type_name}'; known types: {', '.join(self.names)}"
+                                  f"{faults}")
+        try:
+            controller: Controller = self._plugins.load(type_name, Controller)()
+        except PluginError as error:
+            raise ControllerError(f"controller type '{type_name}': {error}") from error
+        except Exception as error:  # a user's constructor may raise anything
+            raise ControllerError(f"controller type '{type_name}': its constructor raised {type(error).__name__}: "
+                                  f"{error}") from error
+        return controller
+
     def reload(self) -> None:
-        """Look again for modules installed since the program started."""
-        importlib.invalidate_caches()
+        """Look again for classes and modules installed since the program started."""
+        self._plugins.reload()

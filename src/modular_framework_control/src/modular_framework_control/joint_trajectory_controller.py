@@ -10,14 +10,14 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_switch import LOGGER
 from modular_framework_control.goal_ticket import GoalStatus
-from modular_framework_control.hardware_interface import JointHandle, PositionJointInterface
+from modular_framework_control.hardware_interface import HardwareInterface, JointHandle, PositionJointInterface
 from modular_framework_control.joint_limits import limits_from_urdf
 from modular_framework_control.node_handle import NodeHandle, read_bool, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
@@ -79,7 +79,7 @@ class JointTrajectoryController(Controller):
         on_feedback: called in the control loop at `action_monitor_rate` with the active ticket and a snapshot.
     """
 
-    interface_class = PositionJointInterface
+    interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
 
     def __init__(self) -> None:
         self.joint_names: list[str] = []
@@ -207,16 +207,21 @@ class JointTrajectoryController(Controller):
             stages = self._stages = tuple(stage for i, stage in enumerate(stages)
                                           if i + 1 == len(stages) or stages[i + 1].from_s > time_s)
         desired = self._sample(stages, time_s)
-        for handle, position in zip(self._handles, desired[POSITION].tolist(), strict=True):
-            handle.command = position
         self._read_actual()
         error = desired[:2] - self._actual
         if self._any_continuous:
             turned = error[POSITION, self._continuous]
             error[POSITION, self._continuous] = turned - 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
+        self._command(desired, error, period_s)
         if self._active is not None:
             self._check(self._active, time_s, error)
         self._report(time_s, desired, error)
+
+    def _command(self, desired: Array, error: Array, period_s: float) -> None:
+        """Command the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
+        del error, period_s
+        for handle, position in zip(self._handles, desired[POSITION].tolist(), strict=True):
+            handle.command = position
 
     def _read_actual(self) -> None:
         states = [handle.state for handle in self._handles]

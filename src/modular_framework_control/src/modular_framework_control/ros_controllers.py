@@ -27,10 +27,12 @@ from modular_framework_control.gripper_action_controller import (
     GripperState,
     GripperTicket,
 )
+from modular_framework_control.joint_command_controllers import JointCommandController
 from modular_framework_control.joint_state_controller import JointStateController, JointStateSnapshot
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
+from modular_framework_control.ros_command_edges import JointCommandEdge
 from modular_framework_control.ros_outbox import Outbox
 from modular_framework_control.trajectory_goal import (
     GoalRejectedError,
@@ -144,6 +146,7 @@ _EDGES: tuple[tuple[type[Controller], Any], ...] = (
     (JointStateController, JointStateEdge),
     (JointTrajectoryController, JointTrajectoryEdge),
     (GripperActionController, GripperEdge),
+    (JointCommandController, JointCommandEdge),
 )
 
 

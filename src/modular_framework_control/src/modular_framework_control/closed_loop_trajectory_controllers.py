@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Trajectory controllers for joints that take velocities or efforts: what a position-controlled joint does inside
+itself, these do with gains."""
+from __future__ import annotations
+
+from typing import Any
+
+from modular_framework_control.hardware_interface import EffortJointInterface, VelocityJointInterface
+from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
+from modular_framework_control.node_handle import NodeHandle, read_number
+from modular_framework_control.pid import read_pid
+from modular_framework_control.trajectory import POSITION, VELOCITY, Array
+
+
+class _ClosedLoopTrajectoryController(JointTrajectoryController):
+    """Commands `velocity_ff * desired velocity + PID(position error, velocity error)` per joint.
+
+    Parameters, besides those of every trajectory controller: `gains/<joint>/{p, i, d, i_clamp, i_clamp_min,
+    i_clamp_max, antiwindup}`; `velocity_ff/<joint>` 0. The command is 0 while the controller does not run.
+    """
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        super().init(hw, root_nh, controller_nh)
+        self._pids = [read_pid(controller_nh.child(f"gains/{name}")) for name in self.joint_names]
+        forward = controller_nh.child("velocity_ff")
+        self._velocity_ff = [read_number(forward, name, 0.0, None) for name in self.joint_names]
+        return True
+
+    def starting(self, time_s: float) -> None:
+        super().starting(time_s)
+        for pid in self._pids:
+            pid.reset()
+        self._command_nothing()
+
+    def stopping(self, time_s: float) -> None:
+        self._command_nothing()
+        super().stopping(time_s)
+
+    def failed(self, time_s: float, reason: str) -> None:
+        self._command_nothing()
+        super().failed(time_s, reason)
+
+    def _command_nothing(self) -> None:
+        for handle in self._handles:
+            handle.command = 0.0
+
+    def _command(self, desired: Array, error: Array, period_s: float) -> None:
+        for handle, pid, forward, velocity, position_error, velocity_error in zip(
+                self._handles, self._pids, self._velocity_ff, desired[VELOCITY].tolist(), error[POSITION].tolist(),
+                error[VELOCITY].tolist(), strict=True):
+            handle.command = forward * velocity + pid.command(position_error, velocity_error, period_s)
+
+
+class VelocityJointTrajectoryController(_ClosedLoopTrajectoryController):
+    """velocity_controllers/JointTrajectoryController; gains in [1/s] (p), [1/s^2] (i), [1] (d, velocity_ff)."""
+
+    interface_class = VelocityJointInterface
+
+
+class EffortJointTrajectoryController(_ClosedLoopTrajectoryController):
+    """effort_controllers/JointTrajectoryController; gains in [Nm/rad] (p), [Nm/(rad s)] (i), [Nm s/rad] (d,
+    velocity_ff)."""
+
+    interface_class = EffortJointInterface

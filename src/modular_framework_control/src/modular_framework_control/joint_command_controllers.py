@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that do at once what one topic says: a position, velocity or effort for one joint or for several.
+
+Where the hardware takes what is commanded, it is passed on; where it takes something else, gains make it that.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_control.controller import Controller, ControllerError
+from modular_framework_control.hardware_interface import (
+    EffortJointInterface,
+    JointHandle,
+    PositionJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.joint_limits import JointLimits, limits_from_urdf
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names
+from modular_framework_control.pid import Pid, read_pid
+
+
+class JointCommandController(Controller):
+    """Base: commands arrive from any thread as a whole and are in force from the next cycle on.
+
+    Parameters, below the controller's name: `joints`, or `joint` for controllers of one.
+
+    Attributes:
+        single: whether it controls one joint, and its topic `command` holds one number.
+        joint_names: the joints, in the order of the numbers of a command.
+    """
+
+    single = True
+
+    def __init__(self) -> None:
+        self.joint_names: list[str] = []
+        self._handles: list[JointHandle] = []
+        self._wanted: tuple[float, ...] = ()
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        key = "joint" if self.single else "joints"
+        self.joint_names = read_names(controller_nh, key)
+        if self.single and len(self.joint_names) != 1:
+            raise ParameterError(f"parameter {join_names(controller_nh.namespace, key)}: got {self.joint_names!r}; "
+                                 "expected the name of one joint")
+        self._handles = [hw.get_handle(name) for name in self.joint_names]
+        return True
+
+    def submit(self, values: Sequence[float]) -> None:
+        """Take a command, from any thread.
+
+        Args:
+            values: one number a joint, in the unit of what is controlled.
+
+        Raises:
+            ControllerError: not as many as joints, or not finite; the command before stays in force.
+        """
+        if len(values) != len(self.joint_names) or not all(map(math.isfinite, values)):
+            raise ControllerError(f"got {list(values)!r}; expected {len(self.joint_names)} finite numbers, for: "
+                                  f"{', '.join(self.joint_names)}")
+        self._wanted = tuple(values)
+
+    def starting(self, time_s: float) -> None:
+        self._wanted = self._resting()
+        self.update(time_s, 0.0)
+
+    def _resting(self) -> tuple[float, ...]:
+        """What keeps the joints where they are."""
+        return (0.0,) * len(self._handles)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        for handle, value in zip(self._handles, self._wanted, strict=True):
+            handle.command = value
+
+
+class _Zeroing(JointCommandController):
+    """One whose joints take velocities or efforts: they get none when it does not run."""
+
+    def stopping(self, time_s: float) -> None:
+        for handle in self._handles:
+            handle.command = 0.0
+
+
+class PositionJointPositionController(JointCommandController):
+    """position_controllers/JointPositionController: positions [rad|m] for joints that take positions."""
+
+    interface_class = PositionJointInterface
+
+    def _resting(self) -> tuple[float, ...]:
+        return tuple(handle.position for handle in self._handles)
+
+
+class PositionJointGroupPositionController(PositionJointPositionController):
+    """position_controllers/JointGroupPositionController."""
+
+    single = False
+
+
+class VelocityJointVelocityController(_Zeroing):
+    """velocity_controllers/JointVelocityController: velocities [rad/s|m/s] for joints that take velocities."""
+
+    interface_class = VelocityJointInterface
+
+
+class VelocityJointGroupVelocityController(VelocityJointVelocityController):
+    """velocity_controllers/JointGroupVelocityController."""
+
+    single = False
+
+
+class EffortJointEffortController(_Zeroing):
+    """effort_controllers/JointEffortController: efforts [Nm|N] for joints that take efforts."""
+
+    interface_class = EffortJointInterface
+
+
+class EffortJointGroupEffortController(EffortJointEffortController):
+    """effort_controllers/JointGroupEffortController."""
+
+    single = False
+
+
+class _WithGains(_Zeroing):
+    """Parameters besides: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several."""
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        super().init(hw, root_nh, controller_nh)
+        where = ["pid"] if self.single else [f"{name}/pid" for name in self.joint_names]
+        self._pids: list[Pid] = [read_pid(controller_nh.child(name)) for name in where]
+        return True
+
+    def starting(self, time_s: float) -> None:
+        for pid in self._pids:
+            pid.reset()
+        super().starting(time_s)
+
+
+class _PositionByGains(_WithGains):
+    """Positions [rad|m], kept within the limits of the robot description, for joints that take something else."""
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        super().init(hw, root_nh, controller_nh)
+        description = root_nh.get_param("robot_description")
+        known = limits_from_urdf(description) if isinstance(description, str) else {}
+        self._limits = [known.get(name, JointLimits()) for name in self.joint_names]
+        return True
+
+    def _resting(self) -> tuple[float, ...]:
+        return tuple(handle.position for handle in self._handles)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        for handle, value, limits, pid in zip(self._handles, self._wanted, self._limits, self._pids, strict=True):
+            if limits.continuous:
+                error = math.remainder(value - handle.position, 2.0 * math.pi)
+            else:
+                error = min(max(value, limits.min_position), limits.max_position) - handle.position
+            handle.command = pid.command(error, -handle.velocity, period_s)
+
+
+class VelocityJointPositionController(_PositionByGains):
+    """velocity_controllers/JointPositionController: a position for a joint that takes velocities."""
+
+    interface_class = VelocityJointInterface
+
+
+class EffortJointPositionController(_PositionByGains):
+    """effort_controllers/JointPositionController: a position for a joint that takes efforts."""
+
+    interface_class = EffortJointInterface
+
+
+class EffortJointGroupPositionController(EffortJointPositionController):
+    """effort_controllers/JointGroupPositionController."""
+
+    single = False
+
+
+class EffortJointVelocityController(_WithGains):
+    """effort_controllers/JointVelocityController: a velocity [rad/s|m/s] for a joint that takes efforts."""
+
+    interface_class = EffortJointInterface
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._last_error = math.nan
+
+    def starting(self, time_s: float) -> None:
+        self._last_error = math.nan
+        super().starting(time_s)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        error = self._wanted[0] - self._handles[0].velocity
+        known = period_s > 0.0 and math.isfinite(self._last_error)
+        rate = (error - self._last_error) / period_s if known else 0.0
+        self._last_error = error
+        self._handles[0].command = self._pids[0].command(error, rate, period_s)

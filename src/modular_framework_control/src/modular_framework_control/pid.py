@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns the error of a joint into a command, with the gains users write below `gains/<joint>` or `pid`."""
+from __future__ import annotations
+
+import math
+
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+
+
+class Pid:
+    """Proportional, integral and derivative gain, with a bound on the integral's part of the command.
+
+    Args:
+        p: command per error.
+        i: command per error and second.
+        d: command per rate of the error.
+        i_min: smallest command of the integral's part, at most 0.
+        i_max: largest command of the integral's part, at least 0.
+        antiwindup: stop to add up where the bound is reached, instead of bounding only what comes out.
+    """
+
+    __slots__ = ("p", "i", "d", "i_min", "i_max", "antiwindup", "_sum")
+
+    def __init__(self, p: float, i: float = 0.0, d: float = 0.0, i_min: float = 0.0, i_max: float = 0.0,
+                 antiwindup: bool = False) -> None:
+        self.p, self.i, self.d = p, i, d
+        self.i_min, self.i_max = i_min, i_max
+        self.antiwindup = antiwindup
+        self._sum = 0.0
+
+    def reset(self) -> None:
+        """Forget what was added up."""
+        self._sum = 0.0
+
+    def command(self, error: float, error_rate: float, period_s: float) -> float:
+        """The command for an error.
+
+        Args:
+            error: desired minus measured.
+            error_rate: its change [1/s].
+            period_s: time since the last call [s].
+
+        Returns:
+            p * error + i * (sum of error * period), bounded, + d * error_rate; 0 for an error that is no number.
+        """
+        if not (math.isfinite(error) and math.isfinite(error_rate)):
+            return 0.0
+        total = self._sum + error * max(0.0, period_s)
+        if self.antiwindup and self.i != 0.0:
+            ends = sorted((self.i_min / self.i, self.i_max / self.i))
+            total = min(max(total, ends[0]), ends[1])
+        self._sum = total
+        return self.p * error + min(max(self.i * total, self.i_min), self.i_max) + self.d * error_rate
+
+
+def read_pid(gains_nh: NodeHandle) -> Pid:
+    """Gains of one joint: `p`, which must be there; `i` 0, `d` 0, `i_clamp` 0 (or `i_clamp_min`, `i_clamp_max`),
+    `antiwindup` false. An `i_clamp` of 0 switches the integral off, as in ros_control.
+
+    Raises:
+        ParameterError: no `p`, or a value of the wrong kind.
+    """
+    if not gains_nh.has_param("p"):
+        raise ParameterError(f"parameter {join_names(gains_nh.namespace, 'p')} is not set; a joint that is controlled "
+                             "by velocity or effort needs its gains: p, and if wanted i, d, i_clamp, antiwindup")
+    p, i, d = (read_number(gains_nh, key, 0.0, None) for key in ("p", "i", "d"))
+    clamp = abs(read_number(gains_nh, "i_clamp", 0.0, None))
+    i_min = -abs(read_number(gains_nh, "i_clamp_min", -clamp, None))
+    i_max = abs(read_number(gains_nh, "i_clamp_max", clamp, None))
+    return Pid(p, i, d, i_min, i_max, read_bool(gains_nh, "antiwindup", False))
