@@ -11,7 +11,6 @@ import uuid
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 
-import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
@@ -33,6 +32,7 @@ from moveit_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_core.commander_results import ExecutionResult, IkResult, PlanResult
 from modular_framework_core.moveit_requests import (
     StartState,
@@ -112,7 +112,7 @@ class ArmCommander:
             self._plan_service = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
             self._ik_service = rospy.ServiceProxy("compute_ik", GetPositionIK)
             self._validity_service = rospy.ServiceProxy("check_state_validity", GetStateValidity)
-            self._execute_client = actionlib.SimpleActionClient(EXECUTE_ACTION, ExecuteTrajectoryAction)
+            self._execute_client = SteadyActionClient(EXECUTE_ACTION, ExecuteTrajectoryAction)
             self._subscribers = [rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10),
                                  rospy.Subscriber(REPORT_TOPIC, String, self._on_report, queue_size=10)]
             try:

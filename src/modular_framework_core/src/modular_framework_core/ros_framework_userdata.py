@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import actionlib
 import rospy
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
+from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_core.arm_commander import ArmCommander
 from modular_framework_core.msg import GraspAction
 from modular_framework_core.ros_calls import call_service, wait_for_service
@@ -50,7 +50,7 @@ def initialise_userdata(userdata: Any) -> None:
     userdata.manipulator_controller_client = None
     userdata.max_torque = parameters.max_torque
     if parameters.manipulator_action:
-        userdata.manipulator_controller_client = actionlib.SimpleActionClient(
+        userdata.manipulator_controller_client = SteadyActionClient(
             parameters.manipulator_action, GraspAction
         )
 

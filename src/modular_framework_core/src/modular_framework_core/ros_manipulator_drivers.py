@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import (
@@ -19,6 +18,7 @@ from control_msgs.msg import (
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_core.grasp_server import GraspCommandError, Outcome
 from modular_framework_core.ros_calls import wait_for_action, wait_for_result, wait_until
 
@@ -98,7 +98,7 @@ class GripperDriver:
 
     def __init__(self, action: str) -> None:
         self._action = action
-        self._client = actionlib.SimpleActionClient(action, GripperCommandAction)
+        self._client = SteadyActionClient(action, GripperCommandAction)
 
     def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
         """Moves the joint; a stall is an outcome, not an error.
@@ -135,7 +135,7 @@ class TrajectoryDriver:
 
     def __init__(self, action: str, duration_s: float) -> None:
         self._action, self._duration_s = action, duration_s
-        self._client = actionlib.SimpleActionClient(action, FollowJointTrajectoryAction)
+        self._client = SteadyActionClient(action, FollowJointTrajectoryAction)
 
     def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
         """Moves the joints; fingers that rest short of their targets are stalled.

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A simple action client that does not lose the answer of a quick server."""
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import actionlib
+from actionlib.action_client import ClientGoalHandle
+
+
+class SteadyActionClient(actionlib.SimpleActionClient):
+    """An actionlib.SimpleActionClient for servers that answer at once.
+
+    actionlib's own client knows its goal only when `send_goal` has returned, and drops whatever the server says before
+    that: a goal accepted or ended within that time stays pending for ever. This one lets such an answer wait.
+    """
+
+    def __init__(self, ns: str, action_spec: type[Any]) -> None:
+        self._sending = threading.RLock()
+        super().__init__(ns, action_spec)
+
+    def send_goal(self, *args: Any, **kwargs: Any) -> None:
+        """Sends a goal; arguments as those of actionlib.SimpleActionClient.send_goal."""
+        with self._sending:
+            super().send_goal(*args, **kwargs)
+
+    def _handle_transition(self, gh: ClientGoalHandle) -> None:
+        with self._sending:
+            tracked = gh == self.gh
+        if tracked:
+            super()._handle_transition(gh)
