@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""smach for ROS: the public interface of smach_ros 2.5.2, written anew.
+
+Importing the package makes smach log through rospy and stop when rospy shuts down.
+"""
+import rospy
+
+import smach
+from smach_ros.action_server_wrapper import ActionServerWrapper
+from smach_ros.condition_state import ConditionState
+from smach_ros.introspection import IntrospectionClient, IntrospectionServer
+from smach_ros.monitor_state import MonitorState
+from smach_ros.service_state import ServiceState
+from smach_ros.simple_action_state import SimpleActionState
+from smach_ros.util import set_preempt_handler
+
+__all__ = [
+    "ActionServerWrapper",
+    "ConditionState",
+    "IntrospectionClient",
+    "IntrospectionServer",
+    "MonitorState",
+    "ServiceState",
+    "SimpleActionState",
+    "set_preempt_handler",
+]
+
+smach.set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)
+smach.set_shutdown_check(rospy.is_shutdown)

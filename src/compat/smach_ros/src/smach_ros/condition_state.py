@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A state that asks a function again and again until it says yes."""
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import rospy
+
+import smach
+from smach_ros.waiting import RosTimeLimit, going_down, seconds
+
+__all__ = ["ConditionState"]
+
+
+class ConditionState(smach.State):
+    """Outcomes: true, false (not within the checks or the time allowed), preempted."""
+
+    def __init__(
+        self,
+        cond_cb: Callable[[Any], object],
+        input_keys: Iterable[str] = (),
+        poll_rate: rospy.Duration = rospy.Duration(0.05),  # noqa: B008 - never changed
+        timeout: rospy.Duration | None = None,
+        max_checks: int = 1,
+    ) -> None:
+        """Make the state.
+
+        Args:
+            cond_cb: gets the userdata; one made by ``smach.cb_interface`` brings its keys along.
+            input_keys: userdata keys that are read.
+            poll_rate: time between two checks [wall time].
+            timeout: longest execution [ROS time]; None: no limit.
+            max_checks: longest number of checks; -1: no limit.
+
+        Raises:
+            smach.InvalidStateError: an argument does not fit.
+        """
+        super().__init__(("true", "false", "preempted"), input_keys)
+        if not callable(cond_cb):
+            raise smach.InvalidStateError(f"cond_cb is a {type(cond_cb).__name__}; give a function")
+        if not isinstance(max_checks, int) or (max_checks < 1 and max_checks != -1):
+            raise smach.InvalidStateError(f"max_checks must be -1 (no limit) or at least 1, got {max_checks!r}")
+        period_s = seconds("poll_rate", poll_rate)
+        if period_s is None:
+            raise smach.InvalidStateError("poll_rate must be a rospy.Duration, got None")
+        declared: Any = cond_cb
+        if smach.has_smach_interface(cond_cb):
+            self.register_input_keys(declared.get_registered_input_keys())
+            self.register_output_keys(declared.get_registered_output_keys())
+        self._cond_cb = cond_cb
+        self._period_s = period_s
+        self._timeout_s = seconds("timeout", timeout)
+        self._max_checks = max_checks
+        self._wake = threading.Event()
+
+    def execute(self, userdata: Any) -> str:
+        """Ask until the function says yes, or no further check is allowed.
+
+        Raises:
+            smach.InvalidUserCodeError: the function raised.
+        """
+        self._wake.clear()
+        limit = RosTimeLimit(self._timeout_s)
+        checks = 0
+        while not (self.preempt_requested() or going_down()):
+            if limit.over():
+                return "false"
+            if self._ask(userdata):
+                return "true"
+            checks += 1
+            if checks == self._max_checks:
+                return "false"
+            self._wake.wait(self._period_s)
+        self.service_preempt()
+        return "preempted"
+
+    def _ask(self, userdata: Any) -> bool:
+        try:
+            return bool(self._cond_cb(userdata))
+        except Exception as error:
+            raise smach.InvalidUserCodeError(
+                f"condition {self._cond_cb!r} raised {type(error).__name__}: {error}\n{traceback.format_exc()}"
+            ) from error
+
+    def request_preempt(self) -> None:
+        """Ask the state to stop."""
+        super().request_preempt()
+        self._wake.set()

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows a running state machine on topics, for viewers, and lets them choose the state it starts in."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable
+from typing import Any
+
+import rospy
+from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus, SmachContainerStructure
+from std_msgs.msg import Header
+
+import smach
+from smach_ros.userdata_wire import UserdataError, decode, encode
+from smach_ros.waiting import seconds
+
+__all__ = ["IntrospectionClient", "IntrospectionServer"]
+
+STATUS_TOPIC = "/smach/container_status"
+INIT_TOPIC = "/smach/container_init"
+STRUCTURE_TOPIC = "/smach/container_structure"
+
+UPDATE_PERIOD_S = 2.0
+"""How often everything is published again [wall time]."""
+
+MIN_QUEUE = 100
+
+
+def _values(userdata: smach.UserData) -> dict[str, Any]:
+    keys = list(userdata.keys())
+    return {key: userdata[key] for key in keys}
+
+
+class ContainerProxy:
+    """What the server tells of one container."""
+
+    def __init__(self, container: smach.Container, path: str) -> None:
+        """Keep a container and its path from the root."""
+        self.container = container
+        self.path = path
+
+    def structure(self) -> SmachContainerStructure:
+        """Return the message that tells the states and transitions."""
+        edges = self.container.get_internal_edges()
+        return SmachContainerStructure(
+            header=Header(stamp=rospy.Time.now()),
+            path=self.path,
+            children=list(self.container.get_children()),
+            internal_outcomes=[str(outcome) for outcome, _, _ in edges],
+            outcomes_from=[str(label) for _, label, _ in edges],
+            outcomes_to=[str(target) for _, _, target in edges],
+            container_outcomes=list(self.container.get_registered_outcomes()),
+        )
+
+    def status(self, info: str) -> SmachContainerStatus:
+        """Return the message that tells the active states and the userdata."""
+        return SmachContainerStatus(
+            header=Header(stamp=rospy.Time.now()),
+            path=self.path,
+            initial_states=[str(label) for label in self.container.get_initial_states()],
+            active_states=[str(label) for label in self.container.get_active_states()],
+            local_data=encode(_values(self.container.userdata)),
+            info=info,
+        )
+
+    def set_initial_state(self, command: SmachContainerInitialStatusCmd) -> None:
+        """Do what a viewer commands.
+
+        Raises:
+            smach.SmachError: the container has no such states.
+            UserdataError: the userdata is broken.
+        """
+        children = self.container.get_children()
+        unknown = [label for label in command.initial_states if label not in children]
+        if unknown:
+            raise smach.InvalidStateError(f"there are no states {unknown}; there are {list(children)}")
+        userdata = smach.UserData()
+        for key, value in decode(command.local_data).items():
+            userdata[key] = value
+        self.container.set_initial_state(list(command.initial_states), userdata)
+
+
+class _NewSubscriber(rospy.SubscribeListener):
+    """Calls a function when somebody has subscribed."""
+
+    def __init__(self, event: threading.Event) -> None:
+        super().__init__()
+        self._event = event
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
+        """Called by rospy."""
+        self._event.set()
+
+
+class IntrospectionServer:
+    """Publishes structure and status of a container and of all containers in it.
+
+    Nothing is made up or sent while nobody listens; a new listener is told everything at once, then whenever a
+    container starts, ends or makes a transition, and every two seconds.
+    Publishers: ``<server_name>/smach/container_structure``, ``<server_name>/smach/container_status``.
+    Subscriber: ``<server_name>/smach/container_init``.
+    """
+
+    def __init__(self, server_name: str, state: smach.Container, path: str, *, accept_commands: bool = True) -> None:
+        """Make the server; ``start`` starts it.
+
+        Args:
+            server_name: start of the topics' names.
+            state: the outermost container.
+            path: what it is called, as "/TASK".
+            accept_commands: whether viewers may set initial states and userdata.
+
+        Raises:
+            smach.InvalidStateError: the state is no container, or the path does not begin with "/".
+        """
+        if not isinstance(state, smach.Container):
+            raise smach.InvalidStateError(f"introspection needs a container, got a {type(state).__name__}")
+        if not path.startswith("/"):
+            raise smach.InvalidStateError(f"the path of the outermost container must begin with '/', got '{path}'")
+        self._server_name = server_name
+        self._state = state
+        self._path = path
+        self._accept_commands = accept_commands
+        self._proxies: list[ContainerProxy] = []
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._running = False
+        self._run_number = 0
+        self._topics: list[Any] = []
+
+    def start(self) -> None:
+        """Advertise the topics and begin to publish. A server that was stopped can be started again."""
+        with self._lock:
+            if self._running:
+                return
+            self._running = True
+            self._run_number += 1
+        if not self._proxies:
+            self.construct(self._server_name, self._state, self._path)
+        queue = max(MIN_QUEUE, 2 * len(self._proxies))
+        listener = _NewSubscriber(self._wake)
+        self._structure_pub = rospy.Publisher(
+            self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, listener, queue_size=queue
+        )
+        self._status_pub = rospy.Publisher(
+            self._server_name + STATUS_TOPIC, SmachContainerStatus, listener, queue_size=queue
+        )
+        self._topics = [self._structure_pub, self._status_pub]
+        if self._accept_commands:
+            self._topics.append(
+                rospy.Subscriber(self._server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_command)
+            )
+        threading.Thread(
+            target=self._publish_loop, args=(self._run_number,), name=f"{self._server_name} introspection", daemon=True
+        ).start()
+
+    def stop(self) -> None:
+        """Withdraw the topics. May be called twice."""
+        with self._lock:
+            self._running = False
+            topics, self._topics = self._topics, []
+        self._wake.set()
+        for topic in topics:
+            topic.unregister()
+
+    def construct(self, server_name: str, state: smach.Container, path: str) -> None:
+        """Take up a container and all containers in it; server_name is that of this server."""
+        proxy = ContainerProxy(state, path)
+        self._proxies.append(proxy)
+
+        def changed(*_: Any) -> None:
+            self._publish_status(proxy, f"active: {', '.join(state.get_active_states())}")
+
+        state.register_start_cb(changed)
+        state.register_transition_cb(changed)
+        state.register_termination_cb(changed)
+        for label, child in state.get_children().items():
+            if isinstance(child, smach.Container):
+                self.construct(server_name, child, f"{path.rstrip('/')}/{label}")
+
+    def clear(self) -> None:
+        """Forget all containers."""
+        self._proxies = []
+
+    def _publish_loop(self, run_number: int) -> None:
+        """Body of the thread: publish everything now and then, and when there is a new listener."""
+        while self._running and self._run_number == run_number and not rospy.is_shutdown():
+            self._wake.clear()
+            for proxy in list(self._proxies):
+                self._publish_structure(proxy)
+                self._publish_status(proxy, "HEARTBEAT")
+            self._wake.wait(UPDATE_PERIOD_S)
+
+    def _publish_structure(self, proxy: ContainerProxy) -> None:
+        if self._running and self._structure_pub.get_num_connections() > 0:
+            self._send(self._structure_pub, proxy.structure)
+
+    def _publish_status(self, proxy: ContainerProxy, info: str) -> None:
+        if self._running and self._status_pub.get_num_connections() > 0:
+            self._send(self._status_pub, lambda: proxy.status(info))
+
+    def _send(self, publisher: rospy.Publisher, message: Any) -> None:
+        """Make a message and publish it: watching a machine must not disturb it."""
+        try:
+            publisher.publish(message())
+        except Exception as error:
+            if self._running and not rospy.is_shutdown():
+                rospy.logwarn_throttle(10.0, f"the state machine could not be shown: {type(error).__name__}: {error}")
+
+    def _on_command(self, command: SmachContainerInitialStatusCmd) -> None:
+        for proxy in list(self._proxies):
+            if proxy.path != command.path:
+                continue
+            try:
+                proxy.set_initial_state(command)
+            except (smach.SmachError, UserdataError) as error:
+                rospy.logerr(f"initial state of '{command.path}' not set: {error}")
+            else:
+                self._publish_status(proxy, "REMOTE_INIT")
+            return
+
+
+class IntrospectionClient:
+    """Finds introspection servers and commands them."""
+
+    def __init__(self) -> None:
+        """Make a client; it connects when it is used."""
+        self._publishers: dict[str, rospy.Publisher] = {}
+
+    def get_servers(self) -> list[str]:
+        """Return the names of the servers that publish now."""
+        return [
+            topic[: -len(STATUS_TOPIC)]
+            for topic, kind in rospy.get_published_topics()
+            if kind == SmachContainerStatus._type and topic.endswith(STATUS_TOPIC)
+        ]
+
+    def set_initial_state(
+        self,
+        server: str,
+        path: str,
+        initial_states: Iterable[str],
+        initial_userdata: smach.UserData | None = None,
+        timeout: rospy.Duration | None = None,
+    ) -> bool | None:
+        """Choose the states a container starts in.
+
+        Args:
+            server: name of the server.
+            path: path of the container.
+            initial_states: labels of its states.
+            initial_userdata: values that are put in its userdata: plain values and messages.
+            timeout: longest wait for the container to have taken it over [wall time]; None: do not wait.
+
+        Returns:
+            Whether it has; None when there was no wait.
+
+        Raises:
+            UserdataError: a value cannot be sent.
+        """
+        labels = list(initial_states)
+        userdata = smach.UserData() if initial_userdata is None else initial_userdata
+        values = _values(userdata)
+        command = SmachContainerInitialStatusCmd(path, labels, encode(values, strict=True))
+        if server not in self._publishers:
+            self._publishers[server] = rospy.Publisher(
+                server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1, latch=True
+            )
+        publisher = self._publishers[server]
+        timeout_s = seconds("timeout", timeout)
+        if timeout_s is None:
+            publisher.publish(command)
+            return None
+        return _send_until_taken(publisher, server, command, values, timeout_s)
+
+
+def _send_until_taken(publisher: rospy.Publisher, server: str, command: SmachContainerInitialStatusCmd,
+                      values: dict[str, Any], timeout_s: float) -> bool:
+    """Send a command again and again until a status shows its effect; return whether one did in time."""
+    taken = threading.Event()
+
+    def look(status: SmachContainerStatus) -> None:
+        if status.path != command.path or not set(command.initial_states) <= set(status.initial_states):
+            return
+        try:
+            shown = decode(status.local_data)
+        except UserdataError as error:
+            rospy.logwarn_throttle(10.0, f"status of '{server}' cannot be read: {error}")
+            return
+        if all(key in shown and shown[key] == value for key, value in values.items()):
+            taken.set()
+
+    subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, look)
+    end = time.monotonic() + timeout_s
+    try:
+        while not taken.is_set() and time.monotonic() < end and not rospy.is_shutdown():
+            publisher.publish(command)
+            taken.wait(max(0.0, min(0.3, end - time.monotonic())))
+    finally:
+        subscriber.unregister()
+    return taken.is_set()

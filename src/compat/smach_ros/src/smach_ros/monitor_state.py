@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A state that looks at the messages of a topic and ends when a condition no longer holds, or has held often enough."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import rospy
+
+import smach
+from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, going_down, seconds
+
+__all__ = ["MonitorState"]
+
+
+class MonitorState(smach.State):
+    """Outcomes: valid (true ``max_checks`` times), invalid (false once), preempted.
+
+    Attributes:
+        reason: why the last execution ended as invalid or preempted; "" when it did not.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        msg_type: Any,
+        cond_cb: Callable[[Any, Any], object],
+        max_checks: int = -1,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+        timeout: rospy.Duration | None = None,
+    ) -> None:
+        """Make the state.
+
+        Args:
+            topic: name of the topic.
+            msg_type: type of its messages.
+            cond_cb: gets (userdata, message); a false value, or an error, ends the state as invalid.
+            max_checks: number of true answers that end it as valid; -1: only a false one ends it.
+            input_keys: userdata keys that are read.
+            output_keys: userdata keys that are written.
+            io_keys: userdata keys that are read and written.
+            timeout: longest execution [ROS time]; then the outcome is invalid; None: no limit.
+
+        Raises:
+            smach.InvalidStateError: an argument does not fit.
+        """
+        super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, io_keys)
+        if not hasattr(msg_type, "_md5sum"):
+            raise smach.InvalidStateError(
+                f"msg_type of '{topic}' must be the class of a message as std_msgs.msg.Bool, got {msg_type!r}"
+            )
+        if not callable(cond_cb):
+            raise smach.InvalidStateError(f"cond_cb of '{topic}' is a {type(cond_cb).__name__}; give a function")
+        self._topic = topic
+        self._msg_type = msg_type
+        self._cond_cb = cond_cb
+        self._max_checks = max_checks
+        self._timeout_s = seconds("timeout", timeout)
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._checks = 0
+        self._verdict: str | None = None
+        self.reason = ""
+
+    def execute(self, userdata: Any) -> str:
+        """Listen to the topic until the verdict is there."""
+        self.reason = ""
+        self._checks = 0
+        self._verdict = None
+        self._wake.clear()
+        if self.preempt_requested():
+            return self._preempted()
+        limit = RosTimeLimit(self._timeout_s)
+        subscriber = rospy.Subscriber(self._topic, self._msg_type, self._check, callback_args=userdata)
+        try:
+            while self._verdict is None:
+                if self.preempt_requested() or going_down():
+                    return self._preempted()
+                if limit.over():
+                    self._decide("invalid", f"no verdict on '{self._topic}' within {self._timeout_s} s")
+                self._wake.wait(POLL_PERIOD_S)
+        finally:
+            subscriber.unregister()
+        return self._preempted() if self.preempt_requested() else self._verdict
+
+    def _check(self, message: Any, userdata: Any) -> None:
+        """Ask the condition about one message; the first verdict stays."""
+        with self._lock:
+            if self._verdict is not None:
+                return
+            try:
+                holds = bool(self._cond_cb(userdata, message))
+            except Exception as error:
+                self._decide("invalid", f"the condition on '{self._topic}' raised {type(error).__name__}: {error}")
+                smach.logerr(self.reason)
+                return
+            if not holds:
+                self._decide("invalid", f"the condition on '{self._topic}' does not hold")
+                return
+            self._checks += 1
+            if 0 < self._max_checks <= self._checks:
+                self._decide("valid", "")
+
+    def _decide(self, verdict: str, reason: str) -> None:
+        self.reason = reason
+        self._verdict = verdict
+        self._wake.set()
+
+    def _preempted(self) -> str:
+        self.reason = f"asked to stop while looking at '{self._topic}'"
+        self.service_preempt()
+        return "preempted"
+
+    def request_preempt(self) -> None:
+        """Ask the state to stop."""
+        super().request_preempt()
+        self._wake.set()

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A state that gives an action server a goal and ends with it; asked to stop, it cancels the goal at once."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import rospy
+from actionlib import CommState, SimpleActionClient
+from actionlib_msgs.msg import GoalID, GoalStatus
+
+import smach
+from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource, UserCallback
+from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, WallTimeLimit, going_down, seconds
+
+__all__ = ["SimpleActionState"]
+
+SERVER_LOST_S = 5.0
+"""How long a server may be gone [s] before its goal is given up."""
+
+_STATUS_NAMES = {
+    value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)
+}
+
+
+class SimpleActionState(AskingState):
+    """Outcomes: succeeded, aborted, preempted, and those the user adds."""
+
+    def __init__(
+        self,
+        action_name: str,
+        action_spec: Any,
+        goal: Any = None,
+        goal_key: str | None = None,
+        goal_slots: Iterable[str] = (),
+        goal_cb: Any = None,
+        goal_cb_args: Iterable[Any] = (),
+        goal_cb_kwargs: Mapping[str, Any] | None = None,
+        result_key: str | None = None,
+        result_slots: Iterable[str] = (),
+        result_cb: Any = None,
+        result_cb_args: Iterable[Any] = (),
+        result_cb_kwargs: Mapping[str, Any] | None = None,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        exec_timeout: rospy.Duration | None = None,
+        preempt_timeout: rospy.Duration | None = rospy.Duration(60.0),  # noqa: B008 - never changed
+        server_wait_timeout: rospy.Duration | None = rospy.Duration(60.0),  # noqa: B008 - never changed
+        io_keys: Iterable[str] = (),
+    ) -> None:
+        """Make the state.
+
+        Args:
+            action_name: name of the action.
+            action_spec: its type, as ``FibonacciAction``.
+            goal: the goal, or what the goal is started from; None: an empty one.
+            goal_key: userdata key that holds the goal.
+            goal_slots: fields of the goal that are taken from userdata keys of the same names.
+            goal_cb: gets (userdata, goal, *args, **kwargs), may change the goal or return another one.
+            goal_cb_args: see there.
+            goal_cb_kwargs: see there.
+            result_key: userdata key the result is put under.
+            result_slots: fields of the result that are put under userdata keys of the same names.
+            result_cb: gets (userdata, goal status, result, *args, **kwargs), may return an outcome.
+            result_cb_args: see there.
+            result_cb_kwargs: see there.
+            input_keys: further userdata keys that are read.
+            output_keys: further userdata keys that are written.
+            outcomes: further outcomes, for ``result_cb``.
+            exec_timeout: longest execution [ROS time]; then the goal is cancelled, and the outcome is aborted.
+            preempt_timeout: longest wait for the end of a cancelled goal [wall time]; then the outcome is aborted.
+            server_wait_timeout: longest wait for the server [wall time]; then the outcome is aborted.
+            io_keys: further userdata keys that are read and written.
+
+        Raises:
+            smach.InvalidStateError: an argument does not fit; the text says which and what would.
+        """
+        super().__init__(input_keys, output_keys, io_keys, outcomes)
+        self._action_name = action_name
+        self._action_spec = action_spec
+        self._exec_timeout_s = seconds("exec_timeout", exec_timeout)
+        self._preempt_timeout_s = seconds("preempt_timeout", preempt_timeout)
+        self._server_wait_timeout_s = seconds("server_wait_timeout", server_wait_timeout)
+        empty_goal, empty_result = _empty_messages(action_name, action_spec)
+        keys = ([*input_keys, *io_keys], [*output_keys, *io_keys])
+        goal_callback = UserCallback("goal_cb", goal_cb, goal_cb_args, goal_cb_kwargs, keys)
+        result_callback = UserCallback("result_cb", result_cb, result_cb_args, result_cb_kwargs, keys)
+        self._source = MessageSource("goal", empty_goal, goal, goal_key, goal_slots, goal_callback)
+        self._sink = MessageSink("result", empty_result, result_key, result_slots, result_callback)
+        self._source.register_on(self)
+        self._sink.register_on(self)
+        self._lock = threading.RLock()
+        self._wake = threading.Event()
+        self._goal_is_out = False
+        self._client: SimpleActionClient | None = None
+        if rospy.core.is_initialized():
+            self._connect()  # so that the server is found while the rest of the machine is being made
+
+    def _connect(self) -> SimpleActionClient:
+        if self._client is None:
+            self._client = SimpleActionClient(self._action_name, self._action_spec)
+        return self._client
+
+    # ---- stopping ------------------------------------------------------------------------------------------
+    def request_preempt(self) -> None:
+        """Ask the state to stop: a goal that is out is cancelled at once."""
+        with self._lock:
+            super().request_preempt()
+            if self._goal_is_out and self._client is not None:
+                smach.loginfo(f"action '{self._action_name}': asked to stop, the goal is cancelled")
+                _cancel(self._client)
+        self._wake.set()
+
+    # ---- running -------------------------------------------------------------------------------------------
+    def execute(self, userdata: Any) -> str:
+        """Wait for the server, send the goal, wait for its end."""
+        self.reason = ""
+        self._wake.clear()
+        try:
+            self._wait_for_server()
+            if self.preempt_requested() or going_down():
+                return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
+            goal = self._source.make(userdata)
+            with self._lock:  # a request to stop comes before this, or finds the goal out
+                if self.preempt_requested():
+                    return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
+                client = self._connect()
+                client.send_goal(goal, done_cb=lambda status, result: self._wake.set())
+                self._goal_is_out = True
+            return self._follow(client, userdata)
+        except ExchangeError as error:
+            return self._abort(f"action '{self._action_name}': {error}")
+        finally:
+            with self._lock:
+                self._goal_is_out = False
+
+    def _wait_for_server(self) -> None:
+        """Wait until the server is there, or the state is asked to stop.
+
+        Raises:
+            ExchangeError: it did not come in time.
+        """
+        client = self._connect()
+        limit = WallTimeLimit(self._server_wait_timeout_s)
+        told = WallTimeLimit(1.0)
+        while not (_server_is_there(client) or self.preempt_requested() or going_down()):
+            if limit.over():
+                raise ExchangeError(
+                    f"no server of type {self._action_spec._type} was at '{rospy.resolve_name(self._action_name)}' "
+                    f"within {self._server_wait_timeout_s} s; start the node that offers it"
+                )
+            if told.over():
+                smach.logwarn(f"still waiting for the server of action '{self._action_name}'")
+                told = WallTimeLimit(10.0)
+            self._wake.wait(POLL_PERIOD_S)
+
+    def _follow(self, client: SimpleActionClient, userdata: Any) -> str:
+        """Wait for the end of the goal and return the outcome."""
+        too_late = self._wait_for_end(client)
+        # only now: the status of a goal can be final before its result has come
+        status = client.get_state()
+        result = client.get_result() if client.gh else None
+        text = client.get_goal_status_text() if client.gh else ""
+        chosen = self._sink.deliver(userdata, self.get_registered_outcomes(), result, status)
+        outcome = self._outcome(status, text, too_late)
+        return outcome if chosen is None else chosen
+
+    def _wait_for_end(self, client: SimpleActionClient) -> str:
+        """Wait until the goal has ended; return "" or why the state gave it up.
+
+        Raises:
+            ExchangeError: the goal did not end though it was cancelled, or the server has gone.
+        """
+        limit = RosTimeLimit(self._exec_timeout_s)
+        lost = WallTimeLimit(SERVER_LOST_S)
+        cancelled: WallTimeLimit | None = None
+        too_late = ""
+        while not _ended(client):
+            if cancelled is None and (self.preempt_requested() or smach.is_shutdown() or limit.over()):
+                if not (self.preempt_requested() or smach.is_shutdown()):
+                    too_late = f"was not done within {self._exec_timeout_s} s"
+                    smach.logwarn(f"action '{self._action_name}' {too_late}; the goal is cancelled")
+                _cancel(client)
+                cancelled = WallTimeLimit(self._preempt_timeout_s)
+            if cancelled is not None and (cancelled.over() or rospy.is_shutdown()):
+                client.stop_tracking_goal()
+                raise ExchangeError(
+                    f"the goal was cancelled{', since it ' + too_late if too_late else ''}, but did not end within "
+                    f"{self._preempt_timeout_s} s"
+                )
+            if _server_is_there(client):
+                lost = WallTimeLimit(SERVER_LOST_S)
+            elif lost.over():
+                client.stop_tracking_goal()
+                raise ExchangeError(f"the server went away {SERVER_LOST_S} s ago with the goal")
+            self._wake.wait(POLL_PERIOD_S)
+            self._wake.clear()
+        return too_late
+
+    def _outcome(self, status: int, text: str, too_late: str) -> str:
+        if status == GoalStatus.SUCCEEDED:
+            return "succeeded"
+        told = f": {text}" if text else ""
+        if status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED) and (self.preempt_requested() or going_down()):
+            return self._preempted(f"action '{self._action_name}': the goal was stopped{told}")
+        why = too_late or f"ended with status {_STATUS_NAMES.get(status, status)}{told}"
+        return self._abort(f"action '{self._action_name}' {why}")
+
+
+def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
+    """Return an empty goal and result of an action type; raise ``InvalidStateError`` when it is none."""
+    if not isinstance(action_name, str) or not action_name:
+        raise smach.InvalidStateError(f"action_name must be the name of an action, got {action_name!r}")
+    try:
+        action = action_spec()
+        return action.action_goal.goal, action.action_result.result
+    except (AttributeError, TypeError) as error:
+        raise smach.InvalidStateError(
+            f"action_spec of '{action_name}' must be the class of an action as FibonacciAction, got {action_spec!r}"
+        ) from error
+
+
+def _server_is_there(client: SimpleActionClient) -> bool:
+    """Tell whether one server is connected by all topics of the action."""
+    inner = client.action_client
+    status = inner.last_status_msg
+    if status is None:
+        return False
+    server = status._connection_header["callerid"]
+    hears = [topic.impl for topic in (inner.pub_goal, inner.pub_cancel)]
+    heard = [topic.impl for topic in (inner.result_sub, inner.feedback_sub)]
+    if None in hears or None in heard:  # unregistered: rospy is shutting down
+        return False
+    return all(topic.has_connection(server) for topic in hears) and all(
+        any(link.callerid_pub == server for link in topic.connections) for topic in heard
+    )
+
+
+def _ended(client: SimpleActionClient) -> bool:
+    """Tell whether the goal has ended and its result is here.
+
+    The handle knows better than the client, which misses the end of a goal that ends while it is being sent.
+    """
+    return client.gh is not None and client.gh.get_comm_state() == CommState.DONE
+
+
+def _cancel(client: SimpleActionClient) -> None:
+    """Cancel the goal.
+
+    The client's own way takes a goal that is cancelled before its server has confirmed it for lost.
+    """
+    handle = client.gh
+    if handle is not None:
+        client.action_client.pub_cancel.publish(GoalID(id=handle.comm_state_machine.action_goal.goal_id.id))

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Time limits of states: in ROS time for how long work may take, in wall time for how long another node is waited for.
+
+A paused simulation stops the clock of ROS and the work with it; a node that is missing stays missing meanwhile.
+"""
+from __future__ import annotations
+
+import time
+
+import rospy
+
+import smach
+
+__all__ = ["POLL_PERIOD_S", "RosTimeLimit", "WallTimeLimit", "going_down", "seconds"]
+
+POLL_PERIOD_S = 0.02
+"""How often a waiting state looks around [s]."""
+
+
+def seconds(what: str, duration: object) -> float | None:
+    """Return a duration in seconds; None stays None: no limit.
+
+    Args:
+        what: name of the argument, for the error.
+        duration: a ``rospy.Duration``, or a number [s].
+
+    Raises:
+        smach.InvalidStateError: it is something else, or negative.
+    """
+    if duration is None:
+        return None
+    if isinstance(duration, (rospy.Duration, int, float)) and not isinstance(duration, bool):
+        value = duration.to_sec() if isinstance(duration, rospy.Duration) else float(duration)
+        if value >= 0.0:
+            return value
+    raise smach.InvalidStateError(f"{what} must be a rospy.Duration of at least 0 s, or None; got {duration!r}")
+
+
+def going_down() -> bool:
+    """Tell whether the process or the machine is asked to end."""
+    return rospy.is_shutdown() or smach.is_shutdown()
+
+
+class RosTimeLimit:
+    """A limit in ROS time; a clock that jumps back starts it anew."""
+
+    def __init__(self, limit_s: float | None) -> None:
+        """Start the limit [s]; None: there is none."""
+        self._limit_s = limit_s
+        self._start = rospy.get_time() if limit_s is not None else 0.0
+
+    def over(self) -> bool:
+        """Tell whether the time is over."""
+        if self._limit_s is None:
+            return False
+        now = rospy.get_time()
+        self._start = min(self._start, now)
+        return now - self._start >= self._limit_s
+
+
+class WallTimeLimit:
+    """A limit in wall time."""
+
+    def __init__(self, limit_s: float | None) -> None:
+        """Start the limit [s]; None: there is none."""
+        self._end = None if limit_s is None else time.monotonic() + limit_s
+
+    def over(self) -> bool:
+        """Tell whether the time is over."""
+        return self._end is not None and time.monotonic() >= self._end
