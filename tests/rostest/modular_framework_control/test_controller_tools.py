@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import rospy
+from controller_manager_msgs.msg import ControllersStatistics
 from controller_manager_msgs.srv import ListControllers
 from std_msgs.msg import Bool
 
@@ -19,6 +20,8 @@ LAUNCH = """
   <rosparam>
     states: {type: joint_state_controller/JointStateController}
     arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}
+    jog: {type: position_controllers/JointPositionController, joint: shoulder}
+    controller_groups: {follow: [states, arm], teach: [states, jog]}
   </rosparam>
   <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
     <rosparam>{joints: [shoulder]}</rosparam>
@@ -97,6 +100,28 @@ def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
     assert states() == {"states": "running"}
     assert run(tool("controller_manager", "kill", "states"))[0] == 0
     assert states() == {}
+
+
+def test_groups_are_listed_started_and_exchanged(tool: Callable[..., Any]) -> None:
+    assert run(tool("controller_group", "list")) == (0, "Number of groups: 2\n  follow\n      states\n      arm\n"
+                                                        "  teach\n      states\n      jog\n")
+    assert run(tool("controller_group", "spawn", "follow"))[0] == 0
+    assert states() == {"states": "running", "arm": "running"}
+    assert run(tool("controller_group", "switch", "teach")) == (0, "started: jog; stopped: arm\n")
+    assert states() == {"states": "running", "arm": "stopped", "jog": "running"}
+    code, output = run(tool("controller_group", "switch", "absent"))
+    assert code == 1 and "known groups: follow, teach" in output
+
+
+def test_statistics_of_the_controllers_are_published(tool: Callable[..., Any]) -> None:
+    message = rospy.wait_for_message("controller_manager/statistics", ControllersStatistics, 10.0)
+    figures = {entry.name: entry for entry in message.controller}
+    assert {name: entry.running for name, entry in figures.items()} == {"states": True, "arm": False, "jog": True}
+    jog = figures["jog"]
+    assert jog.type == "position_controllers/JointPositionController"
+    assert 0.0 < jog.mean_time.to_sec() <= jog.max_time.to_sec() < 1.0
+    assert message.header.stamp.to_sec() - 5.0 < jog.timestamp.to_sec() <= message.header.stamp.to_sec() + 1.0
+    assert run(tool("controller_manager", "kill", "states"))[0] == 0
 
 
 def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:

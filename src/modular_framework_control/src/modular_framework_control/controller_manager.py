@@ -7,11 +7,14 @@ one slot.
 """
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from modular_framework_control.controller import Controller, ControllerError
+from modular_framework_control.controller_statistics import StatisticsSnapshot
 from modular_framework_control.controller_switch import (
     LOGGER,
     ControllerState,
@@ -37,11 +40,13 @@ class ControllerReport:
         info: name, type and claimed joints.
         state: initialized, running or stopped.
         failure: why the controller was stopped by the manager; "" when it was not.
+        statistics: its update times since it was started last.
     """
 
     info: ControllerInfo
     state: ControllerState
     failure: str
+    statistics: StatisticsSnapshot
 
 
 def _attach_nothing(name: str, controller: Controller) -> Detach:
@@ -58,15 +63,18 @@ class ControllerManager:
         types: known controller types.
         attach: called for each loaded controller; opens its topics and actions and returns what closes them.
         update_wait_s: how long a switch waits for the control loop to carry it out [s of real time].
+        clock: real time [s], for the statistics.
     """
 
     def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle, types: ControllerTypes | None = None,
-                 attach: Attach = _attach_nothing, update_wait_s: float = 10.0) -> None:
+                 attach: Attach = _attach_nothing, update_wait_s: float = 10.0,
+                 clock: Callable[[], float] = time.perf_counter) -> None:
         self._robot_hw = robot_hw
         self._root_nh = root_nh
         self.types = types if types is not None else ControllerTypes()
         self._attach = attach
         self._update_wait_s = update_wait_s
+        self._clock = clock
         self._services = threading.RLock()
         self._slot_lock = threading.Lock()
         self._pending: SwitchRequest | None = None
@@ -87,6 +95,8 @@ class ControllerManager:
         """
         reset = reset_controllers or time_s < self._last_time_s
         self._last_time_s = time_s
+        begun_s = self._clock()
+        late_s = begun_s + period_s if period_s > 0.0 else math.inf
         for entry in self._loaded:
             if entry.state is not ControllerState.RUNNING:
                 continue
@@ -98,6 +108,9 @@ class ControllerManager:
                 entry.controller.update(time_s, period_s)
             except Exception as error:  # one controller's fault must not stop the others
                 entry.fail(time_s, f"update() raised {type(error).__name__}: {error}")
+            ended_s = self._clock()
+            entry.statistics.add(time_s, ended_s - begun_s, begun_s <= late_s < ended_s)
+            begun_s = ended_s
         if self._pending is not None:
             self._step_switch(time_s)
 
@@ -210,7 +223,8 @@ class ControllerManager:
 
     def list_controllers(self) -> list[ControllerReport]:
         """All loaded controllers in the order they were loaded."""
-        return [ControllerReport(entry.info, entry.state, entry.failure) for entry in self._loaded]
+        return [ControllerReport(entry.info, entry.state, entry.failure, entry.statistics.snapshot())
+                for entry in self._loaded]
 
     def list_controller_types(self) -> list[tuple[str, str]]:
         """Known type names, each with the base class it is reported under."""

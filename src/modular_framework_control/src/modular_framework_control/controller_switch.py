@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
 from modular_framework_control.controller import Controller, ControllerError
+from modular_framework_control.controller_statistics import UpdateStatistics
 from modular_framework_control.hardware_interface import ControllerInfo
 from modular_framework_control.robot_hw import RobotHW, SwitchState
 
@@ -39,6 +40,7 @@ class LoadedController:
     controller: Controller
     state: ControllerState = ControllerState.INITIALIZED
     failure: str = ""
+    statistics: UpdateStatistics = field(default_factory=UpdateStatistics)
 
     @property
     def name(self) -> str:
@@ -55,6 +57,7 @@ class LoadedController:
         except Exception as error:  # a user's controller may raise anything; the loop must go on
             return self.fail(time_s, f"starting() raised {type(error).__name__}: {error}")
         self.failure = ""
+        self.statistics.reset()
         self.state = ControllerState.RUNNING
         return ""
 

@@ -2,6 +2,7 @@
 """Where message classes meet the types of the controllers."""
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,12 +14,13 @@ from control_msgs.msg import (
     GripperCommandResult,
     JointTrajectoryControllerState,
 )
-from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
+from controller_manager_msgs.msg import ControllerState, ControllerStatistics, HardwareInterfaceResources
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_control.controller_manager import ControllerReport
+from modular_framework_control.controller_switch import ControllerState as LoadedState
 from modular_framework_control.gripper_action_controller import GripperState
 from modular_framework_control.joint_state_controller import JointStateSnapshot
 from modular_framework_control.trajectory import Array, JointTrajectory, TrajectoryPoint
@@ -91,3 +93,13 @@ def controller_report_to_msg(report: ControllerReport) -> ControllerState:
     claims = [HardwareInterfaceResources(claim.hardware_interface, sorted(claim.resources))
               for claim in report.info.claimed_resources]
     return ControllerState(report.info.name, report.state.value, report.info.type, claims)
+
+
+def controller_statistics_to_msg(report: ControllerReport) -> ControllerStatistics:
+    """Update times of one controller; `variance_time`, a duration, is the square root of their variance."""
+    figures = report.statistics
+    return ControllerStatistics(
+        report.info.name, report.info.type, genpy.Time.from_sec(figures.updated_at_s),
+        report.state is LoadedState.RUNNING, genpy.Duration.from_sec(figures.max_s),
+        genpy.Duration.from_sec(figures.mean_s), genpy.Duration.from_sec(math.sqrt(figures.variance_s2)),
+        figures.overruns, genpy.Time.from_sec(figures.last_overrun_s))

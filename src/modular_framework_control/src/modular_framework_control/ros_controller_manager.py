@@ -6,10 +6,12 @@ Whoever owns the control loop makes one, calls `connect` once, then `update` in 
 """
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
 import rospy
+from controller_manager_msgs.msg import ControllersStatistics
 from controller_manager_msgs.srv import (
     ListControllers,
     ListControllersResponse,
@@ -35,12 +37,15 @@ from modular_framework_control.ros_controllers import attach_ros
 from modular_framework_control.ros_node_handle import RosNodeHandle
 from modular_framework_control.ros_outbox import Outbox
 
+STATISTICS_PERIOD_S = 1.0
+
 
 class RosControllerManager:
     """Controllers of one robot, reachable over ROS.
 
     Services, below `<namespace>/controller_manager`: `load_controller`, `unload_controller`, `switch_controller`,
-    `list_controllers`, `list_controller_types`, `reload_controller_libraries`.
+    `list_controllers`, `list_controller_types`, `reload_controller_libraries`. Publishes, there and once a second of
+    real time while the loop runs, `statistics` (controller_manager_msgs/ControllersStatistics).
 
     Args:
         robot_hw: initialised hardware.
@@ -53,6 +58,8 @@ class RosControllerManager:
         self._outbox = Outbox()
         self.manager = ControllerManager(robot_hw, RosNodeHandle(namespace), types, self._attach)
         self._services: list[rospy.Service] = []
+        self._statistics: rospy.Publisher | None = None
+        self._statistics_due_s = 0.0
 
     def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
         close = attach_ros(controller, self._namespace, name, self._outbox)
@@ -66,6 +73,8 @@ class RosControllerManager:
     def connect(self) -> None:
         """Advertise the services."""
         self._outbox.start()
+        self._statistics = rospy.Publisher(join_names(self._namespace, "controller_manager/statistics"),
+                                           ControllersStatistics, queue_size=1)
         for name, kind, answer in (
                 ("load_controller", LoadController, self._on_load),
                 ("unload_controller", UnloadController, self._on_unload),
@@ -79,6 +88,18 @@ class RosControllerManager:
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
         """One control cycle; see ControllerManager.update."""
         self.manager.update(time_s, period_s, reset_controllers)
+        now_s = time.monotonic()
+        if now_s >= self._statistics_due_s:
+            self._statistics_due_s = now_s + STATISTICS_PERIOD_S
+            self._outbox.put_droppable(self._publish_statistics)
+
+    def _publish_statistics(self) -> None:
+        if self._statistics is not None and self._statistics.get_num_connections() > 0:
+            message = ControllersStatistics()
+            message.header.stamp = rospy.Time.now()
+            message.controller = [conversions.controller_statistics_to_msg(report)
+                                  for report in self.manager.list_controllers()]
+            self._statistics.publish(message)
 
     def close(self) -> None:
         """End all goals, close all topics and services; the control loop must have ended. May be called twice."""
@@ -87,6 +108,9 @@ class RosControllerManager:
         self.manager.stop_all()
         self._outbox.close()
         self.manager.close()
+        if self._statistics is not None:
+            self._statistics.unregister()
+            self._statistics = None
 
     def _on_load(self, request: Any) -> LoadControllerResponse:
         return LoadControllerResponse(_done(lambda: self.manager.load_controller(request.name)))
