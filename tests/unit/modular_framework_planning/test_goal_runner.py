@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -15,14 +16,16 @@ from modular_framework_planning.ros_goal_runner import GoalRunner
 class Handle:
     """A goal as the action server hands it over; remembers how it ended."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, server_lock: Any = None) -> None:
         self.name = name
+        self._server_lock = server_lock or threading.RLock()
         self.outcome = ""
         self.accepted = False
         self.ended = threading.Event()
 
     def get_goal_id(self) -> Any:
-        return SimpleNamespace(id=self.name)
+        with self._server_lock:  # as actionlib's handles do
+            return SimpleNamespace(id=self.name)
 
     def get_goal(self) -> str:
         return self.name
@@ -75,3 +78,31 @@ def test_a_new_goal_ends_the_one_before_and_one_given_up_while_waiting_never_beg
     first, second, third = run(work, "first", "second", "third")
     assert (first.outcome, second.outcome, third.outcome) == ("canceled", "canceled", "succeeded")
     assert begun == ["first", "third"] and not second.accepted
+
+
+def test_a_goal_that_comes_while_the_one_before_is_cleared_away_does_not_lock_the_server() -> None:
+    server_lock = threading.RLock()  # actionlib holds it while it hands a goal over
+    clearing = threading.Event()
+
+    class SlowToName(Handle):
+        """Tells its name so late, once it has ended, that the next goal arrives meanwhile."""
+
+        def get_goal_id(self) -> Any:
+            if self.ended.is_set():
+                clearing.set()
+                time.sleep(0.2)
+            return super().get_goal_id()
+
+    runner = GoalRunner("some_action", ExecuteTrajectoryAction, lambda *_: (None, True, "done"))
+    first, second = SlowToName("first", server_lock), Handle("second", server_lock)
+    runner._on_goal(first)
+    assert clearing.wait(5.0)
+
+    def hand_over() -> None:
+        with server_lock:
+            runner._on_goal(second)
+
+    thread = threading.Thread(target=hand_over, daemon=True)
+    thread.start()
+    thread.join(5.0)
+    assert not thread.is_alive() and second.ended.wait(5.0)

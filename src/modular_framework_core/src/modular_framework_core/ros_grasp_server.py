@@ -76,8 +76,9 @@ class GraspServer:
         threading.Thread(target=self._run, args=(handle, stop), daemon=True).start()
 
     def _on_cancel(self, handle: Any) -> None:
+        name = handle.get_goal_id().id
         with self._lock:
-            stop = self._stops.get(handle.get_goal_id().id)
+            stop = self._stops.get(name)
         if stop is not None:
             stop.set()
 
@@ -104,8 +105,9 @@ class GraspServer:
             rospy.logerr("Grasp command: unexpected %r", error)
             handle.set_aborted(GraspResult(), f"internal error: {error!r}")
         finally:
+            name = handle.get_goal_id().id  # takes the server's lock, which _on_goal holds when it takes ours
             with self._lock:
-                self._stops.pop(handle.get_goal_id().id, None)
+                self._stops.pop(name, None)
 
     def _carry_out(self, handle: Any, stop: threading.Event) -> tuple[Stage, Verdict]:
         command: GraspCommand = handle.get_goal().grasp_command

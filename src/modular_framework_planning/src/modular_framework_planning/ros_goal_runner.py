@@ -40,8 +40,9 @@ class GoalRunner:
         threading.Thread(target=self._run, args=(handle, cancelled), daemon=True).start()
 
     def _on_cancel(self, handle: Any) -> None:
+        name = handle.get_goal_id().id
         with self._lock:
-            event = self._cancels.get(handle.get_goal_id().id)
+            event = self._cancels.get(name)
         if event is not None:
             event.set()
 
@@ -70,5 +71,6 @@ class GoalRunner:
             self._forget(handle)
 
     def _forget(self, handle: Any) -> None:
+        name = handle.get_goal_id().id  # takes the server's lock, which _on_goal holds when it takes ours
         with self._lock:
-            self._cancels.pop(handle.get_goal_id().id, None)
+            self._cancels.pop(name, None)
