@@ -92,6 +92,8 @@ class TrajectoryExecution:
             self._stop.clear()
             parts = self._split(motion)
             self._check_start(motion)
+            if self._is_there_already(motion, parts):
+                return
             self._require_servers(parts)
             self._run(parts, motion.points[-1].time_from_start.to_sec(), cancelled)
             self._settle(motion.joint_names)
@@ -129,6 +131,14 @@ class TrajectoryExecution:
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"joint '{motion.joint_names[worst]}' is "
                                 f"{abs(gap[worst]):.4f} from the trajectory's first point (allowed_start_tolerance "
                                 f"{tolerance}); plan again from the current state")
+
+    def _is_there_already(self, motion: JointTrajectory, parts: list[_Part]) -> bool:
+        """Whether a motion ends where it starts and was seen to start where the robot is.
+
+        Controllers refuse such a motion: its only point is due at once. Grippers do not: their goal is also a force.
+        """
+        return (self.settings.allowed_start_tolerance > 0.0 and motion.points[-1].time_from_start.to_sec() <= 0.0
+                and all(part.controller.kind == "FollowJointTrajectory" for part in parts))
 
     def _require_servers(self, parts: list[_Part]) -> None:
         timeout_s = self.settings.controller_connection_timeout
@@ -206,6 +216,9 @@ def _is_connected(client: actionlib.ActionClient) -> bool:
 def _check_message(motion: JointTrajectory) -> None:
     """Refuses trajectories no controller could follow; raises PlanningError."""
     count = len(motion.joint_names)
+    if motion.points and not count:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory: {len(motion.points)} points but no "
+                            "joint_names; name the joint of each position")
     before = -1.0
     for number, point in enumerate(motion.points):
         stamp = point.time_from_start.to_sec()
