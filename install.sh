@@ -211,14 +211,14 @@ set_up() {
 source_workspace() {
   local space=devel
   [ "${INSTALL_SPACE:-0}" = 1 ] && space=install
-  set +u
-  # shellcheck disable=SC1090,SC1091
-  . "$ROOT/$space/setup.bash"
-  set -u
   # One computer: nodes listen on the loopback interface only, and its name need not resolve. A user's own choice wins.
   if [ -z "${ROS_IP:-}${ROS_HOSTNAME:-}" ]; then
     export ROS_HOSTNAME=127.0.0.1 ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
   fi
+  set +u
+  # shellcheck disable=SC1090,SC1091
+  . "$ROOT/$space/setup.bash"
+  set -u
 }
 
 main() {
