@@ -10,7 +10,8 @@ import pytest
 
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.goal_ticket import GoalStatus
+from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
+from modular_framework_control.gripper_action_controller import GripperTicket
 from modular_framework_control.hardware_interface import (
     EffortJointInterface,
     HardwareInterface,
@@ -199,10 +200,54 @@ def test_gains_are_read_with_their_bounds() -> None:
         read_pid(MappingNodeHandle({}, "/g"))
 
 
+@pytest.mark.parametrize(("max_effort", "largest"), [(0.0, 10.0), (3.0, 3.0)])
+def test_a_gripper_of_efforts_reaches_its_goal_within_the_bound_of_its_effort(start: Callable[..., Any],
+                                                                              max_effort: float,
+                                                                              largest: float) -> None:
+    loop = start("effort", "GripperActionController", joint="a", gains={"a": STIFF}, goal_tolerance=0.001)
+    ticket: GripperTicket = GoalTicket()
+    handle = joint(loop, "effort")
+    loop.controllers["c"].submit(0.1, max_effort, ticket)
+    seen = 0.0
+    while ticket.status in (GoalStatus.PENDING, GoalStatus.ACTIVE):
+        loop.step()
+        seen = max(seen, abs(handle.command))
+    assert ticket.status is GoalStatus.SUCCEEDED and abs(handle.position - 0.1) <= 0.001
+    assert seen == pytest.approx(largest)
+
+
+def test_a_gripper_of_efforts_that_meets_something_stalls_and_goes_on_squeezing(start: Callable[..., Any]) -> None:
+    loop = start("effort", "GripperActionController", joint="a", gains={"a": STIFF}, stall_timeout=0.2)
+    ticket: GripperTicket = GoalTicket()
+    loop.controllers["c"].submit(1.5, 2.0, ticket)
+    loop.run(3.0)
+    assert ticket.status is GoalStatus.ABORTED and ticket.result is not None and ticket.result.stalled
+    assert joint(loop, "effort").command == 2.0
+    assert loop.switch([], ["c"]) is None
+    assert joint(loop, "effort").command == 0.0
+
+
 class Waver(Controller):
-    """A user's controller."""
+    """A user's controller that opens something."""
 
     interface_class = PositionJointInterface
+    closed = 0
+
+    def close(self) -> None:
+        type(self).closed += 1
+        raise OSError("already gone")
+
+
+def test_what_a_controller_opened_it_can_close_when_it_is_unloaded(make_loop: Callable[..., Any],
+                                                                   caplog: pytest.LogCaptureFixture) -> None:
+    types = ControllerTypes()
+    types.register("lab/Waver", Waver)
+    loop = make_loop({"hw": {"joints": ["a"]}, "w": {"type": "lab/Waver"}}, types=types)
+    loop.manager.load_controller("w")
+    assert Waver.closed == 0
+    loop.manager.unload_controller("w")
+    assert Waver.closed == 1 and loop.states() == {}
+    assert "controller 'w': close() raised OSError: already gone" in caplog.text
 
 
 class Raiser(Controller):

@@ -58,3 +58,6 @@ class Controller:
         """Called in place of `stopping` when this controller raised; `reason` is for whoever waits for a result."""
         del reason
         self.stopping(time_s)
+
+    def close(self) -> None:
+        """Called once, after the controller was unloaded, on a thread that may wait: close what `init` opened."""

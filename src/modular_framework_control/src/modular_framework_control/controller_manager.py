@@ -152,7 +152,8 @@ class ControllerManager:
                                       f"expected one of: {', '.join(self.types.names)}. Is the controller file loaded?")
             controller = self.types.create(controller_type)
             info = ControllerInfo(name, controller_type, self._init_controller(name, controller, controller_nh))
-            self._detach[name] = self._attach(name, controller)
+            detach = self._attach(name, controller)
+            self._detach[name] = lambda: _close(name, controller, detach)
             self._loaded = (*self._loaded, LoadedController(info, controller))
 
     def _init_controller(self, name: str, controller: Controller,
@@ -272,3 +273,11 @@ def _checked(strictness: int) -> Strictness:
         return Strictness(strictness)
     except ValueError:
         raise ControllerError(f"strictness {strictness} is not known; use BEST_EFFORT (1) or STRICT (2)") from None
+
+
+def _close(name: str, controller: Controller, detach: Detach) -> None:
+    detach()
+    try:
+        controller.close()
+    except Exception as error:  # a user's controller may raise anything; it is gone all the same
+        LOGGER.exception("controller '%s': close() raised %s: %s", name, type(error).__name__, error)

@@ -20,6 +20,8 @@ BUILT_IN_TYPES: dict[str, str] = {
     "velocity_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:VelocityJointTrajectoryController",
     "effort_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:EffortJointTrajectoryController",
     "position_controllers/GripperActionController": f"{_PACKAGE}.gripper_action_controller:GripperActionController",
+    "effort_controllers/GripperActionController":
+        f"{_PACKAGE}.effort_gripper_controller:EffortGripperActionController",
     "position_controllers/JointPositionController": f"{_JOINT_COMMAND}:PositionJointPositionController",
     "position_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:PositionJointGroupPositionController",
     "velocity_controllers/JointPositionController": f"{_JOINT_COMMAND}:VelocityJointPositionController",

@@ -10,11 +10,11 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from modular_framework_control.controller import Controller
 from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
-from modular_framework_control.hardware_interface import JointHandle, PositionJointInterface
+from modular_framework_control.hardware_interface import HardwareInterface, JointHandle, PositionJointInterface
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
 
@@ -65,7 +65,7 @@ class GripperActionController(Controller):
         on_feedback: called in the control loop at `action_monitor_rate` with the active ticket and the state.
     """
 
-    interface_class = PositionJointInterface
+    interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
 
     def __init__(self) -> None:
         self.on_feedback: Callable[[GripperTicket, GripperState], None] | None = None
@@ -119,7 +119,7 @@ class GripperActionController(Controller):
         self._reject_waiting("the goal was sent while the controller was being stopped")
         self._hold()
         self._active = None
-        self._apply()
+        self._apply(0.0)
         self._running = True
 
     def stopping(self, time_s: float) -> None:
@@ -147,7 +147,7 @@ class GripperActionController(Controller):
             elif self._active is not None and self._active.ticket is order:
                 self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
                 self._hold()
-        self._apply()
+        self._apply(period_s)
         if self._active is not None:
             self._check(self._active, time_s)
 
@@ -183,7 +183,9 @@ class GripperActionController(Controller):
         self._command = self._handle.position
         self._max_effort = self._default_max_effort
 
-    def _apply(self) -> None:
+    def _apply(self, period_s: float) -> None:
+        """Command the joint; `period_s` [s] is the time since the last call, 0 at a start."""
+        del period_s
         self._handle.command = self._command
         self._handle.max_effort = self._max_effort
 

@@ -117,34 +117,37 @@ class PluginIndex:
 
     def _plugins(self) -> dict[str, Plugin]:
         if self._found is None:
-            self._faults = []
-            self._found = {}
+            found: dict[str, Plugin] = {}
+            faults: list[str] = []
             for package, folder in sorted(self._packages().items()):
-                for plugin in self._of_package(package, folder):
-                    first = self._found.setdefault(plugin.name, plugin)
+                for plugin in self._of_package(package, folder, faults):
+                    first = found.setdefault(plugin.name, plugin)
                     if first is not plugin:
-                        self._faults.append(f"{plugin.origin}: {plugin.name} is already offered by {first.origin}")
+                        faults.append(f"{plugin.origin}: {plugin.name} is already offered by {first.origin}")
+            self._faults, self._found = faults, found
+            return found
         return self._found
 
-    def _of_package(self, package: str, folder: Path) -> list[Plugin]:
+    def _of_package(self, package: str, folder: Path, faults: list[str]) -> list[Plugin]:
         manifest = folder / "package.xml"
         if not manifest.is_file() or EXPORT_TAG not in manifest.read_text(encoding="utf-8", errors="replace"):
             return []
         plugins: list[Plugin] = []
-        for path in self._descriptions(package, manifest):
+        for path in _descriptions(package, manifest, faults):
             try:
                 plugins += [plugin for plugin in read_description(path) if plugin.base == self._base]
             except PluginError as error:
-                self._faults.append(str(error))
+                faults.append(str(error))
         return plugins
 
-    def _descriptions(self, package: str, manifest: Path) -> list[Path]:
-        try:
-            exports = ElementTree.parse(manifest).getroot().findall(f"export/{EXPORT_TAG}")
-        except ElementTree.ParseError as error:
-            self._faults.append(f"{manifest} of package {package}: {error}")
-            return []
-        return [Path(export.get("plugin", "").replace("${prefix}", str(manifest.parent))) for export in exports]
+
+def _descriptions(package: str, manifest: Path, faults: list[str]) -> list[Path]:
+    try:
+        exports = ElementTree.parse(manifest).getroot().findall(f"export/{EXPORT_TAG}")
+    except ElementTree.ParseError as error:
+        faults.append(f"{manifest} of package {package}: {error}")
+        return []
+    return [Path(export.get("plugin", "").replace("${prefix}", str(manifest.parent))) for export in exports]
 
 
 def read_description(path: Path) -> list[Plugin]:

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A gripper whose joint takes efforts: gains make the way to its goal an effort, and the goal's bound holds for it."""
+from __future__ import annotations
+
+from typing import Any
+
+from modular_framework_control.gripper_action_controller import GripperActionController
+from modular_framework_control.hardware_interface import EffortJointInterface
+from modular_framework_control.node_handle import NodeHandle
+from modular_framework_control.pid import read_pid
+
+
+class EffortGripperActionController(GripperActionController):
+    """effort_controllers/GripperActionController.
+
+    Parameters, besides those of every gripper controller: `gains/<joint>/{p, i, d, i_clamp, ...}`. The effort is at
+    most the goal's `max_effort`, or the parameter's when the goal gives none; without both only the hardware bounds it.
+    It is 0 while the controller does not run.
+    """
+
+    interface_class = EffortJointInterface
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        super().init(hw, root_nh, controller_nh)
+        self._pid = read_pid(controller_nh.child(f"gains/{self._handle.name}"))
+        return True
+
+    def starting(self, time_s: float) -> None:
+        self._pid.reset()
+        super().starting(time_s)
+
+    def stopping(self, time_s: float) -> None:
+        self._handle.command = 0.0
+        super().stopping(time_s)
+
+    def failed(self, time_s: float, reason: str) -> None:
+        self._handle.command = 0.0
+        super().failed(time_s, reason)
+
+    def _apply(self, period_s: float) -> None:
+        handle = self._handle
+        effort = self._pid.command(self._command - handle.position, -handle.velocity, period_s)
+        if self._max_effort > 0.0:
+            effort = min(max(effort, -self._max_effort), self._max_effort)
+        handle.command = effort
