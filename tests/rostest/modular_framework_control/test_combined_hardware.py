@@ -15,6 +15,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 MODULE = """
+import time
+
 import rospy
 from std_msgs.msg import Bool
 from modular_framework_control.mock_robot_hw import MockRobotHW
@@ -29,6 +31,11 @@ class LabGripper(MockRobotHW):
 
     def _on_switch(self, message):
         self._ready.publish(message.data)
+
+class LabSnail(MockRobotHW):
+    def write(self, time_s, period_s):
+        super().write(time_s, period_s)
+        time.sleep(0.03)
 """
 ENVIRONMENT = """
   <env name="ROS_PACKAGE_PATH" value="{folder}:$(env ROS_PACKAGE_PATH)"/>
@@ -56,6 +63,9 @@ FAILING = """
   <node pkg="modular_framework_control" type="robot_hw" name="unknown_hw" output="screen">
     <rosparam>{{type: lab_gripper/LabLeg}}</rosparam>
   </node>
+  <node pkg="modular_framework_control" type="robot_hw" name="late_hw" output="screen">
+    <rosparam>{{type: lab_gripper/LabSnail, joints: [finger], rate: 50}}</rosparam>
+  </node>
 </launch>
 """
 
@@ -71,6 +81,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> str:
         '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>')
     (folder / "plugins.xml").write_text(
         '<library path="lab_gripper_hw"><class name="lab_gripper/LabGripper" type="LabGripper" '
+        'base_class_type="hardware_interface::RobotHW"/><class name="lab_gripper/LabSnail" type="LabSnail" '
         'base_class_type="hardware_interface::RobotHW"/></library>')
     return ENVIRONMENT.format(folder=Path(folder))
 
@@ -109,12 +120,12 @@ def test_a_controller_sees_the_joints_of_all_hardware() -> None:
     assert [(entry.name, entry.state) for entry in listed] == [(name, "running")]
 
 
-def test_hardware_that_does_not_get_ready_or_is_unknown_ends_the_node_with_its_name(ros_launch: Callable[..., Any],
-                                                                                     environment: str) -> None:
+def test_hardware_that_is_not_ready_unknown_or_late_is_told(ros_launch: Callable[..., Any], environment: str) -> None:
     session = ros_launch(FAILING.format(environment=environment))
     expected = ("waited 1 s in vain for True on topic /never_said of hardware '/slow_hw'",
                 "unknown hardware type 'lab_gripper/LabLeg'",
-                "known: lab_gripper/LabGripper, modular_framework_control/")
+                "known: lab_gripper/LabGripper, lab_gripper/LabSnail, modular_framework_control/",
+                "its period is 20.0 ms; overruns so far: 1")
     deadline = time.monotonic() + 15.0
     while not all(words in session.log() for words in expected):
         assert time.monotonic() < deadline, session.log()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 
 import rospy
@@ -16,6 +17,7 @@ from modular_framework_control.ros_node_handle import RosNodeHandle
 
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
+OVERRUN_WARNING_PERIOD_S = 10.0
 
 
 class RobotHwNode:
@@ -46,6 +48,7 @@ class RobotHwNode:
         self._manager: RosControllerManager | None = None
         self._connected = threading.Event()
         self._failure = ""
+        self._overruns = 0
 
     def connect(self) -> None:
         """Initialise the hardware.
@@ -84,6 +87,7 @@ class RobotHwNode:
         last_s = rospy.get_time()
         rate = rospy.Rate(1.0 / self._period_s, reset=True)
         while not rospy.is_shutdown() and not self._failure:
+            begun_s = time.perf_counter()
             time_s = rospy.get_time()
             period_s = max(0.0, time_s - last_s)
             last_s = time_s
@@ -91,7 +95,14 @@ class RobotHwNode:
             if self._connected.is_set():
                 manager.update(time_s, period_s)
             self._robot_hw.write(time_s, period_s)
+            self._count_overrun(time.perf_counter() - begun_s)
             rate.sleep()
+
+    def _count_overrun(self, work_s: float) -> None:
+        if work_s > self._period_s:
+            self._overruns += 1
+            rospy.logwarn_throttle(OVERRUN_WARNING_PERIOD_S, f"control loop: a cycle took {work_s * 1e3:.1f} ms, its "
+                                   f"period is {self._period_s * 1e3:.1f} ms; overruns so far: {self._overruns}")
 
     def _get_ready(self, manager: RosControllerManager) -> None:
         """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
