@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns messages into lists of numbers and bytes, and back."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, Vector3
+
+from moveit_commander.exception import MoveItCommanderException
+
+
+def msg_to_string(msg: Any) -> bytes:
+    """Serializes a message."""
+    buffer = BytesIO()
+    msg.serialize(buffer)
+    return buffer.getvalue()
+
+
+def msg_from_string(msg: Any, data: bytes) -> None:
+    """Fills a message from its serialized form."""
+    msg.deserialize(data)
+
+
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> list[float]:
+    """Quaternion xyzw of turns about the fixed axes x, then y, then z [rad]."""
+    cr, sr = math.cos(roll / 2.0), math.sin(roll / 2.0)
+    cp, sp = math.cos(pitch / 2.0), math.sin(pitch / 2.0)
+    cy, sy = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
+    return [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy]
+
+
+def rpy_from_quaternion(quaternion: Sequence[float]) -> list[float]:
+    """Turns about the fixed axes x, y, z [rad] of a quaternion xyzw; at pitch +-pi/2 the yaw is chosen as 0."""
+    x, y, z, w = quaternion
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    if norm < 1e-9:
+        raise MoveItCommanderException(f"quaternion {list(quaternion)} has no length; a unit quaternion is needed")
+    x, y, z, w = x / norm, y / norm, z / norm, w / norm
+    sine = 2.0 * (w * y - z * x)
+    if abs(sine) > 1.0 - 1e-12:
+        return [2.0 * math.atan2(x, w), math.copysign(math.pi / 2.0, sine), 0.0]
+    return [math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine),
+            math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))]
+
+
+def pose_to_list(pose_msg: Pose) -> list[float]:
+    """Answers [x, y, z, qx, qy, qz, qw] of a pose [m]."""
+    position, turn = pose_msg.position, pose_msg.orientation
+    return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
+
+
+def list_to_pose(pose_list: Sequence[float]) -> Pose:
+    """Builds a pose from [x, y, z, roll, pitch, yaw] or [x, y, z, qx, qy, qz, qw] [m, rad]."""
+    values = [float(value) for value in pose_list]
+    if len(values) == 6:
+        values = values[:3] + quaternion_from_rpy(*values[3:])
+    elif len(values) != 7:
+        raise MoveItCommanderException(f"a pose list has {len(values)} numbers; 6 (x, y, z, roll, pitch, yaw) or "
+                                       "7 (x, y, z, qx, qy, qz, qw) are needed")
+    return Pose(Point(*values[:3]), Quaternion(*values[3:]))
+
+
+def list_to_pose_stamped(pose_list: Sequence[float], target_frame: str) -> PoseStamped:
+    """As list_to_pose, in a frame and of this moment."""
+    message = PoseStamped(pose=list_to_pose(pose_list))
+    message.header.frame_id = target_frame
+    message.header.stamp = rospy.Time.now()
+    return message
+
+
+def transform_to_list(trf_msg: Transform) -> list[float]:
+    """Answers [x, y, z, qx, qy, qz, qw] of a transform [m]."""
+    shift, turn = trf_msg.translation, trf_msg.rotation
+    return [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, turn.w]
+
+
+def list_to_transform(trf_list: Sequence[float]) -> Transform:
+    """Builds a transform from [x, y, z, qx, qy, qz, qw] [m]."""
+    if len(trf_list) != 7:
+        raise MoveItCommanderException(f"a transform list has {len(trf_list)} numbers; 7 (x, y, z, qx, qy, qz, qw) "
+                                       "are needed")
+    values = [float(value) for value in trf_list]
+    return Transform(Vector3(*values[:3]), Quaternion(*values[3:]))

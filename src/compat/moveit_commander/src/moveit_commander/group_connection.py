@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every part of a group's commander shares: the group's description, the robot's state and the servers."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.msg import (
+    ExecuteTrajectoryAction,
+    MoveGroupAction,
+    MoveItErrorCodes,
+    PlannerInterfaceDescription,
+    RobotState,
+)
+from moveit_msgs.srv import GetPositionFK, GetPositionFKRequest, QueryPlannerInterfaces, QueryPlannerInterfacesRequest
+
+from moveit_commander import conversions
+from moveit_commander.exception import MoveItCommanderException, ServerError
+from moveit_commander.robot_state import CurrentState, current_state
+from moveit_commander.servers import Servers
+
+MOVE_ACTION = "move_group"
+EXECUTE_ACTION = "execute_trajectory"
+CODE_NAMES = {value: name for name, value in vars(MoveItErrorCodes).items()
+              if name.isupper() and isinstance(value, int)}
+
+
+def code_text(code: MoveItErrorCodes) -> str:
+    """An error code in words, for messages."""
+    return f"{CODE_NAMES.get(code.val, 'unknown code')} ({code.val})"
+
+
+def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotState) -> PoseStamped:
+    """Asks compute_fk where a link is in a state. Raises ServerError, or MoveItCommanderException if it refuses."""
+    request = GetPositionFKRequest(fk_link_names=[link], robot_state=state)
+    request.header.frame_id = frame
+    answer = servers.call("compute_fk", GetPositionFK, request)
+    if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.pose_stamped:
+        raise MoveItCommanderException(f"service {servers.resolve('compute_fk')}: no pose of link '{link}' in frame "
+                                       f"'{frame}': {code_text(answer.error_code)}")
+    return answer.pose_stamped[0]
+
+
+class GroupConnection:
+    """One planning group and the move_group node that plans for it."""
+
+    def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
+        self._state: CurrentState = current_state(robot_description, ns)
+        self._model = self._state.model
+        self._group = self._model.group(name)
+        self._robot_description = robot_description
+        self._servers = Servers(ns)
+        self._end_effector_link = self._group.tip
+        self._pose_reference_frame = self._model.planning_frame
+        self._servers.action(MOVE_ACTION, MoveGroupAction, wait_for_servers)
+        self._servers.action(EXECUTE_ACTION, ExecuteTrajectoryAction, wait_for_servers)
+
+    def get_name(self) -> str:
+        """Answers the name of the group."""
+        return self._group.name
+
+    def get_joints(self) -> list[str]:
+        """Answers the names of the group's joints, fixed and mimic ones included."""
+        return [joint.name for joint in self._group.joints]
+
+    def get_active_joints(self) -> list[str]:
+        """Answers the names of the group's joints that move by themselves."""
+        return [joint.name for joint in self._group.active_joints]
+
+    def get_variable_count(self) -> int:
+        """Answers how many numbers describe the group's state, mimic joints included."""
+        return len(self._group.variables)
+
+    def has_end_effector_link(self) -> bool:
+        """Whether the group has a link that poses are meant for."""
+        return bool(self._end_effector_link)
+
+    def get_end_effector_link(self) -> str:
+        """Answers the link that poses are meant for; "" if there is none."""
+        return self._end_effector_link
+
+    def set_end_effector_link(self, link_name: str) -> None:
+        """Chooses the link that poses are meant for; raises MoveItCommanderException if the robot has no such link."""
+        if link_name not in self._model.links:
+            raise MoveItCommanderException(f"Unable to set end effector link: robot '{self._model.name}' has no link "
+                                           f"'{link_name}'")
+        self._end_effector_link = link_name
+
+    def get_pose_reference_frame(self) -> str:
+        """Answers the frame of poses that name none."""
+        return self._pose_reference_frame
+
+    def set_pose_reference_frame(self, reference_frame: str) -> None:
+        """Chooses the frame of poses that name none."""
+        self._pose_reference_frame = reference_frame
+
+    def get_planning_frame(self) -> str:
+        """Answers the frame in which planning is done."""
+        return self._model.planning_frame
+
+    def get_interface_description(self) -> PlannerInterfaceDescription:
+        """Answers the first planner interface of move_group: its name and planner ids."""
+        answer = self._servers.call("query_planner_interface", QueryPlannerInterfaces, QueryPlannerInterfacesRequest())
+        if not answer.planner_interfaces:
+            raise ServerError("service query_planner_interface: the list is empty; move_group has no planning pipeline")
+        return answer.planner_interfaces[0]
+
+    def get_current_joint_values(self) -> list[float]:
+        """Answers the group's present joint positions [rad or m], in the order of its variables."""
+        positions = self._state.positions(self._group_names())
+        return [positions.get(joint.name, joint.default) for joint in self._group.variables]
+
+    def get_current_state(self) -> RobotState:
+        """Answers the whole robot's present state."""
+        return self._state.message(self._group_names())
+
+    def get_current_state_bounded(self) -> RobotState:
+        """Answers the whole robot's present state, each joint brought within its bounds."""
+        return self.enforce_bounds(self.get_current_state())
+
+    def enforce_bounds(self, robot_state_msg: RobotState) -> RobotState:
+        """Answers a state with each joint wrapped or cut off to its bounds; the given one stays as it is."""
+        state = RobotState()
+        state.deserialize(conversions.msg_to_string(robot_state_msg))
+        joints = self._model.joints
+        state.joint_state.position = [joints[name].bounded(value) if name in joints else value for name, value in
+                                      zip(state.joint_state.name, state.joint_state.position, strict=True)]
+        return state
+
+    def get_current_pose(self, end_effector_link: str = "") -> PoseStamped:
+        """Answers the present pose of a link, or of the end effector link, in the planning frame."""
+        return self._pose_of(end_effector_link, self.get_current_state())
+
+    def get_current_rpy(self, end_effector_link: str = "") -> list[float]:
+        """Answers the present [roll, pitch, yaw] of a link, or of the end effector link [rad]."""
+        pose = self.get_current_pose(end_effector_link)
+        return conversions.rpy_from_quaternion(conversions.pose_to_list(pose.pose)[3:])
+
+    def _pose_of(self, link: str, state: RobotState) -> PoseStamped:
+        pose = forward_kinematics(self._servers, self._model.planning_frame, self._link(link, "get the pose of"), state)
+        pose.header.stamp = rospy.Time.now()
+        return pose
+
+    def _link(self, link: str, purpose: str) -> str:
+        """The link a command is for. Raises MoveItCommanderException if none is given and the group has none."""
+        chosen = link or self._end_effector_link
+        if not chosen:
+            raise MoveItCommanderException(f"There is no end effector to {purpose}: group '{self._group.name}' is not "
+                                           "a chain; name the link, or call set_end_effector_link")
+        if chosen not in self._model.links:
+            raise MoveItCommanderException(f"robot '{self._model.name}' has no link '{chosen}'; get_link_names of "
+                                           "RobotCommander lists those it has")
+        return chosen
+
+    def _group_names(self) -> list[str]:
+        return [joint.name for joint in self._group.variables]
+
+    def _parameter(self, name: str, default: float) -> float:
+        value: Any = rospy.get_param(f"{self._robot_description}{name}", default)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise MoveItCommanderException(f"parameter {rospy.resolve_name(self._robot_description)}{name}: got "
+                                           f"{value!r}, a number is needed")
+        return float(value)

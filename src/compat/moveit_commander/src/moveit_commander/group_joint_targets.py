@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a group shall go, in joint space: values, names, random states, and joint values found from a pose."""
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from typing import Any
+
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import MoveItErrorCodes, RobotState
+from moveit_msgs.srv import GetPositionIK, GetPositionIKRequest
+from sensor_msgs.msg import JointState
+
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.group_connection import code_text
+from moveit_commander.group_settings import GroupSettings
+from moveit_commander.robot_model import group_values
+
+
+class Target(Enum):
+    """Which kind of target a plan goes to: the one set last."""
+
+    JOINT = "joint"
+    POSE = "pose"
+    POSITION = "position"
+    ORIENTATION = "orientation"
+
+
+class GroupJointTargets(GroupSettings):
+    """Joint targets of a group; a refused target leaves the one before in force."""
+
+    def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
+        super().__init__(name, robot_description, ns, wait_for_servers)
+        defaults = self._model.defaults()
+        self._joint_target = {joint.name: defaults[joint.name] for joint in self._group.variables
+                              if joint.name in defaults}
+        self._active_target = Target.JOINT
+        self._remembered: dict[str, list[float]] = {}
+        self._random = random.Random()
+
+    def get_joint_value_target(self) -> list[float]:
+        """Answers the joint target [rad or m], in the order of the group's variables."""
+        return [self._joint_target[joint.name] for joint in self._group.variables if joint.name in self._joint_target]
+
+    def set_joint_value_target(self, arg1: Any, arg2: Any = None, arg3: Any = None) -> None:
+        """Sets a joint target.
+
+        Args:
+            arg1: a list with every variable of the group; a dict or JointState with some of them; the name of one
+                joint; or a Pose or PoseStamped, which compute_ik turns into joint values at once.
+            arg2: with a joint's name: its value, or a list of one. With a pose: the link it is for (str), or whether
+                a solution nearby will do (bool).
+            arg3: with a pose: the other one of these two.
+
+        Raises:
+            MoveItCommanderException: a joint or a link is unknown, a value is out of bounds, the pose has no solution.
+        """
+        if isinstance(arg1, Pose | PoseStamped):
+            self._set_from_pose(arg1, *_link_and_approximate(arg2, arg3))
+            return
+        if arg3 is not None or (arg2 is not None and not isinstance(arg1, str)):
+            raise MoveItCommanderException("Too many arguments specified: list, dict and JointState stand alone, a "
+                                           "joint's name takes one value")
+        if isinstance(arg1, JointState):
+            if len(arg1.name) != len(arg1.position):
+                raise MoveItCommanderException(f"JointState has {len(arg1.name)} names and {len(arg1.position)} "
+                                               "positions; each joint needs both")
+            self._set_values(dict(zip(arg1.name, arg1.position, strict=True)))
+        elif isinstance(arg1, str):
+            self._set_values({arg1: _single_value(arg1, arg2)})
+        elif isinstance(arg1, Mapping):
+            self._set_values(arg1)
+        elif isinstance(arg1, Iterable):
+            self._set_values(group_values(self._group, list(arg1)))
+        else:
+            raise MoveItCommanderException(f"Unsupported argument of type {type(arg1)}; allowed: list, dict, "
+                                           "JointState, Pose, PoseStamped, or a joint's name and value")
+
+    def set_random_target(self) -> None:
+        """Sets a joint target drawn evenly within the bounds."""
+        self._set_values(self._model.random_values(self._group, self._random))
+
+    def get_random_joint_values(self) -> list[float]:
+        """Answers joint values drawn evenly within the bounds [rad or m]."""
+        return list(self._model.random_values(self._group, self._random).values())
+
+    def get_random_pose(self, end_effector_link: str = "") -> PoseStamped:
+        """Answers the pose of a link, or of the end effector link, at joint values drawn within the bounds."""
+        self._link(end_effector_link, "get the pose of")
+        drawn = self._state.positions(self._group_names()) | self._model.random_values(self._group, self._random)
+        return self._pose_of(end_effector_link, self._state.message_of(drawn))
+
+    def get_named_targets(self) -> list[str]:
+        """Answers the names of joint targets: those of the SRDF and those remembered."""
+        return sorted({*self._group.states, *self._remembered})
+
+    def set_named_target(self, name: str) -> None:
+        """Sets a joint target by a name of the SRDF or one given to remember_joint_values."""
+        self._set_values(self.get_named_target_values(name))
+
+    def get_named_target_values(self, target: str) -> dict[str, float]:
+        """Answers the joint values of a named target by joint [rad or m]."""
+        if target in self._remembered:
+            return group_values(self._group, self._remembered[target])
+        if target not in self._group.states:
+            raise MoveItCommanderException(f"Unable to set target {target}: group '{self._group.name}' has no such "
+                                           f"named target; it has: {', '.join(self.get_named_targets()) or 'none'}")
+        return dict(self._group.states[target])
+
+    def remember_joint_values(self, name: str, values: Iterable[float] | None = None) -> None:
+        """Keeps joint values under a name; none given: the present ones."""
+        kept = self.get_current_joint_values() if values is None else [float(value) for value in values]
+        group_values(self._group, kept)
+        self._remembered[name] = kept
+
+    def get_remembered_joint_values(self) -> dict[str, list[float]]:
+        """Answers the kept joint values by name [rad or m]."""
+        return {name: list(values) for name, values in self._remembered.items()}
+
+    def forget_joint_values(self, name: str) -> None:
+        """Drops kept joint values; an unknown name is no error."""
+        self._remembered.pop(name, None)
+
+    def _set_values(self, values: Mapping[str, Any]) -> None:
+        joints = {joint.name: joint for joint in self._group.variables}
+        for name, value in values.items():
+            if name not in joints:
+                raise MoveItCommanderException(f"Error setting joint target: group '{self._group.name}' has no joint "
+                                               f"'{name}'; it has: {', '.join(joints)}")
+            if not joints[name].admits(float(value), self._joint_tolerance):
+                raise MoveItCommanderException(
+                    f"Error setting joint target. Is the target within bounds? Joint '{name}': got {value}, allowed "
+                    f"is [{joints[name].lower:.6g}, {joints[name].upper:.6g}]")
+        target = self._joint_target | {name: float(value) for name, value in values.items()}
+        self._joint_target = {**target, **{name: value for name, value in self._model.complete(target).items()
+                                           if name in joints}}
+        self._active_target = Target.JOINT
+
+    def _set_from_pose(self, pose: Pose | PoseStamped, link: str, approximate: bool) -> None:
+        stamped = pose if isinstance(pose, PoseStamped) else PoseStamped(pose=pose)
+        request = GetPositionIKRequest()
+        asked = request.ik_request
+        asked.group_name, asked.ik_link_name = self._group.name, self._link(link, "set the pose for")
+        asked.pose_stamped.pose = stamped.pose
+        asked.pose_stamped.header.frame_id = stamped.header.frame_id or self.get_pose_reference_frame()
+        asked.robot_state = RobotState(is_diff=True)
+        asked.robot_state.joint_state.name = list(self._joint_target)
+        asked.robot_state.joint_state.position = list(self._joint_target.values())
+        answer = self._servers.call("compute_ik", GetPositionIK, request)
+        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+            advice = ("approximate solutions are not offered over the wire" if approximate
+                      else "Is the pose within reach, and the IK solver functional?")
+            raise MoveItCommanderException(f"Error setting joint target: service {self._servers.resolve('compute_ik')}"
+                                           f" answers {code_text(answer.error_code)}. {advice}")
+        found = answer.solution.joint_state
+        wanted = set(self._group_names())
+        self._set_values({name: value for name, value in zip(found.name, found.position, strict=True)
+                          if name in wanted})
+
+
+def _single_value(name: str, value: Any) -> float:
+    """The one value of a one-variable joint, given as a number or as a list of one."""
+    if value is None:
+        raise MoveItCommanderException(f"Joint value expected when joint name specified ('{name}')")
+    values = list(value) if isinstance(value, Iterable) else [value]
+    if len(values) != 1:
+        raise MoveItCommanderException(f"joint '{name}' has 1 variable; got {len(values)} values")
+    return float(values[0])
+
+
+def _link_and_approximate(*arguments: Any) -> tuple[str, bool]:
+    """Sorts the optional arguments of a pose target by their types."""
+    link, approximate = "", False
+    for argument in arguments:
+        match argument:
+            case None:
+                continue
+            case str():
+                link = argument
+            case bool():
+                approximate = argument
+            case _:
+                raise MoveItCommanderException(f"Unexpected type {type(argument)}: a link's name (str) or whether the "
+                                               "pose is approximate (bool) may follow a pose")
+    return link, approximate

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a group holds: attach and detach objects, pick and place them."""
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    Grasp,
+    MoveItErrorCodes,
+    PickupAction,
+    PickupGoal,
+    PlaceAction,
+    PlaceGoal,
+    PlaceLocation,
+)
+from moveit_msgs.srv import GraspPlanning, GraspPlanningRequest
+from rosgraph.names import ns_join
+
+from moveit_commander.exception import MoveItCommanderException, ServerError
+from moveit_commander.group_motion import MOTION_TIMEOUT_S, GroupMotion
+
+LISTENER_TIMEOUT_S = 2.0
+PLACE_KINDS = "Pose, PoseStamped, PlaceLocation, list of PoseStamped or list of PlaceLocation"
+
+
+class GroupObjects(GroupMotion):
+    """Objects in the hand of a group.
+
+    Publishes: attached_collision_object (moveit_msgs/AttachedCollisionObject).
+    """
+
+    def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
+        super().__init__(name, robot_description, ns, wait_for_servers)
+        self._attachments = rospy.Publisher(ns_join(ns, "attached_collision_object"), AttachedCollisionObject,
+                                            queue_size=20)
+
+    def attach_object(self, object_name: str, link_name: str = "", touch_links: Sequence[str] = ()) -> bool:
+        """Attaches an object of the scene to a link.
+
+        Args:
+            object_name: id of the object.
+            link_name: the link; "" for the end effector link, or the group's first link if it has none.
+            touch_links: links that may touch it; none: the link itself.
+
+        Returns:
+            Whether the request was sent; whether move_group could apply it shows in the scene.
+        """
+        link = link_name or self._end_effector_link or next(iter(self._group.links), "")
+        if not link:
+            rospy.logerr("No known link to attach object '%s' to; name one", object_name)
+            return False
+        message = AttachedCollisionObject(link_name=link, touch_links=list(touch_links) or [link])
+        message.object.id, message.object.operation = object_name, CollisionObject.ADD
+        return self._publish([message])
+
+    def detach_object(self, name: str = "") -> bool:
+        """Detaches what a link of the group holds, or the object of that name, or all the group holds ("")."""
+        links = [name] if name in self._group.links else list(self._group.links) if not name else []
+        messages = [AttachedCollisionObject(link_name=link) for link in links] or [AttachedCollisionObject()]
+        for message in messages:
+            message.object.operation = CollisionObject.REMOVE
+            message.object.id = "" if links else name
+        return self._publish(messages)
+
+    def pick(self, object_name: str, grasp: Grasp | Sequence[Grasp] = (), plan_only: bool = False) -> int:
+        """Picks an object by one of the grasps; none: those of the service plan_grasps. Answers the error code.
+
+        Raises:
+            ServerError: move_group does not offer the action pickup, or nobody plans grasps.
+        """
+        grasps = [grasp] if isinstance(grasp, Grasp) else list(grasp)
+        caller = self._servers.action("pickup", PickupAction)
+        if not grasps:
+            grasps = self._planned_grasps(object_name)
+        goal = PickupGoal(
+            target_name=object_name, group_name=self._group.name, end_effector=self._group.end_effector,
+            possible_grasps=grasps, support_surface_name=self._support_surface,
+            allow_gripper_support_collision=bool(self._support_surface), path_constraints=self._path_constraints,
+            planner_id=self._planner_id, allowed_planning_time=self._planning_time_s,
+            planning_options=self._options(plan_only))
+        code = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S).error_code
+        self._judge(code, "pick")
+        return int(code.val)
+
+    def place(self, object_name: str, location: Any = None, plan_only: bool = False) -> bool:
+        """Places an attached object at a pose, at one of several places, or (None) somewhere safe.
+
+        Raises:
+            ServerError: move_group does not offer the action place.
+            MoveItCommanderException: the location is of another type.
+        """
+        goal = PlaceGoal(
+            group_name=self._group.name, attached_object_name=object_name, place_locations=self._places(location),
+            support_surface_name=self._support_surface, path_constraints=self._path_constraints,
+            allow_gripper_support_collision=bool(self._support_surface), planner_id=self._planner_id,
+            allowed_planning_time=self._planning_time_s, planning_options=self._options(plan_only))
+        caller = self._servers.action("place", PlaceAction)
+        result = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S)
+        return self._judge(result.error_code, "place")
+
+    def _places(self, location: Any) -> list[PlaceLocation]:
+        given = location if isinstance(location, list) else [] if location is None else [location]
+        return [item if isinstance(item, PlaceLocation) else self._place(item) for item in given]
+
+    def _place(self, pose: Any) -> PlaceLocation:
+        """A place to come down to along the planning frame's z, and to leave against the link's x."""
+        if not isinstance(pose, Pose | PoseStamped):
+            raise MoveItCommanderException(f"Parameter location must be a {PLACE_KINDS} object; got {type(pose)}")
+        place = PlaceLocation(place_pose=self._stamped(pose))
+        approach, retreat = place.pre_place_approach, place.post_place_retreat
+        approach.direction.header.frame_id = self.get_planning_frame()
+        approach.direction.vector.z = -1.0
+        approach.min_distance, approach.desired_distance = 0.1, 0.2
+        retreat.direction.header.frame_id = self._end_effector_link
+        retreat.direction.vector.x = -1.0
+        retreat.min_distance, retreat.desired_distance = 0.0, 0.2
+        return place
+
+    def _planned_grasps(self, object_name: str) -> list[Grasp]:
+        request = GraspPlanningRequest(group_name=self._group.name, support_surfaces=[self._support_surface])
+        request.target.id = object_name
+        answer = self._servers.call("plan_grasps", GraspPlanning, request)
+        if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.grasps:
+            raise ServerError(f"service plan_grasps: no grasp of '{object_name}' (code {answer.error_code.val}); give "
+                              "grasps to pick()")
+        return list(answer.grasps)
+
+    def _publish(self, messages: Sequence[AttachedCollisionObject]) -> bool:
+        deadline = time.monotonic() + LISTENER_TIMEOUT_S
+        while self._attachments.get_num_connections() == 0 and not rospy.is_shutdown():
+            if time.monotonic() > deadline:
+                rospy.logerr("topic %s: nobody has listened for %g s; does move_group run?",
+                             self._attachments.resolved_name, LISTENER_TIMEOUT_S)
+                return False
+            time.sleep(0.01)
+        for message in messages:
+            self._attachments.publish(message)
+        return True

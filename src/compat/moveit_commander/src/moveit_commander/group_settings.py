@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How a group plans: planner, times, tolerances, scaling factors, workspace, start state and constraints."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from moveit_msgs.msg import Constraints, RobotState, TrajectoryConstraints, WorkspaceParameters
+
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.group_connection import GroupConnection
+
+NO_DATABASE = ("constraints are not kept in a database here; give the moveit_msgs/Constraints message itself to "
+               "set_path_constraints")
+
+
+class GroupSettings(GroupConnection):
+    """The settings that go into every planning request of a group."""
+
+    def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
+        super().__init__(name, robot_description, ns, wait_for_servers)
+        self._planning_time_s = 5.0
+        self._attempts = 1
+        self._pipeline_id = self._planner_id = ""
+        self._looking = self._replanning = False
+        kinematics = f"_kinematics/{name}/goal_"
+        self._joint_tolerance = self._parameter(f"{kinematics}joint_tolerance", 1e-4)
+        self._position_tolerance = self._parameter(f"{kinematics}position_tolerance", 1e-4)
+        self._orientation_tolerance = self._parameter(f"{kinematics}orientation_tolerance", 1e-3)
+        self._velocity_scaling = self._parameter("_planning/default_velocity_scaling_factor", 0.1)
+        self._acceleration_scaling = self._parameter("_planning/default_acceleration_scaling_factor", 0.1)
+        self._speed_limit = 0.0
+        self._speed_limited_link = ""
+        self._workspace = WorkspaceParameters()
+        self._start_state = RobotState(is_diff=True)
+        self._path_constraints = Constraints()
+        self._trajectory_constraints = TrajectoryConstraints()
+        self._support_surface = ""
+
+    def set_start_state_to_current_state(self) -> None:
+        """Lets plans start where the robot is."""
+        self._start_state = RobotState(is_diff=True)
+
+    def set_start_state(self, msg: RobotState) -> None:
+        """Lets plans start at a given state (moveit_msgs/RobotState)."""
+        self._start_state = msg
+
+    def get_goal_tolerance(self) -> tuple[float, float, float]:
+        """Answers the tolerances of joint [rad or m], position [m] and orientation [rad] goals."""
+        return self._joint_tolerance, self._position_tolerance, self._orientation_tolerance
+
+    def get_goal_joint_tolerance(self) -> float:
+        """Answers how far each joint may be from a joint goal [rad or m]."""
+        return self._joint_tolerance
+
+    def get_goal_position_tolerance(self) -> float:
+        """Answers the radius of the sphere about a position goal [m]."""
+        return self._position_tolerance
+
+    def get_goal_orientation_tolerance(self) -> float:
+        """Answers how far an orientation may be turned from its goal about each axis [rad]."""
+        return self._orientation_tolerance
+
+    def set_goal_tolerance(self, value: float) -> None:
+        """Sets all three tolerances to one number."""
+        self._joint_tolerance = self._position_tolerance = self._orientation_tolerance = value
+
+    def set_goal_joint_tolerance(self, value: float) -> None:
+        """Sets how far each joint may be from a joint goal [rad or m]."""
+        self._joint_tolerance = value
+
+    def set_goal_position_tolerance(self, value: float) -> None:
+        """Sets the radius of the sphere about a position goal [m]."""
+        self._position_tolerance = value
+
+    def set_goal_orientation_tolerance(self, value: float) -> None:
+        """Sets how far an orientation may be turned from its goal about each axis [rad]."""
+        self._orientation_tolerance = value
+
+    def allow_looking(self, value: bool) -> None:
+        """Whether move_group may look around with its sensors while it moves."""
+        self._looking = bool(value)
+
+    def allow_replanning(self, value: bool) -> None:
+        """Whether move_group may plan again when the scene changes on the way."""
+        self._replanning = bool(value)
+
+    def get_known_constraints(self) -> list[str]:
+        """Answers the names of constraints kept in a database: none, there is no database."""
+        return []
+
+    def set_constraints_database(self, host: str, port: int) -> None:
+        """Raises MoveItCommanderException: constraints are given as messages, not looked up in a database."""
+        raise MoveItCommanderException(f"Unable to use the database at {host}:{port}: {NO_DATABASE}")
+
+    def get_path_constraints(self) -> Constraints:
+        """Answers what holds along the whole path."""
+        return self._path_constraints
+
+    def set_path_constraints(self, value: Constraints | str | None) -> None:
+        """Sets what holds along the whole path; None clears it.
+
+        Raises:
+            MoveItCommanderException: a name was given, or something else than moveit_msgs/Constraints.
+        """
+        if value is None:
+            self.clear_path_constraints()
+        elif isinstance(value, Constraints):
+            self._path_constraints = value
+        else:
+            raise MoveItCommanderException(f"Unable to set path constraints {value!r}: {NO_DATABASE}")
+
+    def clear_path_constraints(self) -> None:
+        """Lets paths be free again."""
+        self._path_constraints = Constraints()
+
+    def get_trajectory_constraints(self) -> TrajectoryConstraints:
+        """Answers the constraints along the trajectory."""
+        return self._trajectory_constraints
+
+    def set_trajectory_constraints(self, value: TrajectoryConstraints | None) -> None:
+        """Sets the constraints along the trajectory; None clears them."""
+        if value is None:
+            self.clear_trajectory_constraints()
+        elif isinstance(value, TrajectoryConstraints):
+            self._trajectory_constraints = value
+        else:
+            raise MoveItCommanderException(f"Unable to set trajectory constraints {value!r}: a "
+                                           "moveit_msgs/TrajectoryConstraints is needed")
+
+    def clear_trajectory_constraints(self) -> None:
+        """Takes the constraints along the trajectory away."""
+        self._trajectory_constraints = TrajectoryConstraints()
+
+    def set_planning_time(self, seconds: float) -> None:
+        """Sets how long a planner may search [s]; times not above 0 change nothing, as in MoveIt."""
+        if seconds > 0.0:
+            self._planning_time_s = float(seconds)
+
+    def get_planning_time(self) -> float:
+        """Answers how long a planner may search [s]."""
+        return self._planning_time_s
+
+    def set_planning_pipeline_id(self, planning_pipeline: str) -> None:
+        """Chooses the planning pipeline (e.g. ompl); "" is move_group's default. Forgets the planner id."""
+        if planning_pipeline != self._pipeline_id:
+            self._pipeline_id, self._planner_id = planning_pipeline, ""
+
+    def get_planning_pipeline_id(self) -> str:
+        """Answers the planning pipeline; "" is move_group's default."""
+        return self._pipeline_id
+
+    def set_planner_id(self, planner_id: str) -> None:
+        """Chooses a planner of the pipeline (e.g. RRTConnect); "" is the group's default."""
+        self._planner_id = planner_id
+
+    def get_planner_id(self) -> str:
+        """Answers the chosen planner; "" is the group's default."""
+        return self._planner_id
+
+    def set_num_planning_attempts(self, num_planning_attempts: int) -> None:
+        """Sets how many plans are made, the shortest of which is answered."""
+        self._attempts = int(num_planning_attempts)
+
+    def set_workspace(self, ws: Sequence[float]) -> None:
+        """Bounds the workspace [m]: [], [min x, min y, max x, max y] or [min x, y, z, max x, y, z]."""
+        values = [float(value) for value in ws]
+        if len(values) not in (0, 4, 6):
+            raise MoveItCommanderException(f"Expected 0, 4 or 6 values in list specifying workspace; got {len(values)}")
+        if len(values) == 4:
+            values = [values[0], values[1], 0.0, values[2], values[3], 0.0]
+        values = values or [0.0] * 6
+        box = WorkspaceParameters()
+        box.header.frame_id = self.get_planning_frame()
+        box.min_corner.x, box.min_corner.y, box.min_corner.z = values[:3]
+        box.max_corner.x, box.max_corner.y, box.max_corner.z = values[3:]
+        self._workspace = box
+
+    def set_max_velocity_scaling_factor(self, value: float) -> None:
+        """Sets the share of the joints' top velocities to use, in (0, 1]."""
+        self._velocity_scaling = _share(value, "velocity")
+
+    def set_max_acceleration_scaling_factor(self, value: float) -> None:
+        """Sets the share of the joints' top accelerations to use, in (0, 1]."""
+        self._acceleration_scaling = _share(value, "acceleration")
+
+    def limit_max_cartesian_link_speed(self, speed: float, link_name: str = "") -> None:
+        """Bounds the speed of a link, or of the end effector link [m/s]."""
+        if not (math.isfinite(speed) and speed > 0.0):
+            raise MoveItCommanderException(f"Expected speed value to be greater than 0; got {speed} m/s")
+        self._speed_limit, self._speed_limited_link = float(speed), link_name
+
+    def clear_max_cartesian_link_speed(self) -> None:
+        """Takes the bound on a link's speed away."""
+        self._speed_limit, self._speed_limited_link = 0.0, ""
+
+    def set_support_surface_name(self, value: str) -> None:
+        """Names the object that things are picked from and placed on."""
+        self._support_surface = value
+
+
+def _share(value: float, what: str) -> float:
+    if not 0.0 < value <= 1.0:
+        raise MoveItCommanderException(f"Expected value in the range from 0 to 1 for scaling factor; got {value} for "
+                                       f"{what}, allowed is (0, 1]")
+    return float(value)

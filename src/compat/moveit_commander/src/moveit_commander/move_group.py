@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commander of one planning group: MoveGroupCommander."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rospy
+from moveit_msgs.msg import RobotState, RobotTrajectory
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from moveit_commander.chain_jacobian import jacobian
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.group_objects import GroupObjects
+from moveit_commander.robot_model import group_values
+from moveit_commander.trajectory_timing import ALGORITHMS, distinct, retime
+
+
+class MoveGroupCommander(GroupObjects):
+    """Plans and moves one planning group of a robot, through the move_group node."""
+
+    def __init__(self, name: str, robot_description: str = "robot_description", ns: str = "",
+                 wait_for_servers: float = 5.0) -> None:
+        """Connects to move_group.
+
+        Args:
+            name: the planning group.
+            robot_description: parameter with the robot's URDF; SRDF and limits are beside it.
+            ns: namespace of move_group's endpoints and of joint_states.
+            wait_for_servers: how long to wait for move_group [s]; 0: for ever.
+
+        Raises:
+            RobotModelError: no such group or no description (a RuntimeError too).
+            ServerError: move_group did not answer in time (a RuntimeError too).
+        """
+        super().__init__(name, robot_description, ns, wait_for_servers)
+
+    def get_jacobian_matrix(self, joint_values: Sequence[float],
+                            reference_point: Sequence[float] | None = None) -> list[list[float]]:
+        """Answers the 6 x n Jacobian of the group's last link, in the frame of the group's base link.
+
+        Args:
+            joint_values: positions of the group's variables [rad or m].
+            reference_point: point of the last link, in its frame [m]; None: its origin.
+
+        Raises:
+            MoveItCommanderException: the group is not a chain, or the values do not fit it.
+        """
+        if not self._group.is_chain:
+            raise MoveItCommanderException(f"get_jacobian_matrix: group '{self._group.name}' is not a chain")
+        chain = self._model.chain(self._group.joints[0].parent, self._group.tip)
+        positions = self._model.complete(group_values(self._group, joint_values))
+        matrix = jacobian(chain, positions, reference_point or (0.0, 0.0, 0.0))
+        return [[float(value) for value in row] for row in matrix]
+
+    def retime_trajectory(self, ref_state_in: RobotState, traj_in: RobotTrajectory,
+                          velocity_scaling_factor: float = 1.0, acceleration_scaling_factor: float = 1.0,
+                          algorithm: str = "iterative_time_parameterization") -> RobotTrajectory:
+        """Answers the trajectory with new times, velocities and accelerations; its waypoints stay.
+
+        Args:
+            ref_state_in: state of the other joints; not needed here.
+            traj_in: the trajectory; points equal to the one before are left out.
+            velocity_scaling_factor: share of the top velocities, in (0, 1].
+            acceleration_scaling_factor: share of the top accelerations, in (0, 1].
+            algorithm: one of MoveIt's names; all are one time-optimal algorithm here.
+        """
+        if algorithm not in ALGORITHMS:
+            raise MoveItCommanderException(f"retime_trajectory: unknown time parameterization algorithm '{algorithm}'; "
+                                           f"allowed: {', '.join(ALGORITHMS)}")
+        names = traj_in.joint_trajectory.joint_names
+        unknown = [name for name in names if name not in self._model.joints]
+        if unknown or not (0.0 < velocity_scaling_factor <= 1.0 and 0.0 < acceleration_scaling_factor <= 1.0):
+            raise MoveItCommanderException(f"retime_trajectory: unknown joints {unknown}, scaling factors "
+                                           f"{velocity_scaling_factor}, {acceleration_scaling_factor}; only joints of "
+                                           "the robot and factors in (0, 1] are allowed")
+        joints = [self._model.joints[name] for name in names]
+        points = [point.positions for point in traj_in.joint_trajectory.points]
+        timed = RobotTrajectory(multi_dof_joint_trajectory=traj_in.multi_dof_joint_trajectory)
+        timed.joint_trajectory.header, timed.joint_trajectory.joint_names = traj_in.joint_trajectory.header, list(names)
+        kept = [points[index] for index in distinct(points)] if len(points) > 1 else points
+        if len(kept) < 2:
+            timed.joint_trajectory.points = [_point(point, 0.0, [0.0] * len(names), [0.0] * len(names))
+                                             for point in kept]
+            return timed
+        times, velocities, accelerations = retime(
+            kept, velocity_scaling_factor * np.array([joint.velocity for joint in joints]),
+            acceleration_scaling_factor * np.array([joint.acceleration for joint in joints]))
+        timed.joint_trajectory.points = [_point(*row) for row in zip(kept, times, velocities, accelerations,
+                                                                     strict=True)]
+        return timed
+
+
+def _point(positions: Sequence[float], time_s: float, velocities: Sequence[float],
+           accelerations: Sequence[float]) -> JointTrajectoryPoint:
+    return JointTrajectoryPoint(positions=list(positions), velocities=[float(value) for value in velocities],
+                                accelerations=[float(value) for value in accelerations],
+                                time_from_start=rospy.Duration.from_sec(float(time_s)))

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Changes and reads the planning scene of move_group: PlanningSceneInterface."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneComponents
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    ApplyPlanningSceneRequest,
+    GetPlanningScene,
+    GetPlanningSceneRequest,
+)
+from rosgraph.names import ns_join
+from shape_msgs.msg import SolidPrimitive
+
+from moveit_commander import allowed_collisions, collision_objects
+from moveit_commander.exception import ServerError
+from moveit_commander.object_region import Region, inside
+from moveit_commander.roscpp_initializer import ensure_node
+from moveit_commander.servers import Servers
+
+acm_set_default = allowed_collisions.set_default
+acm_set_allowed = allowed_collisions.set_allowed
+Vector = Sequence[float]
+
+
+class PlanningSceneInterface:
+    """Adds, attaches, removes and lists objects.
+
+    Synchronous: each change is in force when the method returns, by the service apply_planning_scene. Otherwise
+    changes are published on collision_object and attached_collision_object.
+    """
+
+    def __init__(self, ns: str = "", synchronous: bool = True) -> None:
+        """Args: ns: namespace of move_group's endpoints. synchronous: whether methods wait for move_group."""
+        ensure_node()
+        self._servers = Servers(ns)
+        self._synchronous = synchronous
+        self._objects: Any = None
+        self._attachments: Any = None
+        if not synchronous:
+            self._objects = rospy.Publisher(ns_join(ns, "collision_object"), CollisionObject, queue_size=100)
+            self._attachments = rospy.Publisher(ns_join(ns, "attached_collision_object"), AttachedCollisionObject,
+                                                queue_size=100)
+
+    def add_object(self, collision_object: CollisionObject) -> None:
+        """Adds an object, or replaces the one with its id."""
+        self._submit(collision_object)
+
+    def add_sphere(self, name: str, pose: PoseStamped, radius: float = 1) -> None:
+        """Adds a sphere [m]."""
+        self._submit(self.make_sphere(name, pose, radius))
+
+    def add_cylinder(self, name: str, pose: PoseStamped, height: float, radius: float) -> None:
+        """Adds a cylinder along z [m]."""
+        self._submit(self.make_cylinder(name, pose, height, radius))
+
+    def add_cone(self, name: str, pose: PoseStamped, height: float, radius: float) -> None:
+        """Adds a cone along z [m]."""
+        self._submit(self.make_cone(name, pose, height, radius))
+
+    def add_mesh(self, name: str, pose: PoseStamped, filename: str, size: Vector = (1, 1, 1)) -> None:
+        """Adds the mesh of a file, scaled by `size` along x, y, z."""
+        self._submit(self.make_mesh(name, pose, filename, size))
+
+    def add_box(self, name: str, pose: PoseStamped, size: Vector = (1, 1, 1)) -> None:
+        """Adds a box [m]."""
+        self._submit(self.make_box(name, pose, size))
+
+    def add_plane(self, name: str, pose: PoseStamped, normal: Vector = (0, 0, 1), offset: float = 0) -> None:
+        """Adds the plane normal . p + offset = 0 in the pose's frame [m]."""
+        self._submit(self.make_plane(name, pose, normal, offset))
+
+    def attach_object(self, object: AttachedCollisionObject | CollisionObject | str,  # noqa: A002 - public name
+                      link: str | None = None, touch_links: Sequence[str] | None = None) -> None:
+        """Attaches a new object, or (by its name) one of the scene, to a link.
+
+        Args:
+            object: the object or its name.
+            link: the link it is fixed to; None: the one of the AttachedCollisionObject.
+            touch_links: links that may touch it; None: the link itself.
+        """
+        if isinstance(object, str):
+            object = collision_objects.existing(object)  # noqa: A001
+        attached = object if isinstance(object, AttachedCollisionObject) else AttachedCollisionObject(object=object)
+        if link is not None:
+            attached.link_name = link
+        attached.touch_links = [attached.link_name] if touch_links is None else list(touch_links)
+        self._submit(attached)
+
+    def attach_mesh(self, link: str, name: str, pose: PoseStamped | None = None, filename: str = "",
+                    size: Vector = (1, 1, 1), touch_links: Sequence[str] | None = None) -> None:
+        """Attaches a mesh of a file; without pose and file: the object of that name."""
+        new = self.make_mesh(name, pose, filename, size) if pose is not None and filename else name
+        self.attach_object(new, link, touch_links)
+
+    def attach_box(self, link: str, name: str, pose: PoseStamped | None = None, size: Vector = (1, 1, 1),
+                   touch_links: Sequence[str] | None = None) -> None:
+        """Attaches a box [m]; without pose: the object of that name."""
+        self.attach_object(name if pose is None else self.make_box(name, pose, size), link, touch_links)
+
+    def attach_sphere(self, link: str, name: str, pose: PoseStamped | None = None, radius: float = 1,
+                      touch_links: Sequence[str] | None = None) -> None:
+        """Attaches a sphere [m]; without pose: the object of that name."""
+        self.attach_object(name if pose is None else self.make_sphere(name, pose, radius), link, touch_links)
+
+    def attach_cylinder(self, link: str, name: str, pose: PoseStamped | None = None, height: float = 1,
+                        radius: float = 1, touch_links: Sequence[str] | None = None) -> None:
+        """Attaches a cylinder [m]; without pose: the object of that name."""
+        self.attach_object(name if pose is None else self.make_cylinder(name, pose, height, radius), link, touch_links)
+
+    def clear(self) -> None:
+        """Takes every object out of the scene, attached ones too."""
+        self.remove_attached_object()
+        self.remove_world_object()
+
+    def remove_world_object(self, name: str | None = None) -> None:
+        """Removes one object, or (None) all that are not attached."""
+        self._submit(CollisionObject(id=name or "", operation=CollisionObject.REMOVE))
+
+    def remove_attached_object(self, link: str | None = None, name: str | None = None) -> None:
+        """Detaches an object, or all of a link, or all; they stay in the scene as objects of the world."""
+        attached = AttachedCollisionObject(link_name=link or "")
+        attached.object.id, attached.object.operation = name or "", CollisionObject.REMOVE
+        self._submit(attached)
+
+    def get_known_object_names(self, with_type: bool = False) -> list[str]:
+        """Answers the names of the world's objects; with_type: only those with a type."""
+        return [item.id for item in self._world(PlanningSceneComponents.WORLD_OBJECT_NAMES)
+                if item.type.key or not with_type]
+
+    def get_known_object_names_in_roi(self, minx: float, miny: float, minz: float, maxx: float, maxy: float,
+                                      maxz: float, with_type: bool = False) -> list[str]:
+        """As get_known_object_names, of objects whose shapes all have their origin in a box, planning frame [m]."""
+        region = Region((minx, miny, minz), (maxx, maxy, maxz))
+        return [item.id for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+                if (item.type.key or not with_type) and inside(item, region)]
+
+    def get_object_poses(self, object_ids: Sequence[str]) -> dict[str, Pose]:
+        """Answers the poses of objects in the planning frame, by name; unknown names are left out."""
+        return {name: item.pose for name, item in self.get_objects(list(object_ids)).items() if name in object_ids}
+
+    def get_objects(self, object_ids: Sequence[str] = ()) -> dict[str, CollisionObject]:
+        """Answers the objects of the world by name; none named: all of them."""
+        return {item.id: item for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+                if item.id in object_ids or not object_ids}
+
+    def get_attached_objects(self, object_ids: Sequence[str] = ()) -> dict[str, AttachedCollisionObject]:
+        """Answers the attached objects by name; none named: all of them."""
+        scene = self.get_planning_scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
+        return {item.object.id: item for item in scene.robot_state.attached_collision_objects
+                if item.object.id in object_ids or not object_ids}
+
+    def get_planning_scene(self, components: int) -> PlanningScene:
+        """Answers parts of move_group's scene: bits of moveit_msgs/PlanningSceneComponents."""
+        request = GetPlanningSceneRequest(PlanningSceneComponents(components))
+        return self._servers.call("get_planning_scene", GetPlanningScene, request).scene
+
+    def apply_planning_scene(self, planning_scene_message: PlanningScene) -> bool:
+        """Changes the scene; answers whether move_group took it."""
+        request = ApplyPlanningSceneRequest(planning_scene_message)
+        return bool(self._servers.call("apply_planning_scene", ApplyPlanningScene, request).success)
+
+    @staticmethod
+    def make_box(name: str, pose: PoseStamped, size: Vector) -> CollisionObject:
+        """Builds a box [m]."""
+        return collision_objects.primitive(name, pose, SolidPrimitive.BOX, size)
+
+    @staticmethod
+    def make_mesh(name: str, pose: PoseStamped, filename: str, scale: Vector = (1, 1, 1)) -> CollisionObject:
+        """Builds an object of a mesh file."""
+        return collision_objects.mesh(name, pose, filename, scale)
+
+    @staticmethod
+    def make_sphere(name: str, pose: PoseStamped, radius: float) -> CollisionObject:
+        """Builds a sphere [m]."""
+        return collision_objects.primitive(name, pose, SolidPrimitive.SPHERE, [radius])
+
+    @staticmethod
+    def make_cylinder(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
+        """Builds a cylinder [m]."""
+        return collision_objects.primitive(name, pose, SolidPrimitive.CYLINDER, [height, radius])
+
+    @staticmethod
+    def make_cone(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
+        """Builds a cone [m]."""
+        return collision_objects.primitive(name, pose, SolidPrimitive.CONE, [height, radius])
+
+    @staticmethod
+    def make_plane(name: str, pose: PoseStamped, normal: Vector = (0, 0, 1), offset: float = 0) -> CollisionObject:
+        """Builds a plane."""
+        return collision_objects.plane(name, pose, normal, offset)
+
+    def _world(self, components: int) -> list[CollisionObject]:
+        return list(self.get_planning_scene(components).world.collision_objects)
+
+    def _submit(self, item: CollisionObject | AttachedCollisionObject) -> None:
+        attached = isinstance(item, AttachedCollisionObject)
+        if not self._synchronous:
+            (self._attachments if attached else self._objects).publish(item)
+            return
+        scene = PlanningScene(is_diff=True)
+        scene.robot_state.is_diff = True
+        if attached:
+            scene.robot_state.attached_collision_objects = [item]
+        else:
+            scene.world.collision_objects = [item]
+        if not self.apply_planning_scene(scene):
+            name = item.object.id if attached else item.id
+            raise ServerError(f"service {self._servers.resolve('apply_planning_scene')}: the change of object '{name}' "
+                              "was refused and the scene is as before; the log of move_group says why")

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The whole robot: its joints, links, groups and present state: RobotCommander."""
+from __future__ import annotations
+
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.msg import RobotState
+from visualization_msgs.msg import MarkerArray
+
+from moveit_commander import robot_parts
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.group_connection import forward_kinematics
+from moveit_commander.move_group import MoveGroupCommander
+from moveit_commander.robot_markers import robot_markers
+from moveit_commander.robot_state import current_state
+from moveit_commander.servers import Servers
+
+
+class RobotCommander:
+    """Answers questions about a robot; groups, joints and links are attributes too (robot.arm, robot.elbow_joint)."""
+
+    Joint = robot_parts.Joint
+    Link = robot_parts.Link
+
+    def __init__(self, robot_description: str = "robot_description", ns: str = "") -> None:
+        """Reads the robot's description.
+
+        Args:
+            robot_description: parameter with the URDF; SRDF and limits are beside it.
+            ns: namespace of move_group's endpoints and of joint_states.
+
+        Raises:
+            RobotModelError: a description is missing or cannot be read (a RuntimeError too).
+        """
+        self._robot_description = robot_description
+        self._ns = ns
+        self._state = current_state(robot_description, ns)
+        self._model = self._state.model
+        self._servers = Servers(ns)
+        self._groups: dict[str, MoveGroupCommander] = {}
+
+    def get_planning_frame(self) -> str:
+        """Answers the frame in which planning is done."""
+        return self._model.planning_frame
+
+    def get_robot_name(self) -> str:
+        """Answers the name in the robot's description."""
+        return self._model.name
+
+    def get_root_link(self) -> str:
+        """Answers the link that has no parent."""
+        return self._model.root_link
+
+    def get_active_joint_names(self, group: str | None = None) -> list[str]:
+        """Answers the joints of a group, or of the robot, that move by themselves."""
+        joints = self._model.joints.values() if group is None else self._model.group(group).joints
+        return [joint.name for joint in joints if joint.active]
+
+    def get_joint_names(self, group: str | None = None) -> list[str]:
+        """Answers all joints of a group, or of the robot, fixed and mimic ones included."""
+        joints = self._model.joints.values() if group is None else self._model.group(group).joints
+        return [joint.name for joint in joints]
+
+    def get_link_names(self, group: str | None = None) -> list[str]:
+        """Answers the links of a group, or of the robot."""
+        return list(self._model.links if group is None else self._model.group(group).links)
+
+    def get_group_names(self) -> list[str]:
+        """Answers the planning groups."""
+        return sorted(self._model.groups)
+
+    def has_group(self, name: str) -> bool:
+        """Whether there is a group of that name."""
+        return name in self._model.groups
+
+    def get_current_state(self) -> RobotState:
+        """Answers the robot's present state."""
+        return self._state.message()
+
+    def get_current_variable_values(self) -> dict[str, float]:
+        """Answers the present joint positions by name [rad or m]."""
+        return self._state.positions()
+
+    def get_joint(self, name: str) -> robot_parts.Joint:
+        """Answers a joint; raises MoveItCommanderException if there is none of that name."""
+        if name not in self._model.joints:
+            raise MoveItCommanderException(f"There is no joint named {name}; get_joint_names lists those there are")
+        return self.Joint(self, name)
+
+    def get_link(self, name: str) -> robot_parts.Link:
+        """Answers a link; raises MoveItCommanderException if there is none of that name."""
+        if name not in self._model.links:
+            raise MoveItCommanderException(f"There is no link named {name}; get_link_names lists those there are")
+        return self.Link(self, name)
+
+    def get_group(self, name: str) -> MoveGroupCommander:
+        """Answers the commander of a group, the same one each time."""
+        if name not in self._groups:
+            self._model.group(name)
+            self._groups[name] = MoveGroupCommander(name, self._robot_description, self._ns)
+        return self._groups[name]
+
+    def get_default_owner_group(self, joint_name: str) -> str | None:
+        """Answers the group with the fewest links of those that have a joint; None if no group has it."""
+        owners = [group for group in self._model.groups.values()
+                  if any(joint.name == joint_name for joint in group.joints)]
+        return min(owners, key=lambda group: (len(group.links), group.name)).name if owners else None
+
+    def get_robot_markers(self, *args: Any) -> MarkerArray:
+        """Answers markers that show the robot.
+
+        Args:
+            args: nothing: as it is now; a RobotState; a dict of joint positions [rad or m], and perhaps a list of
+                links; or a group's name, and perhaps a dict of joint positions.
+        """
+        values: dict[str, float] = {}
+        links = self._model.links
+        match args:
+            case ():
+                pass
+            case (RobotState() as state,):
+                values = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
+            case (dict() as values,):
+                pass
+            case (dict() as values, list() | tuple() as chosen):
+                links = tuple(chosen)
+            case (str() as group,):
+                links = self._model.group(group).links
+            case (str() as group, dict() as values):
+                links = self._model.group(group).links
+            case _:
+                raise MoveItCommanderException(f"Unexpected type: {[type(item) for item in args]}; allowed: nothing, "
+                                               "RobotState, dict, (dict, list of links), group, (group, dict)")
+        unknown = [name for name in (*values, *links) if name not in self._model.joints and name not in
+                   self._model.links]
+        if unknown:
+            raise MoveItCommanderException(f"get_robot_markers: robot '{self._model.name}' has no {unknown}")
+        positions = self._model.complete({**self._state.positions(), **values})
+        return robot_markers(self._model, self._servers, self._state.message_of(positions), links)
+
+    def _link_pose(self, link: str) -> PoseStamped:
+        return forward_kinematics(self._servers, self._model.planning_frame, link, self.get_current_state())
+
+    def __getattr__(self, name: str) -> Any:
+        """Finds groups, joints and links by their names."""
+        if not name.startswith("_"):
+            if self.has_group(name):
+                return self.get_group(name)
+            if name in self._model.joints:
+                return self.get_joint(name)
+            if name in self._model.links:
+                return self.get_link(name)
+        raise AttributeError(f"RobotCommander has no attribute '{name}', and the robot no group, joint or link of "
+                             "that name")

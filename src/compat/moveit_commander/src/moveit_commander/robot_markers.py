@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows a state of the robot as markers: the visual shapes of its links where compute_fk says they are."""
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+
+import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from moveit_msgs.msg import MoveItErrorCodes, RobotState
+from moveit_msgs.srv import GetPositionFK, GetPositionFKRequest
+from visualization_msgs.msg import Marker, MarkerArray
+
+from moveit_commander.conversions import list_to_pose
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.object_region import placed
+from moveit_commander.robot_model import RobotModel
+from moveit_commander.servers import Servers
+
+GREY = 0.5
+
+
+def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links: Sequence[str]) -> MarkerArray:
+    """Markers of links in a state, in the planning frame. Raises ServerError or MoveItCommanderException."""
+    visuals = {link.get("name", ""): link.findall("visual") for link in model.urdf_root.findall("link")}
+    shown = [link for link in links if visuals.get(link)]
+    if not shown:
+        return MarkerArray()
+    request = GetPositionFKRequest(fk_link_names=shown, robot_state=state)
+    request.header.frame_id = model.planning_frame
+    answer = servers.call("compute_fk", GetPositionFK, request)
+    if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+        raise MoveItCommanderException(f"service {servers.resolve('compute_fk')}: no poses of {', '.join(shown)}: code "
+                                       f"{answer.error_code.val}")
+    poses = dict(zip(answer.fk_link_names, answer.pose_stamped, strict=True))
+    array = MarkerArray()
+    for link in shown:
+        for number, visual in enumerate(visuals[link]):
+            marker = _marker(visual)
+            if marker is not None:
+                marker.header.frame_id, marker.header.stamp = model.planning_frame, rospy.Time.now()
+                marker.ns, marker.id = link, number
+                marker.pose = _compose(poses[link].pose, _origin(visual))
+                array.markers.append(marker)
+    return array
+
+
+def _marker(visual: ET.Element) -> Marker | None:
+    """The shape of a <visual>; None if it has none that markers can show."""
+    marker = Marker(action=Marker.ADD)
+    marker.color.r = marker.color.g = marker.color.b = GREY
+    marker.color.a = 1.0
+    for shape in visual.iterfind("geometry/*"):
+        sizes = [float(item) for item in shape.get("size", shape.get("scale", "1 1 1")).split()]
+        match shape.tag:
+            case "mesh":
+                marker.type, marker.mesh_resource = Marker.MESH_RESOURCE, shape.get("filename", "")
+                marker.mesh_use_embedded_materials = True
+            case "box":
+                marker.type = Marker.CUBE
+            case "cylinder" | "sphere":
+                width = 2.0 * float(shape.get("radius", "0"))
+                marker.type = Marker.SPHERE if shape.tag == "sphere" else Marker.CYLINDER
+                sizes = [width, width, float(shape.get("length", width))]
+            case _:
+                return None
+        marker.scale = Vector3(*sizes)
+        return marker
+    return None
+
+
+def _origin(visual: ET.Element) -> Pose:
+    origin = visual.find("origin")
+    attributes = {} if origin is None else origin.attrib
+    numbers = f"{attributes.get('xyz', '0 0 0')} {attributes.get('rpy', '0 0 0')}".split()
+    return list_to_pose([float(number) for number in numbers])
+
+
+def _compose(outer: Pose, inner: Pose) -> Pose:
+    """The inner pose, given in the frame of the outer one, in the frame the outer one is given in."""
+    a, b = outer.orientation, inner.orientation
+    turn = Quaternion(a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+                      a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z)
+    return Pose(Point(*placed(outer, inner.position)), turn)

@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot as its URDF, SRDF and joint limits describe it: joints, links, groups, bounds and named states."""
+from __future__ import annotations
+
+import math
+import random
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from moveit_commander.exception import RobotModelError
+
+ASSUMED_ROOT_JOINT = "ASSUMED_FIXED_ROOT_JOINT"
+MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
+Vector = tuple[float, float, float]
+NO_SHIFT: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One joint; bounds [rad or m], origin [m, rad] in the parent link, axis in the joint's own frame."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    lower: float = 0.0
+    upper: float = 0.0
+    velocity: float = 1.0
+    acceleration: float = 1.0
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (1.0, 0.0, 0.0)
+    leader: str = ""
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def movable(self) -> bool:
+        return self.kind in MOVABLE_KINDS
+
+    @property
+    def active(self) -> bool:
+        """Whether it moves by itself: neither fixed nor mimic."""
+        return self.movable and not self.leader
+
+    @property
+    def default(self) -> float:
+        """0, or the middle of the bounds where 0 is out of them."""
+        return 0.0 if self.lower <= 0.0 <= self.upper else (self.lower + self.upper) / 2.0
+
+    def admits(self, value: float, tolerance: float = 0.0) -> bool:
+        """Whether a position keeps the bounds; a continuous joint has none."""
+        if not math.isfinite(value):
+            return False
+        return self.kind == "continuous" or self.lower - tolerance <= value <= self.upper + tolerance
+
+    def bounded(self, value: float) -> float:
+        """The position, wrapped to (-pi, pi] or cut off at the bounds."""
+        if self.kind == "continuous":
+            return math.remainder(value, 2.0 * math.pi)
+        return min(max(value, self.lower), self.upper)
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A planning group; joints and links in the order of the model."""
+
+    name: str
+    joints: tuple[Joint, ...]
+    links: tuple[str, ...]
+    is_chain: bool
+    end_effector: str
+    states: Mapping[str, Mapping[str, float]]
+
+    @property
+    def active_joints(self) -> tuple[Joint, ...]:
+        return tuple(joint for joint in self.joints if joint.active)
+
+    @property
+    def variables(self) -> tuple[Joint, ...]:
+        """Every joint with a position, those that mimic another included."""
+        return tuple(joint for joint in self.joints if joint.movable)
+
+    @property
+    def tip(self) -> str:
+        return self.links[-1] if self.is_chain else ""
+
+
+class RobotModel:
+    """Answers what the descriptions say; it knows nothing of the robot's present state."""
+
+    def __init__(self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None) -> None:
+        """Reads the documents.
+
+        Args:
+            urdf: the robot's description, xacro expanded.
+            srdf: the semantic description.
+            limits: entries of joint_limits.yaml by joint name.
+
+        Raises:
+            RobotModelError: one of them cannot be read, or they contradict each other.
+        """
+        self.urdf_root = _parse(urdf, "URDF")
+        semantics = _parse(srdf, "SRDF")
+        self.name = self.urdf_root.get("name", "")
+        tree = {joint.child: joint for joint in (_joint(element, limits or {}) for element in
+                                                 self.urdf_root.findall("joint"))}
+        links = [link.get("name", "") for link in self.urdf_root.findall("link")]
+        roots = [link for link in links if link not in tree]
+        if len(roots) != 1:
+            raise RobotModelError(f"URDF '{self.name}': {len(roots)} links have no parent joint; exactly one may")
+        self.root_link = roots[0]
+        root_joint = _root_joint(semantics, self.root_link)
+        self.planning_frame = root_joint.parent or self.root_link
+        ordered = [root_joint, *_depth_first(tree.values(), self.root_link)]
+        self.joints = {joint.name: joint for joint in ordered}
+        self.links = tuple(joint.child for joint in ordered)
+        self._parent_joint = {joint.child: joint for joint in ordered}
+        self.passive = frozenset(item.get("name", "") for item in semantics.findall("passive_joint"))
+        self._semantics = semantics
+        self.groups = {element.get("name", ""): self._group(element) for element in semantics.findall("group")}
+
+    def group(self, name: str) -> Group:
+        """Answers a group; raises RobotModelError with the names there are."""
+        if name not in self.groups:
+            raise RobotModelError(f"There is no group named '{name}' in robot '{self.name}'; it has: "
+                                  f"{', '.join(sorted(self.groups)) or 'none'}")
+        return self.groups[name]
+
+    def chain(self, base: str, tip: str) -> list[Joint]:
+        """The joints from a link down to another one of its branch."""
+        joints: list[Joint] = []
+        link = tip
+        while link != base:
+            joint = self._parent_joint.get(link)
+            if joint is None:
+                raise RobotModelError(f"link '{tip}' is not below link '{base}' in robot '{self.name}'")
+            joints.append(joint)
+            link = joint.parent
+        return joints[::-1]
+
+    def complete(self, positions: Mapping[str, float]) -> dict[str, float]:
+        """The positions of the model's joints, in its order, mimic joints computed; unknown joints left out."""
+        values: dict[str, float] = {}
+        for joint in self.joints.values():
+            if joint.leader and joint.leader in positions:
+                values[joint.name] = joint.multiplier * positions[joint.leader] + joint.offset
+            elif joint.movable and joint.name in positions:
+                values[joint.name] = positions[joint.name]
+        return values
+
+    def defaults(self) -> dict[str, float]:
+        """The default position of every movable joint."""
+        return self.complete({joint.name: joint.default for joint in self.joints.values() if joint.active})
+
+    def random_values(self, group: Group, generator: random.Random) -> dict[str, float]:
+        """Positions of the group's joints, drawn evenly within the bounds."""
+        drawn = {joint.name: generator.uniform(joint.lower, joint.upper) for joint in group.active_joints}
+        completed = self.complete(drawn)
+        return {joint.name: completed[joint.name] for joint in group.variables if joint.name in completed}
+
+    def _group(self, element: ET.Element) -> Group:
+        name = element.get("name", "")
+        wanted = self._members(element, frozenset())
+        joints = tuple(joint for joint in self.joints.values() if joint.name in wanted)
+        links = tuple(joint.child for joint in joints)
+        is_chain = bool(joints) and any(joint.active for joint in joints) and all(
+            self._follows(sooner, later) for sooner, later in zip(joints[:-1], joints[1:], strict=True))
+        states = {item.get("name", ""): {value.get("name", ""): float(value.get("value", "0").split()[0])
+                                         for value in item.findall("joint")}
+                  for item in self._semantics.findall("group_state") if item.get("group") == name}
+        effectors = [item.get("name", "") for item in self._semantics.findall("end_effector")
+                     if name in (item.get("group"), item.get("parent_group"))
+                     or (not item.get("parent_group") and item.get("parent_link") in links)]
+        return Group(name, joints, links, is_chain, effectors[0] if effectors else "", states)
+
+    def _members(self, element: ET.Element, above: frozenset[str]) -> set[str]:
+        """Names of a group's joints, those of its subgroups included."""
+        name = element.get("name", "")
+        if name in above:
+            raise RobotModelError(f"SRDF: group '{name}' contains itself; take one <group> element out")
+        members = {item.get("name", "") for item in element.findall("joint")}
+        for item in element.findall("link"):
+            members.add(self._joint_above(item.get("name", "")).name)
+        for item in element.findall("chain"):
+            base, tip = item.get("base_link", ""), item.get("tip_link", "")
+            members.update(joint.name for joint in self.chain(base, tip))
+        for item in element.findall("group"):
+            inner = [other for other in self._semantics.findall("group") if other.get("name") == item.get("name")]
+            if not inner:
+                raise RobotModelError(f"SRDF: group '{name}' names the group '{item.get('name')}', which is not there")
+            members |= self._members(inner[0], above | {name})
+        return members
+
+    def _follows(self, sooner: Joint, later: Joint) -> bool:
+        """Whether only fixed joints lie between two joints."""
+        link = later.parent
+        while link != sooner.child and link in self._parent_joint and self._parent_joint[link].kind == "fixed":
+            link = self._parent_joint[link].parent
+        return link == sooner.child
+
+    def _joint_above(self, link: str) -> Joint:
+        if link not in self._parent_joint:
+            raise RobotModelError(f"SRDF: link '{link}' is not a link of robot '{self.name}'")
+        return self._parent_joint[link]
+
+
+def _parse(text: str, kind: str) -> ET.Element:
+    try:
+        return ET.fromstring(text)
+    except ET.ParseError as error:
+        raise RobotModelError(f"{kind}: not an XML document ({error}); is it loaded and expanded?") from error
+
+
+def _root_joint(semantics: ET.Element, root_link: str) -> Joint:
+    for item in semantics.findall("virtual_joint"):
+        if item.get("child_link") == root_link:
+            return Joint(item.get("name", ""), "fixed", item.get("parent_frame", ""), root_link)
+    return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
+
+
+def _depth_first(joints: Iterable[Joint], root_link: str) -> list[Joint]:
+    below: dict[str, list[Joint]] = {}
+    for joint in sorted(joints, key=lambda item: item.name):
+        below.setdefault(joint.parent, []).append(joint)
+    ordered: list[Joint] = []
+    waiting = below.get(root_link, [])[::-1]
+    while waiting:
+        joint = waiting.pop()
+        ordered.append(joint)
+        waiting.extend(below.get(joint.child, [])[::-1])
+    return ordered
+
+
+def _numbers(text: str | None, default: Vector) -> Vector:
+    if text is None:
+        return default
+    first, second, third = (float(item) for item in text.split())
+    return first, second, third
+
+
+def _joint(element: ET.Element, limits: Mapping[str, Any]) -> Joint:
+    name, kind = element.get("name", ""), element.get("type", "")
+    try:
+        return _read_joint(element, name, kind, limits.get(name) or {})
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RobotModelError(f"URDF joint '{name}' or its entry in joint_limits.yaml: {error}; numbers and the "
+                              "elements parent and child are needed") from error
+
+
+def _read_joint(element: ET.Element, name: str, kind: str, entry: Mapping[str, Any]) -> Joint:
+    def inner(tag: str) -> Mapping[str, str]:
+        found = element.find(tag)
+        return {} if found is None else found.attrib
+
+    limit, soft, origin, mimic = inner("limit"), inner("safety_controller"), inner("origin"), inner("mimic")
+    lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
+    if "soft_lower_limit" in soft or "soft_upper_limit" in soft:
+        lower = max(lower, float(soft.get("soft_lower_limit", lower)))
+        upper = min(upper, float(soft.get("soft_upper_limit", upper)))
+    if kind == "continuous":
+        lower, upper = -math.pi, math.pi
+    if entry.get("has_position_limits", False):
+        lower, upper = float(entry.get("min_position", lower)), float(entry.get("max_position", upper))
+    velocity = float(limit.get("velocity", 0.0)) or 1.0
+    if entry.get("has_velocity_limits", False):
+        velocity = float(entry.get("max_velocity", velocity))
+    acceleration = float(entry.get("max_acceleration", 1.0)) if entry.get("has_acceleration_limits", False) else 1.0
+    return Joint(name, kind, inner("parent").get("link", ""), inner("child").get("link", ""), lower, upper, velocity,
+                 acceleration, _numbers(origin.get("xyz"), NO_SHIFT), _numbers(origin.get("rpy"), NO_SHIFT),
+                 _numbers(inner("axis").get("xyz"), (1.0, 0.0, 0.0)), mimic.get("joint", ""),
+                 float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0)))
+
+
+def group_values(group: Group, values: Sequence[float]) -> dict[str, float]:
+    """Names the positions of a list: one for every variable of the group, or one for every active joint.
+
+    Raises:
+        RobotModelError: the list has another length.
+    """
+    numbers = [float(value) for value in values]
+    for joints in (group.variables, group.active_joints):
+        if len(numbers) == len(joints):
+            return {joint.name: number for joint, number in zip(joints, numbers, strict=True)}
+    raise RobotModelError(f"group '{group.name}': got {len(numbers)} joint values; {len(group.variables)} are needed, "
+                          f"in this order: {', '.join(joint.name for joint in group.variables)}")

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot as it is now: its description from the parameter server, its joint positions from joint_states."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable, Mapping
+
+import rospy
+from moveit_msgs.msg import RobotState
+from rosgraph.names import ns_join
+from sensor_msgs.msg import JointState
+
+from moveit_commander.exception import RobotModelError, ServerError
+from moveit_commander.robot_model import RobotModel
+from moveit_commander.roscpp_initializer import ensure_node, on_shutdown
+
+STATE_TIMEOUT_S = 1.0
+_shared: dict[tuple[str, str], CurrentState] = {}
+_sharing = threading.Lock()
+
+
+def load_model(robot_description: str) -> RobotModel:
+    """Reads URDF, SRDF and joint limits from the parameters `<robot_description>`, `_semantic` and `_planning`.
+
+    Raises:
+        RobotModelError: one of the first two is not there or cannot be read.
+    """
+    texts = []
+    for parameter in (robot_description, f"{robot_description}_semantic"):
+        text = rospy.get_param(parameter, None)
+        if not isinstance(text, str):
+            raise RobotModelError(f"parameter {rospy.resolve_name(parameter)}: got {type(text).__name__}, the text of "
+                                  "the robot's description is needed; load it (planning_context.launch) or name "
+                                  "another one by the argument robot_description")
+        texts.append(text)
+    limits = rospy.get_param(f"{robot_description}_planning/joint_limits", {})
+    return RobotModel(texts[0], texts[1], limits if isinstance(limits, dict) else {})
+
+
+def current_state(robot_description: str, ns: str) -> CurrentState:
+    """Answers the listener of a robot; the commanders of one robot share it. Raises RobotModelError."""
+    ensure_node()
+    key = (str(rospy.resolve_name(robot_description)), str(rospy.resolve_name(ns_join(ns, "joint_states"))))
+    with _sharing:
+        if key not in _shared:
+            _shared[key] = CurrentState(load_model(robot_description), key[1])
+        return _shared[key]
+
+
+def _forget_all() -> None:
+    with _sharing:
+        for state in _shared.values():
+            state.close()
+        _shared.clear()
+
+
+class CurrentState:
+    """Listens to a topic of joint states.
+
+    Subscribes: joint_states (sensor_msgs/JointState).
+    """
+
+    def __init__(self, model: RobotModel, topic: str) -> None:
+        self.model = model
+        self._topic = topic
+        self._positions: dict[str, float] = {}
+        self._arrivals: dict[str, float] = {}
+        self._stamp = rospy.Time()
+        self._changed = threading.Condition()
+        self._subscriber = rospy.Subscriber(topic, JointState, self._hear, queue_size=10, tcp_nodelay=True)
+        on_shutdown(_forget_all)
+
+    def close(self) -> None:
+        """Stops listening. May be called twice."""
+        self._subscriber.unregister()
+
+    def positions(self, needed: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
+        """Positions that arrived after this call [rad or m], mimic joints included.
+
+        Args:
+            needed: active joints that must be heard of; none: every active joint that is not passive.
+            timeout_s: how long to wait [s].
+
+        Raises:
+            ServerError: a needed joint was not heard of in time.
+        """
+        joints = [self.model.joints[name] for name in needed] or list(self.model.joints.values())
+        names = {joint.leader or joint.name for joint in joints if joint.movable}
+        names -= self.model.passive
+        begun = time.monotonic()
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._fresh(names, begun), timeout_s):
+                missing = sorted(name for name in names if self._arrivals.get(name, 0.0) < begun)
+                raise ServerError(f"topic {self._topic}: waited {timeout_s:g} s for joint states, nothing came for "
+                                  f"{', '.join(missing)}; does the joint state controller run?")
+            return self.model.complete(self._positions)
+
+    def message(self, needed: Iterable[str] = ()) -> RobotState:
+        """The whole known state as a message, in the planning frame; `needed` as above."""
+        return self.message_of(self.positions(needed))
+
+    def message_of(self, positions: Mapping[str, float]) -> RobotState:
+        """A message of given positions."""
+        state = RobotState()
+        state.joint_state.header.frame_id = self.model.planning_frame
+        state.joint_state.header.stamp = self._stamp
+        state.joint_state.name = list(positions)
+        state.joint_state.position = list(positions.values())
+        state.multi_dof_joint_state.header = state.joint_state.header
+        return state
+
+    def _fresh(self, names: Iterable[str], begun: float) -> bool:
+        return all(self._arrivals.get(name, 0.0) >= begun for name in names)
+
+    def _hear(self, message: JointState) -> None:
+        now = time.monotonic()
+        with self._changed:
+            for name, position in zip(message.name, message.position, strict=False):
+                self._positions[name], self._arrivals[name] = position, now
+            self._stamp = max(self._stamp, message.header.stamp)
+            self._changed.notify_all()

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes the process a ROS node if the script has not done so, under the names scripts of MoveIt call."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import rospy
+
+NODE_NAME = "move_group_commander_wrappers"
+
+
+class _Node:
+    """What this library added to the process: perhaps the node itself, and connections to close."""
+
+    def __init__(self) -> None:
+        self._arguments: list[str] | None = None
+        self._ours = False
+        self._closers: list[Callable[[], None]] = []
+
+    def remember(self, arguments: Sequence[str]) -> None:
+        self._arguments = [argument for argument in arguments if not argument.startswith("__name:=")]
+
+    def ensure(self) -> None:
+        """Initialises a node, unless the script has its own already."""
+        if not rospy.core.is_initialized():
+            rospy.init_node(NODE_NAME, argv=self._arguments, anonymous=True, disable_signals=True)
+            self._ours = True
+
+    def on_shutdown(self, close: Callable[[], None]) -> None:
+        self._closers.append(close)
+
+    def close(self) -> None:
+        while self._closers:
+            self._closers.pop()()
+        if self._ours and not rospy.is_shutdown():
+            rospy.signal_shutdown("roscpp_shutdown was called")
+
+
+_node = _Node()
+ensure_node = _node.ensure
+on_shutdown = _node.on_shutdown
+
+
+def roscpp_initialize(args: Sequence[str]) -> None:
+    """Keeps the command line for the node; a script may call rospy.init_node before or after.
+
+    The node is made when the first interface is built, if the script has not called rospy.init_node by then.
+    """
+    _node.remember(args)
+
+
+def roscpp_shutdown() -> None:
+    """Closes the connections of this library; ends the node only if this library has made it. May be called twice."""
+    _node.close()

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Speaks to move_group: services and actions under a namespace; each wait is bounded and names what it is for."""
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import actionlib
+import rospy
+from rosgraph.names import ns_join
+
+from moveit_commander.exception import ServerError
+
+SERVICE_TIMEOUT_S = 5.0
+ACTION_TIMEOUT_S = 5.0
+POLL_PERIOD_S = 0.02
+SERVER_LOST_S = 5.0  # an action server that nobody advertises for so long has gone
+
+
+class Servers:
+    """The endpoints of one move_group node."""
+
+    def __init__(self, ns: str = "") -> None:
+        """Args: ns: namespace of the move_group node's endpoints; "" for that of this node."""
+        self._ns = ns
+        self._actions: dict[str, ActionCaller] = {}
+
+    def resolve(self, name: str) -> str:
+        """The full name of an endpoint."""
+        return str(rospy.resolve_name(ns_join(self._ns, name)))
+
+    def call(self, name: str, kind: Any, request: Any, timeout_s: float = SERVICE_TIMEOUT_S) -> Any:
+        """Calls a service.
+
+        Raises:
+            ServerError: nobody offers it within the time, or the call fails.
+        """
+        full_name = self.resolve(name)
+        try:
+            rospy.wait_for_service(full_name, timeout_s)
+            return rospy.ServiceProxy(full_name, kind)(request)
+        except rospy.ROSException as error:
+            raise ServerError(f"service {full_name}: waited {timeout_s:g} s, nobody offers it ({error}); does "
+                              "move_group run, and does it have this capability?") from error
+        except rospy.ServiceException as error:
+            raise ServerError(f"service {full_name} failed: {error}; move_group's log says why") from error
+
+    def action(self, name: str, kind: Any, timeout_s: float = ACTION_TIMEOUT_S) -> ActionCaller:
+        """Answers the caller of an action, connected.
+
+        Raises:
+            ServerError: no server within the time; 0 waits for ever, as in MoveIt.
+        """
+        if name not in self._actions:
+            self._actions[name] = ActionCaller(self.resolve(name), kind)
+        self._actions[name].connect(timeout_s)
+        return self._actions[name]
+
+
+class ActionCaller:
+    """Sends goals to one action server and waits for results by the wall clock: halted simulated time is no trap."""
+
+    def __init__(self, name: str, kind: Any) -> None:
+        self.name = name
+        self._client = actionlib.SimpleActionClient(name, kind)
+
+    def connect(self, timeout_s: float) -> None:
+        """Waits for the server; 0 waits for ever. Raises ServerError."""
+        begun = time.monotonic()
+        while not self._connected():
+            if rospy.is_shutdown() or 0.0 < timeout_s <= time.monotonic() - begun:
+                raise ServerError(f"action {self.name}: Unable to connect to its server within allotted time "
+                                  f"({timeout_s:g}s); does move_group run, and does it have this capability?")
+            time.sleep(POLL_PERIOD_S)
+
+    def send(self, goal: Any) -> None:
+        """Sends a goal and does not wait; the goal before it is no longer listened to."""
+        self._client.send_goal(goal)
+
+    def run(self, goal: Any, timeout_s: float) -> Any:
+        """Sends a goal and answers its result.
+
+        Raises:
+            ServerError: no result within the time (the goal is cancelled), or the server has gone.
+        """
+        done = threading.Event()
+        self._client.send_goal(goal, done_cb=lambda _status, _result: done.set())
+        begun = seen = time.monotonic()
+        while not done.wait(POLL_PERIOD_S):
+            now = time.monotonic()
+            seen = now if self._connected() else seen
+            if rospy.is_shutdown():
+                raise ServerError(f"action {self.name}: this node is shut down before the result came")
+            if now - begun > timeout_s:
+                self._client.cancel_goal()
+                raise ServerError(f"action {self.name}: no result within {timeout_s:g} s; the goal is cancelled")
+            if now - seen > SERVER_LOST_S:
+                raise ServerError(f"action {self.name}: its server has gone for {SERVER_LOST_S:g} s; has it died?")
+        result = self._client.get_result()
+        if result is None:
+            raise ServerError(f"action {self.name}: ended without a result ({self._client.get_goal_status_text()}); "
+                              "move_group's log says why")
+        return result
+
+    def _connected(self) -> bool:
+        """Whether goals, cancels and results have a way; asked without rospy's clock, which may stand still."""
+        wires = self._client.action_client
+        ends = (wires.pub_goal, wires.pub_cancel, wires.result_sub, wires.feedback_sub)
+        return wires.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)

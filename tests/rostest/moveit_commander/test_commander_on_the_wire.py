@@ -1,0 +1,447 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every method of moveit_commander, against a running move_group with a controlled (mock) robot."""
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import moveit_commander
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from moveit_commander import MoveGroupCommander, MoveItCommanderException, RobotCommander
+from moveit_msgs.msg import (
+    Constraints,
+    MoveItErrorCodes,
+    RobotTrajectory,
+    TrajectoryConstraints,
+)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+START = {"shoulder_pan_joint": 1.57, "shoulder_lift_joint": -1.57, "elbow_joint": 1.2, "wrist_1_joint": -1.2,
+         "wrist_2_joint": -1.57, "wrist_3_joint": 0.0}
+FINGER = "ezgripper_knuckle_palm_L1_1"
+PALM = "ezgripper_palm_link"
+LAUNCH = f"""<launch>
+  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
+    <arg name="load_robot_description" value="true"/>
+  </include>
+  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
+    <rosparam>
+      joints: [{", ".join(START)}, {FINGER}]
+      initial_positions: {START}
+    </rosparam>
+  </node>
+  <node pkg="modular_framework_core" type="robot_controllers_spawner" name="spawner" output="screen"
+        args="ur5_ezgripper_robot ur5_ezgripper_controller_simulation.yaml"/>
+</launch>"""
+DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
+GOAL = Pose(Point(0.1, 0.5, 0.95), DOWN)
+NEAR = [1.5, -1.5, 1.3, -1.3, -1.5, 0.1]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def session(ros_launch: Callable[..., Any]) -> Iterator[Any]:
+    session = ros_launch(LAUNCH)
+    session.wait_for_service("plan_kinematic_path", 60.0)
+    moveit_commander.roscpp_initialize(["test", "__name:=ignored"])
+    yield session
+    assert session.alive(), session.log()
+    moveit_commander.roscpp_shutdown()
+
+
+@pytest.fixture(scope="module")
+def robot(session: Any) -> RobotCommander:
+    robot = RobotCommander()
+    until(lambda: len(rospy.wait_for_message("joint_states", JointState, 30.0).name) >= 7, 30.0)
+    return robot
+
+
+@pytest.fixture(scope="module")
+def arm(robot: RobotCommander) -> MoveGroupCommander:
+    arm = MoveGroupCommander("arm_and_manipulator", wait_for_servers=30.0)
+    arm.set_max_velocity_scaling_factor(1.0)
+    arm.set_max_acceleration_scaling_factor(1.0)
+    return arm
+
+
+def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"not so within {timeout_s} s"
+        time.sleep(0.02)
+
+
+def stamped(x: float, y: float, z: float, frame: str = "world") -> PoseStamped:
+    return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), Quaternion(0, 0, 0, 1)))
+
+
+def place_of(pose: PoseStamped) -> list[float]:
+    return moveit_commander.conversions.pose_to_list(pose.pose)
+
+
+def is_at(arm: MoveGroupCommander, values: Any) -> bool:
+    return np.allclose(arm.get_current_joint_values(), values, atol=2e-3)
+
+
+# ---------------------------------------------------------------- RobotCommander
+def test_the_robot_is_described(robot: RobotCommander) -> None:
+    assert robot.get_planning_frame() == robot.get_root_link() == "world"
+    assert robot.get_robot_name() == "ur5_with_ezgripper"
+    assert {"arm", "arm_and_manipulator", "ezgripper"} <= set(robot.get_group_names())
+    assert robot.has_group("arm") and not robot.has_group("leg")
+    assert robot.get_active_joint_names() == [*START, FINGER]
+    assert robot.get_active_joint_names("arm") == list(START)
+    assert set(robot.get_active_joint_names()) < set(robot.get_joint_names())
+    assert set(START) < set(robot.get_joint_names("arm_and_manipulator"))
+    assert "forearm_link" in robot.get_link_names() and "forearm_link" not in robot.get_link_names("ezgripper")
+    assert robot.get_default_owner_group("elbow_joint") == "arm"
+    assert robot.get_default_owner_group("no_such_joint") is None
+    for ask in (robot.get_active_joint_names, robot.get_joint_names, robot.get_link_names, robot.get_group):
+        with pytest.raises(MoveItCommanderException, match="There is no group named"):
+            ask("leg")
+
+
+def test_the_robot_knows_its_state(robot: RobotCommander) -> None:
+    state = robot.get_current_state().joint_state
+    known = dict(zip(state.name, state.position, strict=True))
+    assert {name: known[name] for name in START} == pytest.approx(START, abs=1e-6)
+    values = robot.get_current_variable_values()
+    assert values == pytest.approx(known, abs=1e-6)
+    assert values["ezgripper_knuckle_palm_L1_2"] == pytest.approx(values[FINGER]), "mimic joints follow"
+
+
+def test_joints_and_links_answer_for_themselves(robot: RobotCommander) -> None:
+    joint = robot.get_joint("elbow_joint")
+    assert joint.name() == "elbow_joint" and joint.variable_count() == 1
+    assert joint.bounds() == [joint.min_bound(), joint.max_bound()] and joint.min_bound() < 0.0 < joint.max_bound()
+    assert joint.value() == pytest.approx(START["elbow_joint"])
+    assert robot.world_joint.bounds() == robot.world_joint.value() == [] and robot.world_joint.variable_count() == 0
+    link = robot.get_link("base_link")
+    assert link.name() == "base_link" and link.pose().header.frame_id == "world"
+    assert place_of(link.pose())[:3] == pytest.approx([0.0, 0.0, 0.86], abs=1e-6)
+    assert robot.elbow_joint.name() == "elbow_joint" and robot.base_link.name() == "base_link"
+    assert robot.arm is robot.get_group("arm") and robot.arm.get_name() == "arm"
+    for ask in (robot.get_joint, robot.get_link):
+        with pytest.raises(MoveItCommanderException, match="nobody"):
+            ask("nobody")
+    with pytest.raises(AttributeError, match="nobody"):
+        _ = robot.nobody
+
+
+def test_markers_show_the_robot(robot: RobotCommander) -> None:
+    links = {marker.ns for marker in robot.get_robot_markers().markers}
+    assert {"forearm_link", "upper_arm_link"} <= links
+    turned = robot.get_robot_markers({"shoulder_pan_joint": 0.0}, ["forearm_link"]).markers
+    now = robot.get_robot_markers(robot.get_current_state()).markers
+    here = next(marker for marker in now if marker.ns == "forearm_link")
+    assert {marker.ns for marker in turned} == {"forearm_link"} and turned[0].pose != here.pose
+    assert {marker.ns for marker in robot.get_robot_markers("ezgripper").markers} <= links
+    assert robot.get_robot_markers("arm", {"elbow_joint": 0.0}).markers
+    assert robot.get_robot_markers({"elbow_joint": 0.0}).markers
+    with pytest.raises(MoveItCommanderException, match="Unexpected type"):
+        robot.get_robot_markers(3.0)
+
+
+# ---------------------------------------------------------------- MoveGroupCommander: what it knows
+def test_the_group_is_described(arm: MoveGroupCommander) -> None:
+    assert arm.get_name() == "arm_and_manipulator" and arm.get_planning_frame() == "world"
+    assert arm.get_active_joints() == list(START) and set(START) < set(arm.get_joints())
+    assert arm.get_variable_count() == 6
+    assert arm.has_end_effector_link() and arm.get_end_effector_link() == "eg_manipulator"
+    arm.set_end_effector_link("tool0")
+    assert arm.get_end_effector_link() == "tool0"
+    arm.set_end_effector_link("eg_manipulator")
+    with pytest.raises(MoveItCommanderException, match="Unable to set end effector link"):
+        arm.set_end_effector_link("nobody")
+    assert arm.get_pose_reference_frame() == "world"
+    arm.set_pose_reference_frame("base_link")
+    assert arm.get_pose_reference_frame() == "base_link"
+    arm.set_pose_reference_frame("world")
+    assert "RRTConnect" in arm.get_interface_description().planner_ids
+
+
+def test_a_group_without_a_tip_needs_a_link(robot: RobotCommander) -> None:
+    gripper = robot.get_group("ezgripper")
+    assert not gripper.has_end_effector_link() and gripper.get_variable_count() == 4
+    assert len(gripper.get_current_joint_values()) == 4
+    for ask in (gripper.get_current_pose, gripper.get_current_rpy, gripper.get_random_pose):
+        with pytest.raises(MoveItCommanderException, match="There is no end effector"):
+            ask()
+    assert gripper.get_current_pose(PALM).header.frame_id == "world"
+
+
+def test_an_unknown_group_or_description_is_a_runtime_error_too() -> None:
+    with pytest.raises(RuntimeError, match="There is no group named 'leg'"):
+        MoveGroupCommander("leg")
+    with pytest.raises(RuntimeError, match="nowhere"):
+        RobotCommander("nowhere")
+    with pytest.raises(RuntimeError, match="/elsewhere/move_group.*Unable to connect"):
+        MoveGroupCommander("arm", ns="elsewhere", wait_for_servers=0.2)
+
+
+def test_the_current_pose_is_known(arm: MoveGroupCommander) -> None:
+    pose = arm.get_current_pose()
+    assert pose.header.frame_id == "world" and pose.pose.position.z > 0.86
+    turn = moveit_commander.conversions.quaternion_from_rpy(*arm.get_current_rpy())
+    assert abs(np.dot(turn, place_of(pose)[3:])) == pytest.approx(1.0, abs=1e-6)
+    assert place_of(arm.get_current_pose("base_link"))[:3] == pytest.approx([0.0, 0.0, 0.86], abs=1e-6)
+    state = arm.get_current_state()
+    assert arm.get_current_state_bounded().joint_state.name == state.joint_state.name
+    state.joint_state.position = [100.0] * len(state.joint_state.name)
+    assert max(arm.enforce_bounds(state).joint_state.position) < 10.0
+
+
+def test_random_values_keep_the_bounds(arm: MoveGroupCommander, robot: RobotCommander) -> None:
+    for _ in range(20):
+        for name, value in zip(arm.get_active_joints(), arm.get_random_joint_values(), strict=True):
+            low, high = robot.get_joint(name).bounds()
+            assert low <= value <= high
+    assert arm.get_random_pose() != arm.get_random_pose()
+    arm.set_random_target()
+    first = arm.get_joint_value_target()
+    arm.set_random_target()
+    assert arm.get_joint_value_target() != first
+
+
+def test_the_jacobian_is_the_slope_of_forward_kinematics(arm: MoveGroupCommander) -> None:
+    step, values = 1e-4, list(START.values())
+    jacobian = np.array(arm.get_jacobian_matrix(values))
+    assert jacobian.shape == (6, 6) and np.array(arm.get_jacobian_matrix(values, [0.0, 0.0, 0.1])).shape == (6, 6)
+    for column, name in enumerate(START):
+        ends = []
+        for shift in (-step, step):
+            state = arm.get_current_state()
+            state.joint_state.position = [value + shift * (key == name) for key, value in
+                                          zip(state.joint_state.name, state.joint_state.position, strict=True)]
+            ends.append(place_of(arm._pose_of("", state))[:3])
+        slope = (np.array(ends[1]) - ends[0]) / (2.0 * step)
+        assert np.allclose(slope, jacobian[:3, column], atol=1e-4), name
+
+
+# ---------------------------------------------------------------- MoveGroupCommander: settings
+def test_settings_are_in_the_request(arm: MoveGroupCommander) -> None:
+    other = MoveGroupCommander("arm_and_manipulator")
+    assert other.get_goal_tolerance() == (1e-4, 1e-4, 1e-3)
+    other.set_goal_tolerance(0.02)
+    assert other.get_goal_tolerance() == (0.02, 0.02, 0.02)
+    other.set_goal_joint_tolerance(0.001)
+    other.set_goal_position_tolerance(0.002)
+    other.set_goal_orientation_tolerance(0.003)
+    assert (other.get_goal_joint_tolerance(), other.get_goal_position_tolerance(),
+            other.get_goal_orientation_tolerance()) == (0.001, 0.002, 0.003)
+    other.set_planning_time(3.0)
+    other.set_planning_time(-1.0)
+    assert other.get_planning_time() == 3.0
+    other.set_planning_pipeline_id("ompl")
+    other.set_planner_id("RRTstar")
+    assert (other.get_planning_pipeline_id(), other.get_planner_id()) == ("ompl", "RRTstar")
+    other.set_num_planning_attempts(4)
+    other.set_max_velocity_scaling_factor(0.5)
+    other.set_max_acceleration_scaling_factor(0.25)
+    other.limit_max_cartesian_link_speed(0.2)
+    other.set_workspace([-1.0, -2.0, 1.0, 2.0])
+    other.set_path_constraints(Constraints(name="path"))
+    other.set_trajectory_constraints(TrajectoryConstraints([Constraints(name="way")]))
+    other.set_start_state(other.get_current_state())
+    other.allow_looking(False)
+    other.allow_replanning(True)
+    other.set_support_surface_name("table")
+    request = other.construct_motion_plan_request()
+    assert (request.group_name, request.pipeline_id, request.planner_id, request.num_planning_attempts,
+            request.allowed_planning_time) == ("arm_and_manipulator", "ompl", "RRTstar", 4, 3.0)
+    assert (request.max_velocity_scaling_factor, request.max_acceleration_scaling_factor,
+            request.max_cartesian_speed, request.cartesian_speed_limited_link) == (0.5, 0.25, 0.2, "eg_manipulator")
+    assert (request.workspace_parameters.min_corner.y, request.workspace_parameters.max_corner.x) == (-2.0, 1.0)
+    assert request.goal_constraints[0].joint_constraints[0].tolerance_above == 0.001
+    assert request.path_constraints.name == other.get_path_constraints().name == "path"
+    assert other.get_trajectory_constraints() == request.trajectory_constraints
+    assert request.start_state.joint_state.name
+    other.set_path_constraints(None)
+    other.set_trajectory_constraints(None)
+    other.clear_path_constraints()
+    other.clear_trajectory_constraints()
+    other.clear_max_cartesian_link_speed()
+    other.set_workspace([])
+    other.set_start_state_to_current_state()
+    request = other.construct_motion_plan_request()
+    assert request.start_state.is_diff and not request.start_state.joint_state.name
+    assert request.path_constraints == Constraints() and request.max_cartesian_speed == 0.0
+    assert other.get_known_constraints() == []
+
+
+def test_settings_out_of_range_are_refused(arm: MoveGroupCommander) -> None:
+    for wrong in (0.0, -0.1, 1.1, math.nan):
+        for setter in (arm.set_max_velocity_scaling_factor, arm.set_max_acceleration_scaling_factor):
+            with pytest.raises(MoveItCommanderException, match="Expected value in the range from 0 to 1"):
+                setter(wrong)
+    for setter, wrong in ((arm.limit_max_cartesian_link_speed, 0.0), (arm.set_workspace, [1.0]),
+                          (arm.set_path_constraints, "upright"), (arm.set_trajectory_constraints, "upright")):
+        with pytest.raises(MoveItCommanderException):
+            setter(wrong)
+    with pytest.raises(MoveItCommanderException, match="database"):
+        arm.set_constraints_database("localhost", 33829)
+
+
+# ---------------------------------------------------------------- MoveGroupCommander: targets
+def test_joint_targets_have_many_forms(arm: MoveGroupCommander) -> None:
+    arm.set_joint_value_target(NEAR)
+    assert arm.get_joint_value_target() == NEAR
+    arm.set_joint_value_target({"elbow_joint": 1.0})
+    arm.set_joint_value_target("wrist_3_joint", 0.5)
+    arm.set_joint_value_target("wrist_2_joint", [-1.0])
+    arm.set_joint_value_target(JointState(name=["wrist_1_joint"], position=[-0.9]))
+    assert arm.get_joint_value_target() == [1.5, -1.5, 1.0, -0.9, -1.0, 0.5]
+    for arguments in (([1.0],), ({"nobody": 1.0},), ("elbow_joint",), ("elbow_joint", 100.0), ("elbow_joint", [1, 2]),
+                      ("elbow_joint", 1.0, 2.0), (NEAR, 1.0), (3.5,), (GOAL, 3.5), ([math.nan] * 6,),
+                      (JointState(name=["elbow_joint"]),), (stamped(0.0, 5.0, 0.0),), (stamped(0.0, 5.0, 0.0), True)):
+        with pytest.raises(MoveItCommanderException):
+            arm.set_joint_value_target(*arguments)
+    assert arm.get_joint_value_target() == [1.5, -1.5, 1.0, -0.9, -1.0, 0.5], "a refused target changes nothing"
+
+
+def test_a_pose_becomes_joint_values(arm: MoveGroupCommander) -> None:
+    for arguments in ((GOAL,), (PoseStamped(Header(frame_id="world"), GOAL), "eg_manipulator", True)):
+        arm.set_joint_value_target(*arguments)
+        values = arm.get_joint_value_target()
+        state = arm.get_current_state()
+        found = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
+        found.update(zip(arm.get_active_joints(), values, strict=True))
+        state.joint_state.name, state.joint_state.position = list(found), list(found.values())
+        assert place_of(arm._pose_of("", state))[:3] == pytest.approx([0.1, 0.5, 0.95], abs=1e-4)
+
+
+def test_named_and_remembered_targets(arm: MoveGroupCommander) -> None:
+    assert {"initial_pose", "stability_pose"} <= set(arm.get_named_targets())
+    values = arm.get_named_target_values("stability_pose")
+    arm.set_named_target("stability_pose")
+    assert dict(zip(START, arm.get_joint_value_target(), strict=True)) == pytest.approx(values)
+    arm.remember_joint_values("near", NEAR)
+    arm.remember_joint_values("here")
+    assert arm.get_remembered_joint_values()["near"] == NEAR
+    assert arm.get_remembered_joint_values()["here"] == pytest.approx(list(START.values()), abs=1e-6)
+    arm.set_named_target("near")
+    assert arm.get_joint_value_target() == NEAR
+    arm.forget_joint_values("near")
+    with pytest.raises(MoveItCommanderException, match="Unable to set target near"):
+        arm.set_named_target("near")
+
+
+def test_pose_targets_are_constraints(arm: MoveGroupCommander) -> None:
+    def goals() -> Any:
+        return arm.construct_motion_plan_request().goal_constraints
+
+    arm.set_pose_target(PoseStamped(Header(frame_id="base_link"), GOAL))
+    assert goals()[0].position_constraints[0].header.frame_id == "base_link"
+    arm.set_pose_target([0.1, 0.5, 0.95, math.pi, 0.0, 0.0], "tool0")
+    assert {item.link_name for item in goals()[0].position_constraints} == {"eg_manipulator", "tool0"}
+    arm.clear_pose_target("tool0")
+    arm.set_pose_targets([GOAL, [0.0, 0.5, 0.95, 1.0, 0.0, 0.0, 0.0]])
+    assert [goal.position_constraints[0].link_name for goal in goals()] == ["eg_manipulator"] * 2
+    arm.set_position_target([0.1, 0.5, 0.95])
+    assert goals()[0].position_constraints and not goals()[0].orientation_constraints
+    for setter, value in ((arm.set_orientation_target, [1.0, 0.0, 0.0, 0.0]), (arm.set_rpy_target, [math.pi, 0, 0])):
+        setter(value)
+        assert not goals()[0].position_constraints
+        assert abs(goals()[0].orientation_constraints[0].orientation.x) == pytest.approx(1.0)
+    arm.shift_pose_target(2, 0.05)
+    lifted = goals()[0].position_constraints[0].constraint_region.primitive_poses[0].position
+    assert lifted.z == pytest.approx(arm.get_current_pose().pose.position.z + 0.05, abs=1e-5)
+    arm.shift_pose_target(5, 0.1)
+    for setter, value in ((arm.set_orientation_target, [1.0]), (arm.set_rpy_target, [1.0]), (arm.set_pose_target, [1]),
+                          (arm.set_position_target, [1.0]), (arm.set_pose_targets, [])):
+        with pytest.raises(MoveItCommanderException):
+            setter(value)
+    with pytest.raises(MoveItCommanderException, match="An axis value between 0 and 5"):
+        arm.shift_pose_target(6, 0.1)
+    arm.clear_pose_targets()
+    assert goals() == []
+
+
+# ---------------------------------------------------------------- MoveGroupCommander: plan and move
+def test_a_plan_is_a_tuple_of_four_and_can_be_executed(arm: MoveGroupCommander) -> None:
+    success, trajectory, planning_time, code = arm.plan(NEAR)
+    assert success is True and isinstance(trajectory, RobotTrajectory) and code.val == MoveItErrorCodes.SUCCESS
+    assert planning_time > 0.0
+    assert trajectory.joint_trajectory.points[-1].positions == pytest.approx(NEAR, abs=1e-3)
+    slow = arm.retime_trajectory(arm.get_current_state(), trajectory, 0.5, 0.5)
+    ends = [item.joint_trajectory.points[-1].time_from_start.to_sec() for item in (trajectory, slow)]
+    assert ends[1] > ends[0] and slow.joint_trajectory.points[-1].positions == pytest.approx(NEAR, abs=1e-3)
+    with pytest.raises(MoveItCommanderException, match="unknown time parameterization"):
+        arm.retime_trajectory(arm.get_current_state(), trajectory, algorithm="magic")
+    assert arm.execute(trajectory) is True
+    assert is_at(arm, NEAR)
+    with pytest.raises(MoveItCommanderException, match="second item"):
+        arm.execute((success, trajectory))
+
+
+def test_go_takes_every_kind_of_target(arm: MoveGroupCommander) -> None:
+    assert arm.go(GOAL, wait=True) is True
+    assert place_of(arm.get_current_pose())[:3] == pytest.approx([0.1, 0.5, 0.95], abs=2e-3)
+    assert arm.go(JointState(name=list(START), position=NEAR)) and is_at(arm, NEAR)
+    assert arm.go("here") and is_at(arm, list(START.values()))
+    arm.set_joint_value_target(NEAR)
+    assert arm.go() and is_at(arm, NEAR)
+    assert arm.go(list(START.values()), wait=False) is True
+    until(lambda: is_at(arm, list(START.values())), 15.0)
+    assert arm.plan("here")[0] and arm.plan(GOAL)[0]
+
+
+def test_a_motion_can_be_stopped_and_not_waited_for(arm: MoveGroupCommander) -> None:
+    arm.set_max_velocity_scaling_factor(0.1)
+    slow = arm.plan([0.5, *NEAR[1:]])[1]
+    arm.set_max_velocity_scaling_factor(1.0)
+    assert arm.execute(slow.joint_trajectory, wait=False) is True
+    until(lambda: arm.get_current_joint_values()[0] < 1.55)
+    arm.stop()
+    time.sleep(0.9)  # the controller's ramp to rest takes half a second
+    first = arm.get_current_joint_values()
+    time.sleep(0.2)
+    assert arm.get_current_joint_values() == pytest.approx(first, abs=1e-4) and first[0] > 0.6
+    assert arm.go("here")
+
+
+def test_a_plan_that_fails_says_so(arm: MoveGroupCommander) -> None:
+    success, trajectory, _, code = arm.plan(Pose(Point(0.0, 3.0, 1.0), DOWN))
+    assert success is False and code.val != MoveItErrorCodes.SUCCESS and not trajectory.joint_trajectory.points
+    assert arm.go(Pose(Point(0.0, 3.0, 1.0), DOWN)) is False
+    lost = RobotTrajectory()
+    lost.joint_trajectory.joint_names = ["no_such_joint"]
+    lost.joint_trajectory.points = [JointTrajectoryPoint(positions=[0.0], time_from_start=rospy.Duration(1))]
+    assert arm.execute(lost) is False
+    arm.clear_pose_targets()
+
+
+def test_one_joint_moves_alone(robot: RobotCommander) -> None:
+    assert robot.elbow_joint.move(1.25) is True
+    assert robot.elbow_joint.value() == pytest.approx(1.25, abs=2e-3)
+    assert robot.shoulder_pan_joint.value() == pytest.approx(START["shoulder_pan_joint"], abs=2e-3)
+    with pytest.raises(MoveItCommanderException, match="no known group"):
+        robot.world_joint.move(0.0)
+    assert robot.elbow_joint.move(START["elbow_joint"])
+
+
+def test_a_straight_line_is_followed_or_the_missing_service_named(arm: MoveGroupCommander) -> None:
+    try:
+        rospy.wait_for_service("compute_cartesian_path", 0.2)
+        offered = True
+    except rospy.ROSException:
+        offered = False
+    pose = arm.get_current_pose().pose
+    pose.position.z += 0.02
+    if offered:
+        for options in ((), (0.0,), (0.0, True), (True,), (True, Constraints())):
+            path, fraction = arm.compute_cartesian_path([pose], 0.01, *options)
+            assert fraction == pytest.approx(1.0) and path.joint_trajectory.points
+    else:
+        with pytest.raises(MoveItCommanderException, match="service /compute_cartesian_path.*nobody offers it"):
+            arm.compute_cartesian_path([pose], 0.01, avoid_collisions=True)
+    with pytest.raises(TypeError, match="allowed"):
+        arm.compute_cartesian_path([pose], 0.01, 0.0, True, None, 1)
+    with pytest.raises(MoveItCommanderException, match="constraint type"):
+        arm.compute_cartesian_path([pose], 0.01, path_constraints="upright")

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The planning scene through moveit_commander: objects come and go, are attached, picked and placed."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from moveit_commander import (
+    MoveGroupCommander,
+    MoveItCommanderException,
+    PlanningSceneInterface,
+    roscpp_initialize,
+    roscpp_shutdown,
+)
+from moveit_msgs.msg import (
+    AllowedCollisionMatrix,
+    AttachedCollisionObject,
+    Grasp,
+    PlaceLocation,
+    PlanningScene,
+    PlanningSceneComponents,
+)
+from std_msgs.msg import Header
+
+LAUNCH = """<launch>
+  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
+    <arg name="load_robot_description" value="true"/>
+  </include>
+</launch>"""
+PALM = "ezgripper_palm_link"
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+
+
+@pytest.fixture(scope="module")
+def scene(ros_launch: Callable[..., Any]) -> Iterator[PlanningSceneInterface]:
+    session = ros_launch(LAUNCH)
+    session.wait_for_service("apply_planning_scene", 60.0)
+    roscpp_initialize([])
+    yield PlanningSceneInterface()
+    assert session.alive(), session.log()
+    roscpp_shutdown()
+
+
+@pytest.fixture(scope="module")
+def arm(scene: PlanningSceneInterface) -> MoveGroupCommander:
+    return MoveGroupCommander("arm_and_manipulator", wait_for_servers=30.0)
+
+
+@pytest.fixture(autouse=True)
+def empty(scene: PlanningSceneInterface) -> None:
+    scene.clear()
+    assert scene.get_known_object_names() == [] and scene.get_attached_objects() == {}
+
+
+def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"not so within {timeout_s} s"
+        time.sleep(0.02)
+
+
+def at(x: float, y: float, z: float, frame: str = "world") -> PoseStamped:
+    return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), Quaternion(0, 0, 0, 1)))
+
+
+@pytest.fixture
+def mesh_file(tmp_path: Path) -> str:
+    path = tmp_path / "tetrahedron.obj"
+    path.write_text(TETRAHEDRON)
+    return str(path)
+
+
+def test_every_kind_of_object_can_be_added(scene: PlanningSceneInterface, mesh_file: str) -> None:
+    scene.add_box("box", at(0.5, 0.5, 1.0), (0.1, 0.2, 0.3))
+    scene.add_sphere("sphere", at(0.5, -0.5, 1.0), 0.05)
+    scene.add_cylinder("cylinder", at(-0.5, 0.5, 1.0), 0.2, 0.05)
+    scene.add_mesh("mesh", at(-0.5, -0.5, 1.0), mesh_file, (0.1, 0.1, 0.2))
+    scene.add_cone("cone", at(0.0, 0.9, 1.0), 0.2, 0.05)
+    scene.add_plane("plane", at(0.0, 0.0, -1.0))
+    scene.add_object(scene.make_sphere("second", at(1.0, 1.0, 1.0), 0.1))
+    names = {"box", "sphere", "cylinder", "mesh", "cone", "plane", "second"}
+    assert set(scene.get_known_object_names()) == names
+    assert scene.get_known_object_names(with_type=True) == []
+    objects = scene.get_objects()
+    assert set(objects) == names and list(objects["box"].primitives[0].dimensions) == [0.1, 0.2, 0.3]
+    assert len(objects["mesh"].meshes[0].triangles) == 4
+    assert max(vertex.z for vertex in objects["mesh"].meshes[0].vertices) == pytest.approx(0.2)
+    assert set(scene.get_objects(["box", "nobody"])) == {"box"}
+    assert set(scene.get_known_object_names_in_roi(0.0, -1.0, 0.9, 0.6, 0.6, 1.1)) == {"box", "sphere"}
+    pose = scene.get_object_poses(["box", "nobody"])
+    assert set(pose) == {"box"} and pose["box"].position.x == pytest.approx(0.5)
+    scene.remove_world_object("box")
+    assert set(scene.get_known_object_names()) == names - {"box"}
+    scene.remove_world_object()
+    assert scene.get_known_object_names() == []
+
+
+def test_objects_are_attached_and_detached(scene: PlanningSceneInterface, mesh_file: str) -> None:
+    scene.add_box("block", at(0.3, 0.5, 0.9), (0.04, 0.04, 0.08))
+    scene.attach_box(PALM, "block", touch_links=[PALM, "eg_manipulator"])
+    assert scene.get_known_object_names() == []
+    held = scene.get_attached_objects()["block"]
+    assert held.link_name == PALM and set(held.touch_links) == {PALM, "eg_manipulator"}
+    scene.attach_box(PALM, "box", at(0.0, 0.0, 0.1, PALM), (0.02, 0.02, 0.02))
+    scene.attach_sphere(PALM, "sphere", at(0.0, 0.0, 0.1, PALM), 0.01)
+    scene.attach_cylinder(PALM, "cylinder", at(0.0, 0.0, 0.1, PALM), 0.02, 0.01)
+    scene.attach_mesh("tool0", "mesh", at(0.0, 0.0, 0.1, PALM), mesh_file, (0.01, 0.01, 0.01))
+    scene.add_sphere("ball", at(0.5, 0.5, 1.5), 0.1)
+    scene.attach_object("ball", PALM)
+    thing = AttachedCollisionObject(link_name="tool0", object=scene.make_box("thing", at(0, 0, 0, PALM), (.1, .1, .1)))
+    scene.attach_object(thing)
+    names = {"block", "box", "sphere", "cylinder", "mesh", "ball", "thing"}
+    assert set(scene.get_attached_objects()) == names
+    assert set(scene.get_attached_objects(["ball"])) == {"ball"}
+    scene.remove_attached_object(PALM, "ball")
+    assert scene.get_known_object_names() == ["ball"], "a detached object stays in the scene"
+    scene.remove_attached_object("tool0")
+    assert set(scene.get_attached_objects()) == names - {"ball", "mesh", "thing"}
+    scene.remove_attached_object()
+    assert set(scene.get_known_object_names()) == names
+    for kind in ("sphere", "cylinder", "mesh"):
+        getattr(scene, f"attach_{kind}")(PALM, kind)
+        assert kind in scene.get_attached_objects()
+
+
+def test_a_refused_change_is_an_error(scene: PlanningSceneInterface, tmp_path: Path) -> None:
+    with pytest.raises(MoveItCommanderException, match="'block' was refused"):
+        scene.add_box("block", at(0.0, 0.0, 1.0, "nowhere"), (1, 1, 1))
+    with pytest.raises(MoveItCommanderException, match="every size must be above 0"):
+        scene.add_box("block", at(0.0, 0.0, 1.0), (1, 0, 1))
+    with pytest.raises(MoveItCommanderException, match="does not exist"):
+        scene.add_mesh("mesh", at(0.0, 0.0, 1.0), str(tmp_path / "absent.stl"))
+    (tmp_path / "broken.stl").write_text("no mesh")
+    with pytest.raises(MoveItCommanderException, match="broken.stl"):
+        scene.add_mesh("mesh", at(0.0, 0.0, 1.0), str(tmp_path / "broken.stl"))
+
+
+def test_scenes_are_read_and_applied_whole(scene: PlanningSceneInterface) -> None:
+    matrix: AllowedCollisionMatrix = scene.get_planning_scene(
+        PlanningSceneComponents.ALLOWED_COLLISION_MATRIX).allowed_collision_matrix
+    matrix.set_allowed("block")
+    matrix.set_allowed("block", "forearm_link", True)
+    change = PlanningScene(is_diff=True, allowed_collision_matrix=matrix)
+    change.world.collision_objects = [scene.make_box("block", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))]
+    assert scene.apply_planning_scene(change) is True
+    again = scene.get_planning_scene(PlanningSceneComponents.ALLOWED_COLLISION_MATRIX).allowed_collision_matrix
+    assert dict(zip(again.default_entry_names, again.default_entry_values, strict=True))["block"]
+    row = again.entry_values[again.entry_names.index("block")]
+    assert row.enabled[again.entry_names.index("forearm_link")]
+    assert scene.get_known_object_names() == ["block"]
+    change.world.collision_objects = [scene.make_box("", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))]
+    assert scene.apply_planning_scene(change) is False
+
+
+def test_an_asynchronous_scene_publishes(scene: PlanningSceneInterface) -> None:
+    quick = PlanningSceneInterface(synchronous=False)
+    until(lambda: quick._objects.get_num_connections() > 0 and quick._attachments.get_num_connections() > 0)
+    quick.add_box("block", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
+    until(lambda: scene.get_known_object_names() == ["block"])
+    quick.attach_object("block", PALM)
+    until(lambda: set(scene.get_attached_objects()) == {"block"})
+
+
+def test_a_group_attaches_and_detaches(scene: PlanningSceneInterface, arm: MoveGroupCommander) -> None:
+    def attached() -> dict[str, str]:
+        return {name: item.link_name for name, item in scene.get_attached_objects().items()}
+
+    for name in ("first", "second"):
+        scene.add_box(name, at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
+    assert arm.attach_object("first") is True
+    until(lambda: attached() == {"first": "eg_manipulator"})
+    assert arm.attach_object("second", PALM, [PALM, "tool0"])
+    until(lambda: attached() == {"first": "eg_manipulator", "second": PALM})
+    assert set(scene.get_attached_objects()["second"].touch_links) == {PALM, "tool0"}
+    assert arm.detach_object("second") is True
+    until(lambda: attached() == {"first": "eg_manipulator"})
+    assert arm.detach_object("eg_manipulator")
+    until(lambda: attached() == {})
+    assert arm.attach_object("first") and arm.detach_object()
+    until(lambda: attached() == {})
+    assert set(scene.get_known_object_names()) == {"first", "second"}
+
+
+def test_pick_and_place_name_what_is_missing(scene: PlanningSceneInterface, arm: MoveGroupCommander) -> None:
+    pose = at(0.3, 0.5, 0.9)
+    for location in (3.0, [3.0]):
+        with pytest.raises(MoveItCommanderException, match="Parameter location must be"):
+            arm.place("block", location)
+    try:
+        arm._servers.action("pickup", _pickup(), 0.5)
+    except MoveItCommanderException as error:
+        assert "action /pickup" in str(error) and "Unable to connect" in str(error)
+        for wrong in (lambda: arm.pick("block", Grasp()), lambda: arm.place("block", pose)):
+            with pytest.raises(MoveItCommanderException, match="Unable to connect"):
+                wrong()
+        return
+    for grasp in (Grasp(), [Grasp()]):
+        assert isinstance(arm.pick("no_such_object", grasp, plan_only=True), int)
+    for location in (None, pose, pose.pose, PlaceLocation(place_pose=pose), [pose], [PlaceLocation(place_pose=pose)]):
+        assert arm.place("no_such_object", location, plan_only=True) is False
+
+
+def _pickup() -> Any:
+    from moveit_msgs.msg import PickupAction
+
+    return PickupAction

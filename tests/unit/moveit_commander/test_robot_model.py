@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot model of moveit_commander, on a small robot written for it."""
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+from moveit_commander.exception import MoveItCommanderException, RobotModelError
+from moveit_commander.robot_model import ASSUMED_ROOT_JOINT, RobotModel, group_values
+
+URDF = """<robot name="tiny">
+  <link name="base"/><link name="one"/><link name="two"/><link name="flange"/><link name="left"/><link name="right"/>
+  <joint name="b_elbow" type="continuous"><parent link="one"/><child link="two"/><axis xyz="0 0 1"/></joint>
+  <joint name="a_shoulder" type="revolute"><parent link="base"/><child link="one"/><origin xyz="0 0 1"/>
+    <limit lower="0.5" upper="1.5" velocity="2" effort="1"/></joint>
+  <joint name="c_mount" type="fixed"><parent link="two"/><child link="flange"/></joint>
+  <joint name="d_left" type="prismatic"><parent link="flange"/><child link="left"/>
+    <limit lower="0" upper="0.04" velocity="1" effort="1"/></joint>
+  <joint name="e_right" type="prismatic"><parent link="flange"/><child link="right"/>
+    <limit lower="0" upper="0.1" velocity="1" effort="1"/><mimic joint="d_left" multiplier="2" offset="0.01"/></joint>
+</robot>"""
+SRDF = """<robot name="tiny">
+  <group name="arm"><chain base_link="base" tip_link="flange"/></group>
+  <group name="hand"><joint name="d_left"/><link name="right"/></group>
+  <group name="all"><group name="arm"/><group name="hand"/></group>
+  <group_state name="up" group="arm">
+    <joint name="a_shoulder" value="1.0"/><joint name="b_elbow" value="0"/></group_state>
+  <end_effector name="gripper" parent_link="flange" group="hand"/>
+  VIRTUAL
+</robot>"""
+
+
+@pytest.fixture
+def model() -> RobotModel:
+    return RobotModel(URDF, SRDF.replace("VIRTUAL", ""), {"b_elbow": {"has_velocity_limits": True, "max_velocity": 3}})
+
+
+def test_joints_come_depth_first_from_the_root(model: RobotModel) -> None:
+    assert list(model.joints) == [ASSUMED_ROOT_JOINT, "a_shoulder", "b_elbow", "c_mount", "d_left", "e_right"]
+    assert model.links == ("base", "one", "two", "flange", "left", "right")
+    assert model.planning_frame == model.root_link == "base"
+
+
+def test_a_virtual_joint_gives_the_planning_frame() -> None:
+    virtual = '<virtual_joint name="floor" type="fixed" parent_frame="map" child_link="base"/>'
+    model = RobotModel(URDF, SRDF.replace("VIRTUAL", virtual))
+    assert model.planning_frame == "map" and next(iter(model.joints)) == "floor"
+
+
+def test_groups_are_chains_links_and_other_groups(model: RobotModel) -> None:
+    arm, hand, both = (model.group(name) for name in ("arm", "hand", "all"))
+    assert arm.is_chain and arm.tip == "flange" and [joint.name for joint in arm.active_joints] == ["a_shoulder",
+                                                                                                    "b_elbow"]
+    assert not hand.is_chain and hand.tip == ""
+    assert [joint.name for joint in hand.variables] == ["d_left", "e_right"]
+    assert [joint.name for joint in hand.active_joints] == ["d_left"]
+    assert both.links == ("one", "two", "flange", "left", "right")
+    assert arm.end_effector == hand.end_effector == "gripper"
+    assert arm.states["up"] == {"a_shoulder": 1.0, "b_elbow": 0.0}
+
+
+def test_limits_come_from_urdf_and_joint_limits(model: RobotModel) -> None:
+    shoulder, elbow = model.joints["a_shoulder"], model.joints["b_elbow"]
+    assert (shoulder.lower, shoulder.upper, shoulder.velocity, shoulder.default) == (0.5, 1.5, 2.0, 1.0)
+    assert (elbow.lower, elbow.upper, elbow.velocity) == (-math.pi, math.pi, 3.0)
+    assert shoulder.admits(1.5) and shoulder.admits(1.6, 0.2) and not shoulder.admits(1.6)
+    assert not shoulder.admits(math.nan) and elbow.admits(7.0)
+    assert shoulder.bounded(9.0) == 1.5 and elbow.bounded(7.0) == pytest.approx(7.0 - 2.0 * math.pi)
+
+
+def test_mimic_joints_follow(model: RobotModel) -> None:
+    values = model.complete({"d_left": 0.02, "stranger": 1.0})
+    assert values == pytest.approx({"d_left": 0.02, "e_right": 0.05})
+    assert model.random_values(model.group("hand"), random.Random(1)).keys() == {"d_left", "e_right"}
+
+
+def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> None:
+    hand = model.group("hand")
+    assert group_values(hand, [0.01, 0.03]) == {"d_left": 0.01, "e_right": 0.03}
+    assert group_values(hand, [0.01]) == {"d_left": 0.01}
+    with pytest.raises(MoveItCommanderException, match="got 3 joint values; 2 are needed"):
+        group_values(hand, [1, 2, 3])
+
+
+@pytest.mark.parametrize(("urdf", "srdf", "words"), [
+    ("no xml", SRDF, "URDF: not an XML document"),
+    (URDF, "no xml", "SRDF: not an XML document"),
+    (URDF.replace('<link name="base"/>', '<link name="base"/><link name="alone"/>'), SRDF, "2 links have no parent"),
+    (URDF.replace('lower="0.5"', 'lower="low"'), SRDF, "joint 'a_shoulder'"),
+    (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),
+    (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "'nowhere' is not a link"),
+    (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="nobody"/></group>'), "'nobody', which is not"),
+    (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="all"/></group>'), "contains itself"),
+])
+def test_faulty_descriptions_are_refused_with_a_reason(urdf: str, srdf: str, words: str) -> None:
+    with pytest.raises(RobotModelError, match=words):
+        RobotModel(urdf, srdf.replace("VIRTUAL", ""))
+
+
+def test_an_unknown_group_is_named_with_those_there_are(model: RobotModel) -> None:
+    with pytest.raises(RuntimeError, match="no group named 'leg'.*all, arm, hand"):
+        model.group("leg")
