@@ -9,7 +9,8 @@ Parameters (used where there is no argument):
     ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
     ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list).
     ``/run_id``: written by roslaunch; tells when the launch began.
-Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched).
+Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched); for viewers
+    those of ``ros_task_introspection``.
 Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
 """
 from __future__ import annotations
@@ -28,6 +29,7 @@ import rospy
 from std_msgs.msg import String
 
 import smach
+from modular_framework_core.ros_task_introspection import shown
 from modular_framework_core.task_constructor import default_folders, generator, loading, pipeline
 from modular_framework_core.task_constructor.faults import TaskFault
 from modular_framework_core.task_record import StateRecord, TaskRecorder
@@ -127,7 +129,7 @@ def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:
         for number in (signal.SIGINT, signal.SIGTERM)
     }
     reporter = TaskReporter(name)
-    run = TaskRun(name, factory, TaskRecorder(reporter.on_state))
+    run = TaskRun(name, shown(name, factory), TaskRecorder(reporter.on_state))
     run.start()
     try:
         _wait(run, asked_by)

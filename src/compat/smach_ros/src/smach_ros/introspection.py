@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rospy
@@ -134,26 +134,27 @@ class IntrospectionServer:
         with self._lock:
             if self._running:
                 return
-            self._running = True
+            if not self._proxies:
+                self.construct(self._server_name, self._state, self._path)
+            self._advertise()
+            self._running = True  # from here on the callbacks of the containers publish
             self._run_number += 1
-        if not self._proxies:
-            self.construct(self._server_name, self._state, self._path)
+            arguments = (self._run_number,)
+        threading.Thread(
+            target=self._publish_loop, args=arguments, name=f"{self._server_name} introspection", daemon=True
+        ).start()
+
+    def _advertise(self) -> None:
         queue = max(MIN_QUEUE, 2 * len(self._proxies))
         listener = _NewSubscriber(self._wake)
+        name = self._server_name
         self._structure_pub = rospy.Publisher(
-            self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, listener, queue_size=queue
+            name + STRUCTURE_TOPIC, SmachContainerStructure, listener, queue_size=queue
         )
-        self._status_pub = rospy.Publisher(
-            self._server_name + STATUS_TOPIC, SmachContainerStatus, listener, queue_size=queue
-        )
+        self._status_pub = rospy.Publisher(name + STATUS_TOPIC, SmachContainerStatus, listener, queue_size=queue)
         self._topics = [self._structure_pub, self._status_pub]
         if self._accept_commands:
-            self._topics.append(
-                rospy.Subscriber(self._server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_command)
-            )
-        threading.Thread(
-            target=self._publish_loop, args=(self._run_number,), name=f"{self._server_name} introspection", daemon=True
-        ).start()
+            self._topics.append(rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_command))
 
     def stop(self) -> None:
         """Withdraw the topics. May be called twice."""
@@ -193,17 +194,18 @@ class IntrospectionServer:
             self._wake.wait(UPDATE_PERIOD_S)
 
     def _publish_structure(self, proxy: ContainerProxy) -> None:
-        if self._running and self._structure_pub.get_num_connections() > 0:
+        if self._running:
             self._send(self._structure_pub, proxy.structure)
 
     def _publish_status(self, proxy: ContainerProxy, info: str) -> None:
-        if self._running and self._status_pub.get_num_connections() > 0:
+        if self._running:
             self._send(self._status_pub, lambda: proxy.status(info))
 
-    def _send(self, publisher: rospy.Publisher, message: Any) -> None:
-        """Make a message and publish it: watching a machine must not disturb it."""
+    def _send(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
+        """Make a message and publish it when somebody listens: watching a machine must not disturb it."""
         try:
-            publisher.publish(message())
+            if publisher.get_num_connections() > 0:
+                publisher.publish(make())
         except Exception as error:
             if self._running and not rospy.is_shutdown():
                 rospy.logwarn_throttle(10.0, f"the state machine could not be shown: {type(error).__name__}: {error}")

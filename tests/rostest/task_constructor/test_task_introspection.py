@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A running task shows its state machine to viewers, and they cannot disturb it."""
+from __future__ import annotations
+
+import base64
+import pickle
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rospy
+from ros_session import RosSession
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from std_msgs.msg import Empty
+
+STAY = """
+import rospy
+from std_msgs.msg import Empty
+
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Stay(FrameworkState):
+    def execute(self, userdata):
+        heard = []
+        subscriber = rospy.Subscriber("/go_on", Empty, heard.append)
+        self.wait_until(lambda: bool(heard), 20.0)
+        subscriber.unregister()
+        return self.succeed() if heard else self.fail("nobody said go on")
+"""
+
+PICK = """
+name: pick_like
+source: state_machine
+node_name: pick_like
+outcomes: [done, gave_up]
+states:
+  - Select: {source: stay, transitions: {success: Plan, fail: gave_up}}
+  - Plan:
+      source: concurrent_state_machine
+      outcomes: [planned, gave_up]
+      default_outcome: gave_up
+      outcome_map: {planned: {PlanPregrasp: success, PlanGrasp: success}}
+      transitions: {planned: Pick, gave_up: gave_up}
+      states:
+        - PlanPregrasp: {source: stay}
+        - PlanGrasp: {source: stay}
+  - Pick:
+      source: state_machine
+      outcomes: [done, gave_up]
+      transitions: {done: done, gave_up: gave_up}
+      states:
+        - Close: {source: stay, transitions: {success: Lift, fail: gave_up}}
+        - Lift: {source: stay, transitions: {success: done, fail: gave_up}}
+"""
+
+
+class Viewer:
+    """Keeps the last messages of each container."""
+
+    def __init__(self) -> None:
+        self.status: dict[str, SmachContainerStatus] = {}
+        self.structure: dict[str, SmachContainerStructure] = {}
+        self._subscribers = [
+            rospy.Subscriber("/run_task/smach/container_status", SmachContainerStatus, self._on_status),
+            rospy.Subscriber("/run_task/smach/container_structure", SmachContainerStructure, self._on_structure),
+        ]
+
+    def _on_status(self, message: SmachContainerStatus) -> None:
+        self.status[message.path] = message
+
+    def _on_structure(self, message: SmachContainerStructure) -> None:
+        self.structure[message.path] = message
+
+    def active(self, path: str) -> list[str]:
+        return sorted(self.status[path].active_states) if path in self.status else ["not seen"]
+
+
+def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> bool:
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+@pytest.fixture()
+def task(ros_session: RosSession, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    (tmp_path / "stay.py").write_text(STAY)
+    script = tmp_path / "pick_like.yaml"
+    script.write_text(PICK)
+    command = ["rosrun", "modular_framework_core", "run_task", str(script), f"_states_directory:={tmp_path}"]
+    process = subprocess.Popen(
+        command, env=ros_session.env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    yield process
+    if process.poll() is None:
+        process.kill()
+        process.wait(10.0)
+
+
+def test_a_viewer_follows_the_active_states_of_a_nested_task_to_its_end(task) -> None:
+    viewer = Viewer()
+    go_on = rospy.Publisher("/go_on", Empty, queue_size=1)
+
+    def step(path: str, active: list[str]) -> None:
+        assert until(lambda: viewer.active(path) == active), f"{path}: {viewer.active(path)} instead of {active}"
+        assert until(lambda: go_on.get_num_connections() >= 1)
+        time.sleep(0.1)  # the second of two states listens over the connection of the first
+        go_on.publish()
+
+    step("/pick_like", ["Select"])
+    assert until(lambda: set(viewer.structure) == {"/pick_like", "/pick_like/Plan", "/pick_like/Pick"})
+    assert viewer.structure["/pick_like"].children == ["Select", "Plan", "Pick"]
+    assert viewer.structure["/pick_like/Plan"].children == ["PlanPregrasp", "PlanGrasp"]
+    step("/pick_like/Plan", ["PlanGrasp", "PlanPregrasp"])
+    step("/pick_like/Pick", ["Close"])
+    assert viewer.active("/pick_like") == ["Pick"]
+    assert isinstance(pickle.loads(base64.b64decode(viewer.status["/pick_like"].local_data)), dict)
+    step("/pick_like/Pick", ["Lift"])
+    assert until(lambda: viewer.active("/pick_like") == [])
+    assert task.wait(10.0) == 0, task.stdout.read()
+
+
+def test_a_viewer_cannot_change_a_task_and_a_shown_task_stops_at_once(task) -> None:
+    viewer = Viewer()
+    assert until(lambda: viewer.active("/pick_like") == ["Select"])
+    _, subscribed, _ = rosgraph.Master("/test").getSystemState()
+    assert not [topic for topic, _ in subscribed if topic.endswith("/smach/container_init")]
+    asked = time.monotonic()
+    task.send_signal(signal.SIGINT)
+    assert task.wait(5.0) == 1
+    assert time.monotonic() - asked < 3.0
+    output = task.stdout.read()
+    assert "Traceback" not in output, output
+    assert "not shown" not in output
