@@ -2,6 +2,8 @@
 """SimpleActionState against a real action server."""
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 
@@ -186,6 +188,39 @@ def test_a_missing_server_aborts_with_its_name_and_the_time():
     assert run(state)[0] == "aborted"
     assert "actionlib/TestAction" in state.reason
     assert "'/nobody' within 0.3 s" in state.reason
+
+
+MORTAL = """
+import rospy, actionlib
+from actionlib.msg import TestAction
+rospy.init_node("mortal", disable_signals=True)
+server = actionlib.SimpleActionServer("mortal", TestAction, lambda goal: rospy.sleep(60.0), auto_start=False)
+server.start()
+rospy.spin()
+"""
+
+
+def test_a_server_that_dies_with_its_goal_is_noticed(ros_session, monkeypatch):
+    from smach_ros import SimpleActionState, simple_action_state
+
+    monkeypatch.setattr(simple_action_state, "SERVER_LOST_S", 0.5)
+    process = subprocess.Popen([sys.executable, "-c", MORTAL], env=ros_session.env)
+    try:
+        state = SimpleActionState("mortal", TestAction, server_wait_timeout=rospy.Duration(10.0))
+        outcomes: list[str] = []
+        thread = threading.Thread(target=lambda: outcomes.append(run(state)[0]))
+        thread.start()
+        end = time.monotonic() + 10.0
+        while not state._goal_is_out and time.monotonic() < end:
+            time.sleep(0.05)
+        time.sleep(0.3)
+        process.kill()
+        thread.join(5.0)
+        assert outcomes == ["aborted"]
+        assert "the server went away" in state.reason
+    finally:
+        process.kill()
+        process.wait(5.0)
 
 
 def test_waiting_for_a_server_can_be_stopped():

@@ -275,6 +275,33 @@ def test_a_machine_is_offered_as_an_action():
     assert end_of(4)[:2] == (GoalStatus.SUCCEEDED, 8)
 
 
+def test_transitions_send_the_mapped_feedback_and_slots_are_expanded_and_packed():
+    from smach_ros import ActionServerWrapper
+
+    @smach.cb_interface(outcomes=["next"], input_keys=["goal"], output_keys=["progress", "result"])
+    def work(userdata):
+        userdata.progress = userdata.goal + 1
+        userdata.result = userdata.goal + 2
+        return "next"
+
+    machine = smach.StateMachine(["done"], ["goal"], ["result"])
+    with machine:
+        smach.StateMachine.add("FIRST", smach.CBState(work), {"next": "SECOND"})
+        smach.StateMachine.add("SECOND", smach.CBState(work), {"next": "done"})
+    wrapper = ActionServerWrapper(
+        "staged", TestAction, machine, ["done"], feedback_slots_map={"feedback": "progress"}, expand_goal_slots=True,
+        pack_result_slots=True,
+    )
+    wrapper.run_server()
+    client = actionlib.SimpleActionClient("staged", TestAction)
+    assert client.wait_for_server(rospy.Duration(5.0))
+    feedback = []
+    client.send_goal(TestGoal(5), feedback_cb=lambda message: feedback.append(message.feedback))
+    assert client.wait_for_result(rospy.Duration(5.0))
+    assert client.get_result().result == 7
+    assert feedback == [6]
+
+
 def test_wrong_arguments_of_the_wrapper_are_refused():
     from smach_ros import ActionServerWrapper
 
