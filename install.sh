@@ -81,6 +81,9 @@ mount_what_a_bare_root_lacks() {
     as_root mount -t devpts devpts /dev/pts || fail "there are no pseudo-terminals" "mount -t devpts devpts /dev/pts"
   fi
   [ -e /dev/fd ] || as_root ln -s /proc/self/fd /dev/fd
+  if ! getent hosts localhost >/dev/null; then
+    printf '127.0.0.1\tlocalhost\n' | as_root tee -a /etc/hosts >/dev/null
+  fi
 }
 
 missing_debian_packages() {
