@@ -2,12 +2,16 @@
 """The planning scene through moveit_commander: objects come and go, are attached, picked and placed."""
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import actionlib
 import pytest
+import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_commander import (
     MoveGroupCommander,
@@ -16,14 +20,22 @@ from moveit_commander import (
     roscpp_initialize,
     roscpp_shutdown,
 )
+from moveit_commander.servers import Servers
 from moveit_msgs.msg import (
     AllowedCollisionMatrix,
     AttachedCollisionObject,
     Grasp,
+    MoveItErrorCodes,
+    PickupAction,
+    PickupResult,
+    PlaceAction,
     PlaceLocation,
+    PlaceResult,
     PlanningScene,
     PlanningSceneComponents,
+    RobotTrajectory,
 )
+from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
 from std_msgs.msg import Header
 
 LAUNCH = """<launch>
@@ -185,26 +197,89 @@ def test_a_group_attaches_and_detaches(scene: PlanningSceneInterface, arm: MoveG
     assert set(scene.get_known_object_names()) == {"first", "second"}
 
 
-def test_pick_and_place_name_what_is_missing(scene: PlanningSceneInterface, arm: MoveGroupCommander) -> None:
-    pose = at(0.3, 0.5, 0.9)
+class FakeTask:
+    """An action server that keeps its goals and answers success."""
+
+    def __init__(self, name: str, kind: Any, result: Any) -> None:
+        self.goals: list[Any] = []
+        self._result = result
+        self._server = actionlib.SimpleActionServer(name, kind, self._serve, auto_start=False)
+        self._server.start()
+
+    def _serve(self, goal: Any) -> None:
+        self.goals.append(goal)
+        self._server.set_succeeded(self._result)
+
+
+def offered(name: str) -> bool:
+    return any(topic == f"/{name}/result" for topic, _ in rospy.get_published_topics())
+
+
+def test_a_location_of_another_type_is_refused(arm: MoveGroupCommander) -> None:
     for location in (3.0, [3.0]):
         with pytest.raises(MoveItCommanderException, match="Parameter location must be"):
             arm.place("block", location)
-    try:
-        arm._servers.action("pickup", _pickup(), 0.5)
-    except MoveItCommanderException as error:
-        assert "action /pickup" in str(error) and "Unable to connect" in str(error)
-        for wrong in (lambda: arm.pick("block", Grasp()), lambda: arm.place("block", pose)):
-            with pytest.raises(MoveItCommanderException, match="Unable to connect"):
-                wrong()
+
+
+def test_pick_and_place_name_what_is_missing_and_use_what_is_there(arm: MoveGroupCommander) -> None:
+    pose = at(0.3, 0.5, 0.9)
+    locations = [None, pose, pose.pose, PlaceLocation(place_pose=pose), [pose, pose], [PlaceLocation(place_pose=pose)]]
+    if offered("pickup"):
+        assert arm.pick("no_such_object", Grasp(), plan_only=True) != MoveItErrorCodes.SUCCESS
+        assert [arm.place("no_such_object", item, plan_only=True) for item in locations] == [False] * len(locations)
         return
-    for grasp in (Grasp(), [Grasp()]):
-        assert isinstance(arm.pick("no_such_object", grasp, plan_only=True), int)
-    for location in (None, pose, pose.pose, PlaceLocation(place_pose=pose), [pose], [PlaceLocation(place_pose=pose)]):
-        assert arm.place("no_such_object", location, plan_only=True) is False
+    for act in (lambda: arm.pick("block", Grasp()), lambda: arm.place("block", pose)):
+        with pytest.raises(MoveItCommanderException, match="Unable to connect"):
+            act()
+    success = MoveItErrorCodes(MoveItErrorCodes.SUCCESS)
+    pickup = FakeTask("pickup", PickupAction, PickupResult(error_code=success))
+    arm.set_support_surface_name("table")
+    for grasp in (Grasp(id="one"), [Grasp(id="one"), Grasp(id="two")]):
+        assert arm.pick("block", grasp, plan_only=True) == MoveItErrorCodes.SUCCESS
+    assert [[grasp.id for grasp in goal.possible_grasps] for goal in pickup.goals] == [["one"], ["one", "two"]]
+    goal = pickup.goals[0]
+    assert (goal.target_name, goal.group_name, goal.end_effector) == ("block", "arm_and_manipulator",
+                                                                      "ezgripper_finger_1_ee")
+    assert goal.planning_options.plan_only and goal.allow_gripper_support_collision
+    place = FakeTask("place", PlaceAction, PlaceResult(error_code=success))
+    assert [arm.place("block", item) for item in locations] == [True] * len(locations)
+    assert [len(goal.place_locations) for goal in place.goals] == [0, 1, 1, 1, 2, 1]
+    assert place.goals[2].place_locations[0].place_pose.header.frame_id == "world"
+    with pytest.raises(MoveItCommanderException, match="plan_grasps"):
+        arm.pick("block")
 
 
-def _pickup() -> Any:
-    from moveit_msgs.msg import PickupAction
+def test_a_cartesian_path_asks_for_the_lines_and_answers_path_and_share(arm: MoveGroupCommander) -> None:
+    asked: list[Any] = []
+    codes = [MoveItErrorCodes.SUCCESS, MoveItErrorCodes.INVALID_GROUP_NAME]
 
-    return PickupAction
+    def serve(request: Any) -> GetCartesianPathResponse:
+        asked.append(request)
+        path = RobotTrajectory()
+        path.joint_trajectory.joint_names = ["elbow_joint"]
+        return GetCartesianPathResponse(solution=path, fraction=0.75,
+                                        error_code=MoveItErrorCodes(codes[len(asked) - 1]))
+
+    rospy.Service("fake/compute_cartesian_path", GetCartesianPath, serve)
+    servers = arm._servers
+    arm._servers = Servers("fake")
+    try:
+        path, fraction = arm.compute_cartesian_path([Pose(), [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]], 0.01, 2.5, False)
+        assert fraction == 0.75 and path.joint_trajectory.joint_names == ["elbow_joint"]
+        assert arm.compute_cartesian_path([Pose()], 0.02) == (RobotTrajectory(), -1.0)
+    finally:
+        arm._servers = servers
+    first, second = asked
+    assert (first.max_step, first.jump_threshold, first.avoid_collisions) == (0.01, 2.5, False)
+    assert (second.max_step, second.jump_threshold, second.avoid_collisions) == (0.02, 0.0, True)
+    assert (first.group_name, first.link_name, first.header.frame_id) == ("arm_and_manipulator", "eg_manipulator",
+                                                                          "world")
+    assert first.waypoints[1].position.z == 0.3 and first.start_state.is_diff
+
+
+def test_a_script_needs_no_node_of_its_own_and_ends(scene: PlanningSceneInterface) -> None:
+    script = ("import sys, moveit_commander as m; m.roscpp_initialize(sys.argv); r = m.RobotCommander(); "
+              "print(r.get_group_names()); m.roscpp_shutdown(); m.roscpp_shutdown()")
+    ended = subprocess.run([sys.executable, "-c", script, "__name:=other"], capture_output=True, text=True,
+                           timeout=30.0, check=False)
+    assert ended.returncode == 0 and "'arm_and_manipulator'" in ended.stdout, ended.stderr

@@ -30,7 +30,6 @@ from moveit_commander.servers import ACTION_TIMEOUT_S
 
 ANSWER_MARGIN_S = 30.0  # beyond the planning time: queueing, smoothing, collision checks
 MOTION_TIMEOUT_S = 600.0
-CARTESIAN_TIMEOUT_S = 10.0
 
 
 class GroupMotion(GroupPoseTargets):
@@ -134,7 +133,7 @@ class GroupMotion(GroupPoseTargets):
         request.waypoints = [pose if isinstance(pose, Pose) else conversions.list_to_pose(pose) for pose in waypoints]
         request.header.frame_id = self.get_pose_reference_frame()
         request.header.stamp = rospy.Time.now()
-        answer = self._servers.call("compute_cartesian_path", GetCartesianPath, request, CARTESIAN_TIMEOUT_S)
+        answer = self._servers.call("compute_cartesian_path", GetCartesianPath, request)
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             self._judge(answer.error_code, "compute_cartesian_path")
             return RobotTrajectory(), -1.0

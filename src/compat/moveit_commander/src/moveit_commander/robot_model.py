@@ -171,10 +171,11 @@ class RobotModel:
         states = {item.get("name", ""): {value.get("name", ""): float(value.get("value", "0").split()[0])
                                          for value in item.findall("joint")}
                   for item in self._semantics.findall("group_state") if item.get("group") == name}
-        effectors = [item.get("name", "") for item in self._semantics.findall("end_effector")
-                     if name in (item.get("group"), item.get("parent_group"))
-                     or (not item.get("parent_group") and item.get("parent_link") in links)]
-        return Group(name, joints, links, is_chain, effectors[0] if effectors else "", states)
+        known = self._semantics.findall("end_effector")
+        effectors = [item for item in known if name in (item.get("group"), item.get("parent_group"))]
+        effectors += [item for item in known if item.get("parent_link") in links]
+        effector = effectors[0].get("name", "") if effectors else ""
+        return Group(name, joints, links, is_chain, effector, states)
 
     def _members(self, element: ET.Element, above: frozenset[str]) -> set[str]:
         """Names of a group's joints, those of its subgroups included."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import actionlib
 import rospy
+from actionlib import CommState
 from rosgraph.names import ns_join
 
 from moveit_commander.exception import ServerError
@@ -15,6 +16,7 @@ from moveit_commander.exception import ServerError
 SERVICE_TIMEOUT_S = 5.0
 ACTION_TIMEOUT_S = 5.0
 POLL_PERIOD_S = 0.02
+SETTLE_S = 0.1  # the server's end of a new connection is ready a little later than ours
 SERVER_LOST_S = 5.0  # an action server that nobody advertises for so long has gone
 
 
@@ -64,6 +66,7 @@ class ActionCaller:
     def __init__(self, name: str, kind: Any) -> None:
         self.name = name
         self._client = actionlib.SimpleActionClient(name, kind)
+        self._settled = False
 
     def connect(self, timeout_s: float) -> None:
         """Waits for the server; 0 waits for ever. Raises ServerError."""
@@ -73,6 +76,9 @@ class ActionCaller:
                 raise ServerError(f"action {self.name}: Unable to connect to its server within allotted time "
                                   f"({timeout_s:g}s); does move_group run, and does it have this capability?")
             time.sleep(POLL_PERIOD_S)
+        if not self._settled:
+            time.sleep(SETTLE_S)
+            self._settled = True
 
     def send(self, goal: Any) -> None:
         """Sends a goal and does not wait; the goal before it is no longer listened to."""
@@ -89,14 +95,15 @@ class ActionCaller:
         begun = seen = time.monotonic()
         while not done.wait(POLL_PERIOD_S):
             now = time.monotonic()
-            seen = now if self._connected() else seen
+            seen = now if self._connected() and not self._ended() else seen
             if rospy.is_shutdown():
                 raise ServerError(f"action {self.name}: this node is shut down before the result came")
             if now - begun > timeout_s:
                 self._client.cancel_goal()
                 raise ServerError(f"action {self.name}: no result within {timeout_s:g} s; the goal is cancelled")
             if now - seen > SERVER_LOST_S:
-                raise ServerError(f"action {self.name}: its server has gone for {SERVER_LOST_S:g} s; has it died?")
+                raise ServerError(f"action {self.name}: its server has gone, or ended the goal without a result, for "
+                                  f"{SERVER_LOST_S:g} s; has it died?")
         result = self._client.get_result()
         if result is None:
             raise ServerError(f"action {self.name}: ended without a result ({self._client.get_goal_status_text()}); "
@@ -108,3 +115,8 @@ class ActionCaller:
         wires = self._client.action_client
         ends = (wires.pub_goal, wires.pub_cancel, wires.result_sub, wires.feedback_sub)
         return wires.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
+
+    def _ended(self) -> bool:
+        """Whether the server says that the goal has ended, while its result is not here yet."""
+        handle = self._client.gh
+        return handle is not None and handle.get_comm_state() == CommState.WAITING_FOR_RESULT
