@@ -120,15 +120,18 @@ def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> Marker
 
 
 def _ghost(scene: PlanningScene, positions: Any, namespace: str, alpha: float) -> list[Marker]:
-    """Mesh markers of every link that has a visual mesh, at the given positions."""
+    """Markers of what is seen of every link, at the given positions."""
     transforms = scene.model.link_transforms(positions)
-    markers = []
+    frame = scene.model.planning_frame
+    markers = [_shape_marker(shape, transforms[link] * origin, frame, namespace, 0)
+               for link, shapes in scene.model.document.visual_shapes.items() for shape, origin in shapes]
     for link, visuals in scene.model.document.visual_meshes.items():
         for uri, origin, scale in visuals:
-            marker = _marker(Marker.MESH_RESOURCE, scene.model.planning_frame, namespace)
+            marker = _marker(Marker.MESH_RESOURCE, frame, namespace)
             marker.mesh_resource = uri
             marker.pose = pose_message(transforms[link] * origin)
             marker.scale.x, marker.scale.y, marker.scale.z = scale
-            _paint(marker, (*GHOST_COLOR, alpha))
             markers.append(marker)
+    for marker in markers:
+        _paint(marker, (*GHOST_COLOR, alpha))
     return markers

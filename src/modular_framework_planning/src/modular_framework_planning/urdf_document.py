@@ -11,10 +11,12 @@ import numpy as np
 import pinocchio as pin
 
 from modular_framework_planning.errors import ModelError
+from modular_framework_planning.shapes import Box, Cylinder, Shape, Sphere
 from modular_framework_planning.spatial import Transform
 
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
+VisualShape = tuple[Shape, Transform]  # primitive, pose in the link
 CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
 MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
 
@@ -41,6 +43,7 @@ class UrdfDocument:
     joint_kinds: Mapping[str, str]
     mimics: Mapping[str, Mimic] = field(default_factory=dict)
     visual_meshes: Mapping[str, tuple[VisualMesh, ...]] = field(default_factory=dict)
+    visual_shapes: Mapping[str, tuple[VisualShape, ...]] = field(default_factory=dict)
 
 
 def directory_resolver(root: Path) -> MeshResolver:
@@ -108,30 +111,43 @@ def _numbers(text: str | None, default: tuple[float, float, float], where: str) 
     return first, second, third
 
 
-def _visual_meshes(link: ET.Element) -> Iterator[VisualMesh]:
+def _visuals(link: ET.Element) -> Iterator[tuple[ET.Element, Transform, str]]:
+    """Geometry elements of a link's visuals, their poses in the link and where that is."""
     where = f"URDF link '{link.get('name')}' visual"
     for visual in link.findall("visual"):
         origin = visual.find("origin")
         xyz = _numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0), where)
         rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0), where)
         pose = pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.array(xyz))
-        for mesh in visual.iter("mesh"):
-            yield mesh.get("filename", ""), pose, _numbers(mesh.get("scale"), (1.0, 1.0, 1.0), where)
+        for geometry in visual.findall("geometry/*"):
+            yield geometry, pose, where
 
 
-def _resolve_meshes(root: ET.Element, resolve: MeshResolver) -> dict[str, tuple[VisualMesh, ...]]:
-    """Makes collision meshes file paths, takes the visual elements out and returns them."""
-    visuals: dict[str, tuple[VisualMesh, ...]] = {}
+def _visual_meshes(link: ET.Element) -> Iterator[VisualMesh]:
+    for geometry, pose, where in _visuals(link):
+        if geometry.tag == "mesh":
+            yield geometry.get("filename", ""), pose, _numbers(geometry.get("scale"), (1.0, 1.0, 1.0), where)
+
+
+def _visual_shapes(link: ET.Element) -> Iterator[VisualShape]:
+    for geometry, pose, where in _visuals(link):
+        if geometry.tag == "box":
+            yield Box(*_numbers(geometry.get("size"), (1.0, 1.0, 1.0), where)), pose
+        elif geometry.tag == "sphere":
+            yield Sphere(_number(geometry, "radius", 1.0, where)), pose
+        elif geometry.tag == "cylinder":
+            radius, length = _number(geometry, "radius", 1.0, where), _number(geometry, "length", 1.0, where)
+            yield Cylinder(radius=radius, height=length), pose
+
+
+def _resolve_meshes(root: ET.Element, resolve: MeshResolver) -> None:
+    """Makes collision meshes file paths and takes the visual elements out."""
     for link in root.findall("link"):
-        meshes = tuple(_visual_meshes(link))
-        if meshes:
-            visuals[link.get("name", "")] = meshes
         for collision in link.findall("collision"):
             for mesh in collision.iter("mesh"):
                 mesh.set("filename", resolve(mesh.get("filename", "")))
         for visual in link.findall("visual"):
             link.remove(visual)
-    return visuals
 
 
 def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocument:
@@ -164,6 +180,8 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
     roots = [link for link in links if link not in children.values()]
     if len(roots) != 1:
         raise ModelError(f"URDF: {len(roots)} links without a parent joint ({', '.join(roots)}); exactly one is needed")
-    visuals = _resolve_meshes(root, resolve)
+    meshes = {link.get("name", ""): tuple(_visual_meshes(link)) for link in root.findall("link")}
+    shapes = {link.get("name", ""): tuple(_visual_shapes(link)) for link in root.findall("link")}
+    _resolve_meshes(root, resolve)
     return UrdfDocument(ET.tostring(root, encoding="unicode"), root.get("name", ""), roots[0], links, parents,
-                        children, kinds, mimics, visuals)
+                        children, kinds, mimics, meshes, shapes)
