@@ -20,7 +20,9 @@ URDF = """<robot name="r"><link name="a">
 def test_primitives_and_meshes_of_a_link_are_kept_with_their_poses() -> None:
     document = load_urdf(URDF)
     shapes = document.visual_shapes["a"]
-    assert [shape for shape, _ in shapes] == [Box(0.1, 0.2, 0.3), Cylinder(height=0.4, radius=0.1), Sphere(0.2)]
+    assert [type(shape) for shape, _ in shapes] == [Box, Cylinder, Sphere]
+    sizes = [tuple(getattr(shape, name) for name in shape.__match_args__) for shape, _ in shapes]
+    assert sizes == [(0.1, 0.2, 0.3), (0.4, 0.1), (0.2,)]
     assert np.allclose(shapes[0][1].translation, [0.0, 0.0, 0.5])
     (uri, pose, scale), = document.visual_meshes["a"]
     assert (uri, scale) == ("package://p/m.dae", (2.0, 2.0, 2.0)) and np.allclose(pose.homogeneous, np.eye(4))
