@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-import actionlib
 import rospy
 
+from modular_framework_control.ros_action_server import SteadyActionServer
 from modular_framework_core.grasp_server import (
     GraspCommandError,
     Outcome,
@@ -62,8 +62,7 @@ class GraspServer:
     def connect(self, action_name: str) -> None:
         """Starts to listen to the joints and offers the action."""
         self._monitor.connect()
-        self._server = actionlib.ActionServer(action_name, GraspAction, self._on_goal, self._on_cancel,
-                                              auto_start=False)
+        self._server = SteadyActionServer(action_name, GraspAction, self._on_goal, self._on_cancel, auto_start=False)
         self._server.start()
 
     def _on_goal(self, handle: Any) -> None:

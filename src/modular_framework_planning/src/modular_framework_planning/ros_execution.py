@@ -20,6 +20,7 @@ from control_msgs.msg import (
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.ros_parameters import ControllerSpec, ExecutionSettings
@@ -61,7 +62,7 @@ class TrajectoryExecution:
         """Starts to listen for stop events and to look for the controllers."""
         rospy.Subscriber(names.EXECUTION_EVENT_TOPIC, String, self._on_event, queue_size=5)
         for spec in self.controllers:
-            self._clients[spec.name] = actionlib.SimpleActionClient(spec.action, ACTION_TYPES[spec.kind])
+            self._clients[spec.name] = SteadyActionClient(spec.action, ACTION_TYPES[spec.kind])
 
     def close(self) -> None:
         """Stops a motion under way and waits for that; to be called while topics are still open."""
@@ -178,9 +179,8 @@ class TrajectoryExecution:
 
     def _is_done(self, part: _Part) -> bool:
         client = self._clients[part.controller.name]
-        # The status of the goal is final some time before its result is here; DONE means that both are. The goal
-        # handle knows, while the client itself misses an end that comes before send_goal() returns.
-        if client.gh.get_comm_state() != actionlib.CommState.DONE:
+        # the status of the goal is final some time before its result is here; DONE means that both are
+        if client.simple_state != actionlib.SimpleGoalState.DONE:
             return False
         state = client.get_state()
         result = client.get_result()
