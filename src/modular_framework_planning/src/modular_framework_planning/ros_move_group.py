@@ -7,9 +7,22 @@ import time
 
 import rospy
 
+from modular_framework_planning.capabilities.execute_trajectory_action import ExecuteTrajectory
+from modular_framework_planning.capabilities.kinematics_service import KinematicsService
+from modular_framework_planning.capabilities.move_action import MoveAction
+from modular_framework_planning.capabilities.plan_service import PlanService
+from modular_framework_planning.capabilities.planning_scene_services import (
+    ApplyPlanningSceneService,
+    ClearOctomapService,
+    GetPlanningSceneService,
+)
+from modular_framework_planning.capabilities.query_planners_service import QueryPlannersService
+from modular_framework_planning.capabilities.state_validation_service import StateValidationService
+from modular_framework_planning.capabilities.tf_publisher import TfPublisher
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
+from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.ros_execution import TrajectoryExecution
 from modular_framework_planning.ros_markers import MarkerPublisher
@@ -21,6 +34,20 @@ from modular_framework_planning.ros_parameters import (
 )
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
+
+# Every endpoint of the node under the name MoveIt's parameters `capabilities` and `disable_capabilities` use.
+CAPABILITIES = (
+    Capability("move_group/MoveGroupPlanService", PlanService),
+    Capability("move_group/MoveGroupKinematicsService", KinematicsService),
+    Capability("move_group/MoveGroupStateValidationService", StateValidationService),
+    Capability("move_group/MoveGroupGetPlanningSceneService", GetPlanningSceneService),
+    Capability("move_group/ApplyPlanningSceneService", ApplyPlanningSceneService),
+    Capability("move_group/ClearOctomapService", ClearOctomapService),
+    Capability("move_group/MoveGroupQueryPlannersService", QueryPlannersService),
+    Capability("move_group/MoveGroupMoveAction", MoveAction),
+    Capability("move_group/MoveGroupExecuteTrajectoryAction", ExecuteTrajectory),
+    Capability("move_group/TfPublisher", TfPublisher, default=False),
+)
 
 
 def build_context() -> MoveGroupContext:
@@ -35,22 +62,13 @@ def build_context() -> MoveGroupContext:
 
 
 def advertise(context: MoveGroupContext) -> None:
-    """Starts every endpoint."""
-    from modular_framework_planning.capabilities.execute_trajectory_action import ExecuteTrajectory
-    from modular_framework_planning.capabilities.kinematics_service import KinematicsService
-    from modular_framework_planning.capabilities.move_action import MoveAction
-    from modular_framework_planning.capabilities.plan_service import PlanService
-    from modular_framework_planning.capabilities.planning_scene_services import PlanningSceneServices
-    from modular_framework_planning.capabilities.query_planners_service import QueryPlannersService
-    from modular_framework_planning.capabilities.state_validation_service import StateValidationService
-
+    """Starts every endpoint that is not disabled."""
     context.monitor.listeners.append(context.markers.show_scene)
     context.monitor.connect()
     context.markers.show_scene(context.monitor.snapshot())
     context.execution.connect()
     rospy.on_shutdown(context.execution.close)
-    for capability in (PlanService, KinematicsService, StateValidationService, PlanningSceneServices,
-                       QueryPlannersService, MoveAction, ExecuteTrajectory):
+    for capability in chosen_capabilities(CAPABILITIES):
         capability(context).connect()
 
 

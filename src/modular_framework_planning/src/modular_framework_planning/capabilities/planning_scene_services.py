@@ -18,22 +18,31 @@ from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.scene_messages import apply_scene, scene_message
 
 
-class PlanningSceneServices:
-    """Offers the scene's services; a change is in force when apply_planning_scene answers."""
+class GetPlanningSceneService:
+    """Offers get_planning_scene (GetPlanningScene): the asked parts of the current scene."""
 
     def __init__(self, context: MoveGroupContext) -> None:
         self._context = context
 
     def connect(self) -> None:
-        """Advertises the services."""
-        rospy.Service(names.GET_SCENE_SERVICE, GetPlanningScene, self._get)
-        rospy.Service(names.APPLY_SCENE_SERVICE, ApplyPlanningScene, self._apply)
-        rospy.Service(names.CLEAR_OCTOMAP_SERVICE, Empty, self._clear_octomap)
+        """Advertises the service."""
+        rospy.Service(names.GET_SCENE_SERVICE, GetPlanningScene, self._serve)
 
-    def _get(self, request: Any) -> GetPlanningSceneResponse:
+    def _serve(self, request: Any) -> GetPlanningSceneResponse:
         return GetPlanningSceneResponse(scene_message(self._context.monitor.snapshot(), request.components.components))
 
-    def _apply(self, request: Any) -> ApplyPlanningSceneResponse:
+
+class ApplyPlanningSceneService:
+    """Offers apply_planning_scene (ApplyPlanningScene); a change is in force when it answers."""
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+
+    def connect(self) -> None:
+        """Advertises the service."""
+        rospy.Service(names.APPLY_SCENE_SERVICE, ApplyPlanningScene, self._serve)
+
+    def _serve(self, request: Any) -> ApplyPlanningSceneResponse:
         try:
             self._context.monitor.apply(lambda scene: apply_scene(scene, request.scene), request.scene)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
@@ -41,5 +50,16 @@ class PlanningSceneServices:
             return ApplyPlanningSceneResponse(success=False)
         return ApplyPlanningSceneResponse(success=True)
 
-    def _clear_octomap(self, _: Any) -> EmptyResponse:
+
+class ClearOctomapService:
+    """Offers clear_octomap (std_srvs/Empty)."""
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+
+    def connect(self) -> None:
+        """Advertises the service."""
+        rospy.Service(names.CLEAR_OCTOMAP_SERVICE, Empty, self._serve)
+
+    def _serve(self, _: Any) -> EmptyResponse:
         return EmptyResponse()  # there is no octomap to clear
