@@ -15,14 +15,19 @@ TEMPLATES = Path(__file__).parents[3] / "src" / "modular_framework_core" / "temp
 
 STATE_FILES = {
     "plan": '''
+from typing import Literal
+
 from modular_framework_core.framework_state import FrameworkState
+
+Kind = Literal["pose", "joint_state"]
 
 
 class Plan(FrameworkState):
     """Plans."""
 
-    def __init__(self, target, plan_name="", speed=0.5, outcomes=("success", "fail"), input_keys=(),
-                 output_keys=(), io_keys=()):
+    def __init__(self, target, plan_name: str = "", speed: float = 0.5, kind: Kind = "pose",
+                 names: "list[str] | None" = None, tries: int = 1, wait: bool = False,
+                 outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self.target, self.plan_name, self.speed = target, plan_name, speed
 
@@ -96,14 +101,14 @@ class World:
         self.template_folders = [*templates, TEMPLATES]
         self.templates = TemplateCatalogue(self.template_folders)
 
-    def build(self, text: str) -> TaskSpec:
-        """Check a task; its file is called t.yaml in messages."""
-        return TaskBuilder(self.states, self.templates).build(located_yaml.loads(text, "t.yaml"), "t.yaml")
+    def build(self, text: str, file: str = "t.yaml") -> TaskSpec:
+        """Check a task; ``file`` is what its file is called in messages."""
+        return TaskBuilder(self.states, self.templates).build(located_yaml.loads(text, file), file)
 
-    def faults(self, text: str) -> list[str]:
+    def faults(self, text: str, file: str = "t.yaml") -> list[str]:
         """Return the messages about a task, one a fault; none for a valid one."""
         try:
-            self.build(text)
+            self.build(text, file)
         except TaskFault as error:
             return [str(fault) for fault in error.faults]
         return []

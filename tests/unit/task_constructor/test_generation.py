@@ -56,7 +56,8 @@ def test_a_framework_machine_fills_its_userdata_after_its_states(world: World) -
 
 
 def test_the_default_outcome_of_a_concurrent_machine_is_its_negative_one(world: World) -> None:
-    text = "name: both\nsource: concurrent_state_machine\noutcomes: [good, bad]\nstates:\n  - A: {source: move}\n"
+    text = "name: both\nsource: concurrent_state_machine\noutcomes: [good, bad]\noutcome_map: {good: {A: fail}}\n" \
+           "states:\n  - A: {source: move}\n"
     assert machine(world, text).execute() == "bad"
 
 

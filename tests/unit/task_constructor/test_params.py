@@ -29,7 +29,7 @@ def nested(params: str, body: str) -> str:
 
 def test_a_machines_params_are_seen_by_all_its_descendants(world: World) -> None:
     body = nested("{}", "        - Deep:\n            source: concurrent_state_machine\n            "
-                  "outcomes: [success, fail]\n            states:\n"
+                  "outcomes: [success, fail]\n            outcome_map: {success: {A: success}}\n            states:\n"
                   "              - A: {source: plan, target: params.place}\n")
     assert states(world, root("{place: home}", body))["A"].options == {"target": "home"}
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
+from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 
 from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
@@ -35,17 +36,18 @@ class ChildLinks:
 
 
 def check_sequential(
-    children: list[ChildLinks], labels: list[str], outcomes: tuple[str, ...] | None, faults: FaultList
+    children: list[ChildLinks], labels: list[str], outcomes: tuple[str, ...] | None, place: Place, faults: FaultList
 ) -> None:
     """Check the transitions of the children of a state machine.
 
     Args:
         children: the children that could be read.
-        labels: the labels of all children, those that could not be read included.
+        labels: the labels of all children as written, those that could not be read or that repeat one included.
         outcomes: outcomes of the machine; None when they could not be read, which leaves targets unchecked.
+        place: where the outcomes are declared.
         faults: where faults are noted.
     """
-    targets = [*labels, *(outcomes or ())]
+    targets = [*dict.fromkeys(labels), *(outcomes or ())]
     before = len(faults)
     for child in children:
         transitions = child.transitions or {}
@@ -64,24 +66,58 @@ def check_sequential(
                 f"state '{child.label}': no transition for {', '.join(map(repr, missing))}; "
                 f"add it to transitions, leading to one of: {', '.join(targets)}",
             )
-    all_clear = len(faults) == before and len(children) == len(labels)
-    if all_clear and all(child.transitions is not None for child in children):
-        _check_reachable(children, faults)
+    all_clear = len(faults) == before and len(children) == len(labels) > 0
+    known = outcomes is not None and all(None not in (child.transitions, child.outcomes) for child in children)
+    if all_clear and known:
+        _check_ways(children, outcomes or (), place, faults)
 
 
-def _check_reachable(children: list[ChildLinks], faults: FaultList) -> None:
-    """Note states no chain of transitions leads to."""
-    by_label = {child.label: child for child in children}
-    reached: set[str] = set()
-    waiting = [children[0].label] if children else []
-    while waiting:
-        label = waiting.pop()
-        if label not in reached and label in by_label:
-            reached.add(label)
-            waiting.extend(str(target.value) for target in (by_label[label].transitions or {}).values())
+def _check_ways(children: list[ChildLinks], outcomes: tuple[str, ...], place: Place, faults: FaultList) -> None:
+    """Note states no transition leads to, states that lead to no outcome, and outcomes nothing leads to."""
+    leads_to = {child.label: _targets(child, outcomes) for child in children}
+    reached = _closure(leads_to, [children[0].label] if children else [])
+    backwards: dict[str, set[str]] = {}
+    for label, targets in leads_to.items():
+        for target in targets:
+            backwards.setdefault(target, set()).add(label)
+    with_way_out = _closure(backwards, outcomes)
     for child in children:
         if child.label not in reached:
             faults.add(child.place, f"state '{child.label}' is never reached: no transition leads to it")
+        elif child.label not in with_way_out:
+            circle = ", ".join(sorted(_closure(leads_to, [child.label])))
+            faults.add(child.place, f"state '{child.label}' has no way out: from it the machine only gets to {circle}, "
+                                    f"never to an outcome; lead one of them to: {', '.join(outcomes)}")
+    check_outcomes_produced(outcomes, set().union(*leads_to.values()), place, faults)
+
+
+def _targets(child: ChildLinks, outcomes: tuple[str, ...]) -> set[str]:
+    """Return what a child leads to; an outcome of the machine's own that has no transition leads there by its name."""
+    transitions = child.transitions or {}
+    by_name = {name for name in child.outcomes or () if name not in transitions and name in outcomes}
+    return {str(target.value) for target in transitions.values()} | by_name
+
+
+def _closure(leads_to: MappingABC[str, set[str]], start: Iterable[str]) -> set[str]:
+    """Return all names that can be reached from some names, themselves included."""
+    reached: set[str] = set()
+    waiting = list(start)
+    while waiting:
+        label = waiting.pop()
+        if label not in reached:
+            reached.add(label)
+            waiting.extend(leads_to.get(label, ()))
+    return reached
+
+
+def check_outcomes_produced(
+    outcomes: tuple[str, ...], produced: Container[str | None], place: Place, faults: FaultList
+) -> None:
+    """Note outcomes nothing leads to; ``preempted`` is what a machine ends with when it is stopped."""
+    for outcome in outcomes:
+        if outcome not in produced and outcome != "preempted":
+            faults.add(place, f"the outcome '{outcome}' is never produced: nothing leads to it; remove it, or let a "
+                              "transition (in a concurrent machine: an entry of outcome_map) lead to it")
 
 
 def check_concurrent(children: list[ChildLinks], faults: FaultList) -> None:

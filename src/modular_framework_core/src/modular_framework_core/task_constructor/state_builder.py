@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from modular_framework_core.task_constructor import header_fields
-from modular_framework_core.task_constructor.faults import FaultList, Place
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node
+from modular_framework_core.task_constructor.faults import FaultList, Place, nearest
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
+from modular_framework_core.task_constructor.option_types import AnyOf, Choice, OptionType, Plain
 from modular_framework_core.task_constructor.params_scope import ParamsScope
 from modular_framework_core.task_constructor.state_catalogue import (
     STATE_KEYS,
@@ -56,6 +57,8 @@ class StateBuilder:
         for option in source.options.values():
             if option.required and option.name not in options:
                 self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
+            elif option.name in options and option.name not in STATE_KEYS:
+                self._check_type(f"{what} '{option.name}'", option.type, options[option.name])
         for key in STATE_KEYS:
             if key in options:
                 may_be_empty = key != "outcomes"
@@ -66,6 +69,20 @@ class StateBuilder:
             StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), place),
             outcomes,
         )
+
+    def _check_type(self, what: str, allowed: OptionType, value: Node) -> None:
+        found = allowed.mismatch(value)
+        if found is None:
+            return
+        node, wanted = found
+        hint = ""
+        if isinstance(node, Scalar):
+            names = [item for part in (wanted.types if isinstance(wanted, AnyOf) else (wanted,))
+                     if isinstance(part, Choice) for item in part.values if isinstance(item, str)]
+            hint = nearest(str(node.value), names) if isinstance(node.value, str) else ""
+            if wanted == Plain("str") and not isinstance(node.value, str) and node.value is not None:
+                hint = "; put it in quotes to make it text"
+        self._faults.add(node.place, f"{what} must be {wanted.describe()}, found {kind_of(node)}{hint}")
 
     def _state_source(self, body: Mapping, label: str) -> StateSource | None:
         node = body.entries.get("source")

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from modular_framework_core.task_constructor.option_types import Anything, OptionType, from_annotation
+
 STATE_KEYS = ("outcomes", "input_keys", "output_keys", "io_keys")
 """Options every state has."""
 
@@ -31,12 +33,14 @@ class StateOption:
         required: whether it has no default.
         default: the default when it is written as a literal, else None.
         default_known: whether ``default`` is the real default.
+        type: what values it takes, as far as its annotation says.
     """
 
     name: str
     required: bool
     default: Any
     default_known: bool
+    type: OptionType = Anything()
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,40 +144,49 @@ def _read_state(name: str, file: Path) -> StateSource:
             f"{file} must define the class {wanted} (the file name in camel case); it defines: "
             f"{', '.join(classes) or 'no class'}"
         )
-    options, takes_any = _constructor_options(classes[wanted], classes)
+    options, takes_any = _constructor_options(classes[wanted], classes, _aliases(tree))
     return StateSource(name, file, wanted, options, takes_any, ast.get_docstring(classes[wanted]) or "")
 
 
+def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
+    """Return the plain assignments of a module: the names a type may have been given."""
+    return {node.targets[0].id: node.value for node in tree.body
+            if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)}
+
+
 def _constructor_options(
-    node: ast.ClassDef, classes: dict[str, ast.ClassDef]
+    node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
 ) -> tuple[dict[str, StateOption], bool]:
     """Return the options of a class and whether it takes others: its own constructor's, or that of its base."""
     for item in node.body:
         if isinstance(item, ast.FunctionDef) and item.name == "__init__":
-            return _arguments(item.args)
+            return _arguments(item.args, aliases)
     for base in node.bases:
         base_name = base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "")
         if base_name in classes and base_name != node.name:
-            return _constructor_options(classes[base_name], classes)
+            return _constructor_options(classes[base_name], classes, aliases)
         if base_name in BASE_DEFAULTS:
             defaults: dict[str, tuple[str, ...]] = {"outcomes": BASE_DEFAULTS[base_name]}
             return {key: StateOption(key, False, defaults.get(key, ()), True) for key in STATE_KEYS}, False
     return {}, True
 
 
-def _arguments(arguments: ast.arguments) -> tuple[dict[str, StateOption], bool]:
+def _arguments(
+    arguments: ast.arguments, aliases: dict[str, ast.expr]
+) -> tuple[dict[str, StateOption], bool]:
     positional = [*arguments.posonlyargs, *arguments.args]
     padding: list[ast.expr | None] = [None] * (len(positional) - len(arguments.defaults))
     pairs = list(zip(positional, [*padding, *arguments.defaults], strict=True))[1:]
     pairs += list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
-    options = {argument.arg: _option(argument.arg, default) for argument, default in pairs}
+    options = {argument.arg: _option(argument.arg, default, from_annotation(argument.annotation, aliases))
+               for argument, default in pairs}
     return options, arguments.kwarg is not None
 
 
-def _option(name: str, default: ast.expr | None) -> StateOption:
+def _option(name: str, default: ast.expr | None, kind: OptionType) -> StateOption:
     if default is None:
-        return StateOption(name, True, None, False)
+        return StateOption(name, True, None, False, kind)
     try:
-        return StateOption(name, False, ast.literal_eval(default), True)
+        return StateOption(name, False, ast.literal_eval(default), True, kind)
     except (ValueError, TypeError, SyntaxError):
-        return StateOption(name, False, None, False)
+        return StateOption(name, False, None, False, kind)

@@ -85,10 +85,17 @@ class TaskBuilder:
         if template is None:
             return None
         self._check_header_keys(header, template, is_root=parent is None, label=label)
+        outcomes_place = header.entries["outcomes"].place if "outcomes" in header.entries else header.place
         if template.concurrent:
             machine_checks.check_concurrent(links, self._faults)
         else:
-            machine_checks.check_sequential(links, labels, known_outcomes, self._faults)
+            machine_checks.check_sequential(links, labels, known_outcomes, outcomes_place, self._faults)
+        before = len(self._faults)
+        default_outcome = self._default_outcome(header, template, outcomes)
+        outcome_map = self._outcome_map(header, template, outcomes, links)
+        if template.concurrent and known_outcomes and links and len(self._faults) == before:
+            machine_checks.check_outcomes_produced(outcomes, {*outcome_map, default_outcome}, outcomes_place,
+                                                   self._faults)
         return MachineSpec(
             label=label,
             template=template,
@@ -97,8 +104,8 @@ class TaskBuilder:
             states=tuple(children),
             transitions=plain_transitions(header),
             shares_userdata=self._shares_userdata(header),
-            default_outcome=self._default_outcome(header, template, outcomes),
-            outcome_map=self._outcome_map(header, template, outcomes, links),
+            default_outcome=default_outcome,
+            outcome_map=outcome_map,
             input_keys=self._key_names(header, "input_keys"),
             output_keys=self._key_names(header, "output_keys"),
             options={key: header.entries[key].plain() for key in template.options if key in header.entries},
@@ -249,7 +256,7 @@ class TaskBuilder:
                 elif len(item.entries) == 1:
                     message = f"state '{label}' must be a mapping with 'source', found {kind_of(body)}"
                     self._faults.add(item.keys[label], message)
-        return entries, list(dict.fromkeys(labels))
+        return entries, labels
 
     def _child(
         self, label: str, place: Place, body: Mapping, outer: ParamsScope, parent_type: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import rospy
 from moveit_msgs.msg import PlanningScene
@@ -35,7 +35,8 @@ class AllowManipulatorCollisions(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, allow: bool, collision_type: str = "", objects: Sequence[str] | str = (),
+    def __init__(self, allow: bool, collision_type: Literal["", "self-collision", "object-collision"] = "",
+                 objects: Sequence[str] | str = (),
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.msg import GraspCommand, GraspGoal
@@ -31,8 +31,8 @@ class Grasp(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, grasp_type: str, grasp_name: str = "", timeout: float = 60.0,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+    def __init__(self, grasp_type: Literal["pregrasp", "grasp", "postgrasp"], grasp_name: str = "",
+                 timeout: float = 60.0, outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_states.grasp_stages import (
-    GRASP_STAGES,
     StageError,
     arrival_fingers,
     near_joints,
@@ -15,7 +14,8 @@ from modular_framework_states.grasp_stages import (
 )
 from modular_framework_states.manager_clients import ManagerError, fetch, kind_of, store_plan
 
-STATE_TYPES = ("pose", "joint_state", *GRASP_STAGES)
+StateType = Literal["pose", "joint_state", "pregrasp", "grasp", "postgrasp"]
+STATE_TYPES = get_args(StateType)
 FROM_USERDATA = "userdata"
 
 
@@ -38,8 +38,8 @@ class Plan(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, target_state_type: str, target_state_name: str = "", plan_name: str = "",
-                 starting_state_type: str = "", starting_state_name: str = "",
+    def __init__(self, target_state_type: StateType, target_state_name: str = "", plan_name: str = "",
+                 starting_state_type: StateType | Literal[""] = "", starting_state_name: str = "",
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

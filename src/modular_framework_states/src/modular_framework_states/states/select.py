@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_states.grasp_stages import GRASP_STAGES
 from modular_framework_states.manager_clients import ManagerError, fetch, kind_of
 
-MESSAGE_TYPES = ("joint_state", "trajectory", "plan", "pose", *GRASP_STAGES)
+MessageType = Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"]
+MESSAGE_TYPES = get_args(MessageType)
 
 
 class Select(FrameworkState):
@@ -28,7 +28,7 @@ class Select(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, message_type: str, message_names: Sequence[str] | str | None = None,
+    def __init__(self, message_type: MessageType, message_names: Sequence[str] | str | None = None,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
