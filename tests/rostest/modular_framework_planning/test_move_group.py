@@ -2,7 +2,6 @@
 """The move_group node on the wire: it plans, keeps the scene, executes, cancels, and survives malformed requests."""
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryResult
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_msgs.msg import (
     AttachedCollisionObject,
@@ -21,7 +19,6 @@ from moveit_msgs.msg import (
     Constraints,
     ExecuteTrajectoryAction,
     ExecuteTrajectoryGoal,
-    JointConstraint,
     MotionPlanRequest,
     MoveGroupAction,
     MoveGroupGoal,
@@ -29,63 +26,38 @@ from moveit_msgs.msg import (
     OrientationConstraint,
     PlanningScene,
     PlanningSceneComponents,
-    PositionConstraint,
     PositionIKRequest,
     RobotState,
 )
 from moveit_msgs.srv import (
     ApplyPlanningScene,
-    GetMotionPlan,
     GetPlanningScene,
     GetPositionFK,
     GetPositionIK,
     GetStateValidity,
     QueryPlannerInterfaces,
 )
+from planning_wire import (
+    ARM,
+    DOWN,
+    GRIPPER,
+    GROUP,
+    LAUNCH,
+    OK,
+    START,
+    FakeArm,
+    add,
+    box,
+    call,
+    joint_goal,
+    plan,
+    pose_constraints,
+    report_of,
+    request,
+    table,
+)
 from sensor_msgs.msg import JointState
-from shape_msgs.msg import SolidPrimitive
-from std_msgs.msg import Header, String
-
-LAUNCH = """<launch>
-  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
-    <arg name="load_robot_description" value="true"/>
-  </include>
-</launch>"""
-GROUP = "arm_and_manipulator"
-ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
-GRIPPER = "ezgripper_knuckle_palm_L1_1"
-START = [1.57, -1.57, 1.2, -1.2, -1.57, 0.0]
-DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
-OK = MoveItErrorCodes.SUCCESS
-
-
-class FakeArm:
-    """Joint states and an arm controller that jumps from point to point in the trajectory's time."""
-
-    def __init__(self) -> None:
-        self.positions = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}
-        self.cancelled = threading.Event()
-        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
-        self._server = actionlib.SimpleActionServer("arm_trajectory_controller/follow_joint_trajectory",
-                                                    FollowJointTrajectoryAction, self._follow, auto_start=False)
-        self._server.start()
-        self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
-
-    def _publish(self, _: Any) -> None:
-        self._publisher.publish(JointState(Header(stamp=rospy.Time.now()), list(self.positions),
-                                           list(self.positions.values()), [], []))
-
-    def _follow(self, goal: Any) -> None:
-        begun = time.monotonic()
-        for point in goal.trajectory.points:
-            while time.monotonic() - begun < point.time_from_start.to_sec():
-                if self._server.is_preempt_requested():
-                    self.cancelled.set()
-                    self._server.set_preempted(FollowJointTrajectoryResult())
-                    return
-                time.sleep(0.002)
-            self.positions.update(zip(goal.trajectory.joint_names, point.positions, strict=True))
-        self._server.set_succeeded(FollowJointTrajectoryResult())
+from std_msgs.msg import Header
 
 
 @pytest.fixture(scope="module")
@@ -108,67 +80,6 @@ def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
     assert call("apply_planning_scene", ApplyPlanningScene, scene).success
     yield
     assert session.alive(), session.log()
-
-
-def call(name: str, kind: Any, *args: Any) -> Any:
-    rospy.wait_for_service(name, 10.0)
-    return rospy.ServiceProxy(name, kind)(*args)
-
-
-def box(name: str, x: float, y: float, z: float, size: tuple[float, float, float]) -> CollisionObject:
-    message = CollisionObject(id=name, primitives=[SolidPrimitive(SolidPrimitive.BOX, list(size))],
-                              primitive_poses=[Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))])
-    message.header.frame_id = "world"
-    return message
-
-
-def add(*objects: CollisionObject) -> bool:
-    scene = PlanningScene(is_diff=True)
-    scene.world.collision_objects = list(objects)
-    return bool(call("apply_planning_scene", ApplyPlanningScene, scene).success)
-
-
-def table() -> CollisionObject:
-    return box("table", 0.0, 0.56, 0.82, (1.2, 0.8, 0.04))
-
-
-def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOWN, frame: str = "world") -> Constraints:
-    position = PositionConstraint(link_name="eg_manipulator", weight=1.0)
-    position.header.frame_id = frame
-    position.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [0.001])]
-    position.constraint_region.primitive_poses = [Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))]
-    turn = OrientationConstraint(link_name="eg_manipulator", orientation=orientation, weight=1.0)
-    turn.header.frame_id = frame
-    return Constraints(name="goal", position_constraints=[position], orientation_constraints=[turn])
-
-
-def request(goal: Constraints | None = None, **changes: Any) -> MotionPlanRequest:
-    message = MotionPlanRequest(group_name=GROUP, allowed_planning_time=5.0, num_planning_attempts=1,
-                                max_velocity_scaling_factor=0.5, max_acceleration_scaling_factor=0.5,
-                                goal_constraints=[goal or pose_constraints(0.1, 0.5, 0.95)])
-    for name, value in changes.items():
-        setattr(message, name, value)
-    return message
-
-
-def plan(message: MotionPlanRequest) -> Any:
-    return call("plan_kinematic_path", GetMotionPlan, message).motion_plan_response
-
-
-def report_of(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
-    """What the work returned and the planning report it caused."""
-    reports: list[dict[str, Any]] = []
-    subscriber = rospy.Subscriber("move_group/planning_report", String, lambda m: reports.append(json.loads(m.data)))
-    deadline = time.monotonic() + 5.0
-    while subscriber.get_num_connections() == 0 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    result = work()
-    deadline = time.monotonic() + 5.0
-    while not reports and time.monotonic() < deadline:
-        time.sleep(0.01)
-    subscriber.unregister()
-    assert reports, "no planning report within 5 s"
-    return result, reports[-1]
 
 
 def test_a_plan_starts_at_the_current_state_and_ends_at_the_pose() -> None:
@@ -323,10 +234,6 @@ def test_ik_honours_frames_and_says_what_is_out_of_reach() -> None:
     low = PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 0.5, 0.80), DOWN))
     answer, report = report_of(lambda: call("compute_ik", GetPositionIK, ik(pose_stamped=low)))
     assert answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and "'table'" in report["reason"]
-
-
-def joint_goal(name: str, value: float) -> Constraints:
-    return Constraints(joint_constraints=[JointConstraint(joint_name=name, position=value)])
 
 
 NAN = float("nan")

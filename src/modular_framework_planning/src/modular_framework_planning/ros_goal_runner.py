@@ -9,6 +9,7 @@ from typing import Any
 import rospy
 
 from modular_framework_control.ros_action_server import SteadyActionServer
+from modular_framework_planning.errors import ErrorCode
 
 PREVIOUS_GOAL_TIMEOUT_S = 10.0
 
@@ -22,6 +23,7 @@ class GoalRunner:
     def __init__(self, name: str, kind: Any,
                  work: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]]) -> None:
         self._work = work
+        self._result_type = type(kind().action_result.result)
         self._lock = threading.Lock()
         self._turn = threading.Lock()
         self._cancels: dict[str, threading.Event] = {}
@@ -49,11 +51,12 @@ class GoalRunner:
     def _run(self, handle: Any, cancelled: threading.Event) -> None:
         if not self._turn.acquire(timeout=PREVIOUS_GOAL_TIMEOUT_S):
             self._forget(handle)
-            handle.set_rejected(None, f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s")
+            handle.set_rejected(self._result(ErrorCode.PREEMPTED),
+                                f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s")
             return
         try:
             if cancelled.is_set():
-                handle.set_canceled(None, "cancelled before it was begun")
+                handle.set_canceled(self._result(ErrorCode.PREEMPTED), "cancelled before it was begun")
                 return
             handle.set_accepted()
             result, succeeded, text = self._work(handle.get_goal(), cancelled, handle.publish_feedback)
@@ -65,10 +68,16 @@ class GoalRunner:
                 handle.set_aborted(result, text)
         except Exception as error:  # noqa: BLE001 - the client must get an answer whatever happens; it is logged here
             rospy.logerr("action goal ended by an unexpected %s", type(error).__name__, exc_info=error)
-            handle.set_aborted(None, f"unexpected {type(error).__name__}: {error}")
+            handle.set_aborted(self._result(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")
         finally:
             self._turn.release()
             self._forget(handle)
+
+    def _result(self, code: ErrorCode) -> Any:
+        """Returns an empty result with a code, for a goal that was not worked on to its end."""
+        result = self._result_type()
+        getattr(result, "response", result).error_code.val = code  # a sequence has its code one level down
+        return result
 
     def _forget(self, handle: Any) -> None:
         name = handle.get_goal_id().id  # takes the server's lock, which _on_goal holds when it takes ours

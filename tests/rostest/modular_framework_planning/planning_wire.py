@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the tests of move_group share: a robot that follows trajectories, a client's calls and messages."""
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import actionlib
+import rospy
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryResult,
+    GripperCommandAction,
+    GripperCommandResult,
+)
+from geometry_msgs.msg import Point, Pose, Quaternion
+from moveit_msgs.msg import (
+    CollisionObject,
+    Constraints,
+    JointConstraint,
+    MotionPlanRequest,
+    MoveItErrorCodes,
+    OrientationConstraint,
+    PlanningScene,
+    PositionConstraint,
+)
+from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header, String
+
+LAUNCH = """<launch>
+  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
+    <arg name="load_robot_description" value="true"/>
+  </include>
+</launch>"""
+GROUP = "arm_and_manipulator"
+ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
+GRIPPER = "ezgripper_knuckle_palm_L1_1"
+START = [1.57, -1.57, 1.2, -1.2, -1.57, 0.0]
+DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
+OK = MoveItErrorCodes.SUCCESS
+
+
+class FakeArm:
+    """Joint states, an arm controller that jumps from point to point in the trajectory's time, and (if asked for) a
+    gripper controller that is where it should be at once."""
+
+    def __init__(self, with_gripper: bool = False) -> None:
+        self.positions = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}
+        self.cancelled = threading.Event()
+        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
+        self._server = actionlib.SimpleActionServer("arm_trajectory_controller/follow_joint_trajectory",
+                                                    FollowJointTrajectoryAction, self._follow, auto_start=False)
+        self._server.start()
+        self.grips: list[float] = []
+        if with_gripper:
+            self._gripper = actionlib.SimpleActionServer("ezgripper_controller/gripper_cmd", GripperCommandAction,
+                                                         self._grip, auto_start=False)
+            self._gripper.start()
+        self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
+
+    def _publish(self, _: Any) -> None:
+        self._publisher.publish(JointState(Header(stamp=rospy.Time.now()), list(self.positions),
+                                           list(self.positions.values()), [], []))
+
+    def _follow(self, goal: Any) -> None:
+        begun = time.monotonic()
+        for point in goal.trajectory.points:
+            while time.monotonic() - begun < point.time_from_start.to_sec():
+                if self._server.is_preempt_requested():
+                    self.cancelled.set()
+                    self._server.set_preempted(FollowJointTrajectoryResult())
+                    return
+                time.sleep(0.002)
+            self.positions.update(zip(goal.trajectory.joint_names, point.positions, strict=True))
+        self._server.set_succeeded(FollowJointTrajectoryResult())
+
+    def _grip(self, goal: Any) -> None:
+        self.positions[GRIPPER] = goal.command.position
+        self.grips.append(goal.command.position)
+        self._gripper.set_succeeded(GripperCommandResult(position=goal.command.position, reached_goal=True))
+
+
+def call(name: str, kind: Any, *args: Any) -> Any:
+    rospy.wait_for_service(name, 10.0)
+    return rospy.ServiceProxy(name, kind)(*args)
+
+
+def box(name: str, x: float, y: float, z: float, size: tuple[float, float, float]) -> CollisionObject:
+    message = CollisionObject(id=name, primitives=[SolidPrimitive(SolidPrimitive.BOX, list(size))],
+                              primitive_poses=[Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))])
+    message.header.frame_id = "world"
+    return message
+
+
+def add(*objects: CollisionObject) -> bool:
+    scene = PlanningScene(is_diff=True)
+    scene.world.collision_objects = list(objects)
+    return bool(call("apply_planning_scene", ApplyPlanningScene, scene).success)
+
+
+def table() -> CollisionObject:
+    return box("table", 0.0, 0.56, 0.82, (1.2, 0.8, 0.04))
+
+
+def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOWN, frame: str = "world") -> Constraints:
+    position = PositionConstraint(link_name="eg_manipulator", weight=1.0)
+    position.header.frame_id = frame
+    position.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [0.001])]
+    position.constraint_region.primitive_poses = [Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))]
+    turn = OrientationConstraint(link_name="eg_manipulator", orientation=orientation, weight=1.0)
+    turn.header.frame_id = frame
+    return Constraints(name="goal", position_constraints=[position], orientation_constraints=[turn])
+
+
+def request(goal: Constraints | None = None, **changes: Any) -> MotionPlanRequest:
+    message = MotionPlanRequest(group_name=GROUP, allowed_planning_time=5.0, num_planning_attempts=1,
+                                max_velocity_scaling_factor=0.5, max_acceleration_scaling_factor=0.5,
+                                goal_constraints=[goal or pose_constraints(0.1, 0.5, 0.95)])
+    for name, value in changes.items():
+        setattr(message, name, value)
+    return message
+
+
+def plan(message: MotionPlanRequest) -> Any:
+    return call("plan_kinematic_path", GetMotionPlan, message).motion_plan_response
+
+
+def report_of(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
+    """What the work returned and the planning report it caused."""
+    reports: list[dict[str, Any]] = []
+    subscriber = rospy.Subscriber("move_group/planning_report", String, lambda m: reports.append(json.loads(m.data)))
+    deadline = time.monotonic() + 5.0
+    while subscriber.get_num_connections() == 0 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    result = work()
+    deadline = time.monotonic() + 5.0
+    while not reports and time.monotonic() < deadline:
+        time.sleep(0.01)
+    subscriber.unregister()
+    assert reports, "no planning report within 5 s"
+    return result, reports[-1]
+
+
+def joint_goal(name: str, value: float) -> Constraints:
+    return Constraints(joint_constraints=[JointConstraint(joint_name=name, position=value)])
