@@ -15,12 +15,22 @@ DEFAULT_ACCELERATION = 1.0  # [rad/s^2] or [m/s^2] where no source names one
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2]."""
+    """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2].
+
+    Attributes:
+        deceleration: most braking, above 0; None where it is that of speeding up.
+    """
 
     lower: float
     upper: float
     velocity: float
     acceleration: float
+    deceleration: float | None = None
+
+    @property
+    def braking(self) -> float:
+        """Most braking [1/s^2], above 0."""
+        return self.acceleration if self.deceleration is None else self.deceleration
 
 
 def _value(name: str, entry: Mapping[str, Any], flag: str, key: str) -> float | None:
@@ -36,7 +46,7 @@ def tighten(name: str, limits: JointLimits, entry: Mapping[str, Any]) -> JointLi
     """Returns the limits after the file's entry for this joint.
 
     Raises:
-        ModelError: a value is not a number, not above 0, or leaves no room between the bounds.
+        ModelError: a value is not a number, has the wrong sign, or leaves no room between the bounds.
     """
     lower, upper = limits.lower, limits.upper
     low, high = (_value(name, entry, "has_position_limits", key) for key in ("min_position", "max_position"))
@@ -44,9 +54,14 @@ def tighten(name: str, limits: JointLimits, entry: Mapping[str, Any]) -> JointLi
     upper = upper if high is None else min(upper, high)
     velocity = _value(name, entry, "has_velocity_limits", "max_velocity")
     acceleration = _value(name, entry, "has_acceleration_limits", "max_acceleration")
+    braking_flag = "has_deceleration_limits" if "has_deceleration_limits" in entry else "has_deceleration"
+    deceleration = _value(name, entry, braking_flag, "max_deceleration")
+    if deceleration is not None and deceleration >= 0:
+        raise ModelError(f"joint_limits/{name}/max_deceleration: {deceleration}; it must be below 0")
     if lower > upper or (velocity is not None and velocity <= 0) or (acceleration is not None and acceleration <= 0):
         raise ModelError(f"joint_limits/{name}: bounds [{lower}, {upper}], velocity {velocity}, acceleration "
                          f"{acceleration}; the bounds must leave room and the rest must be above 0")
     return JointLimits(lower, upper,
                        limits.velocity if velocity is None else min(velocity, limits.velocity),
-                       limits.acceleration if acceleration is None else acceleration)
+                       limits.acceleration if acceleration is None else acceleration,
+                       None if deceleration is None else -deceleration)

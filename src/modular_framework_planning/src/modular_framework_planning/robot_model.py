@@ -82,6 +82,7 @@ class RobotModel:
         self.lower, self.upper, self.max_velocity, self.max_acceleration = (
             np.array([getattr(self.limits[name], key) for name in self.joint_names])
             for key in ("lower", "upper", "velocity", "acceleration"))
+        self.max_deceleration = np.array([self.limits[name].braking for name in self.joint_names])
         self.mimics = [(self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
                        for name, mimic in self.document.mimics.items()]
         self.link_geometries = self._load_geometry()
