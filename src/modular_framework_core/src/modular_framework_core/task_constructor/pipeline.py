@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from modular_framework_core.task_constructor import default_folders, generator
-from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.task_constructor import default_folders, generator, task_graph
+from modular_framework_core.task_constructor.explanation import explain
+from modular_framework_core.task_constructor.faults import TaskFault, listing, nearest
 from modular_framework_core.task_constructor.generator import GenerationError
-from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
+from modular_framework_core.task_constructor.json_schema import task_schema
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSourceError
 from modular_framework_core.task_constructor.task_builder import load_task
+from modular_framework_core.task_constructor.task_graph import FORMATS, GraphError
 from modular_framework_core.task_constructor.task_spec import TaskSpec
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
 
@@ -31,13 +35,18 @@ def construct_task(
 ) -> tuple[TaskSpec, Path]:
     """Check a task and write its module into the directory ``output``; return the task and the path of the module.
 
+    A module that is there already is kept when nothing it was made from has changed.
+
     Raises:
         TaskFault, FileNotFoundError: as ``check_task``.
         GenerationError: a template is at fault.
     """
     task = check_task(script, states_directories, templates_directories)
-    text = generator.generate(task, templates_directories)
-    return task, generator.write(task, text, output)
+    digest = generator.digest_line(task, templates_directories)
+    target = generator.module_path(task, output)
+    if not generator.is_up_to_date(target, digest):
+        generator.write(task, generator.generate(task, templates_directories, digest), output)
+    return task, target
 
 
 def directories_from(text: str) -> list[Path]:
@@ -49,30 +58,63 @@ def main(arguments: Sequence[str]) -> int:
     """Run the command ``state_machine_generator``.
 
     Returns:
-        0 when the task is in order (and written, unless only checked); 1 when it is not; 2 for a wrong command.
+        0 when what was asked for was done; 1 when the task (or what it needs) is at fault; 2 for a wrong command.
     """
+    parser = _parser()
+    given = parser.parse_args([argument for argument in arguments if ":=" not in argument])
+    if given.script is None and not given.explain and not given.schema:
+        parser.error("the script is missing; only --explain and --schema work without one")
+    try:
+        states = given.states or [default_folders.states_folder()]
+        templates = given.templates or [default_folders.templates_folder()]
+        if given.explain or given.schema:
+            print(_about_language(given, StateCatalogue(states), TemplateCatalogue(templates)))
+        elif given.check or given.graph:
+            print(_checked(given, check_task(given.script, states, templates)))
+        else:
+            output = given.output or generator.default_output_directory()
+            print(construct_task(given.script, states, templates, output)[1])
+    except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownStateError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+class UnknownStateError(Exception):
+    """There is no state of that name; says which there are."""
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="state_machine_generator",
         description="Checks a task constructor script and writes the state machine it describes.",
     )
-    parser.add_argument("script", type=Path, help="the task, a YAML file")
+    parser.add_argument("script", type=Path, nargs="?", help="the task, a YAML file")
     several = "several are separated by ':'; empty or left out: the framework's"
     parser.add_argument("states", type=directories_from, nargs="?", help=f"directory of the states; {several}")
     parser.add_argument("templates", type=directories_from, nargs="?", help=f"directory of the templates; {several}")
     parser.add_argument("output", type=Path, nargs="?", help="directory to write to (default: in $ROS_HOME)")
     parser.add_argument("--check", action="store_true", help="only check; write nothing")
-    given = parser.parse_args([argument for argument in arguments if ":=" not in argument])
-    try:
-        states = given.states or [default_folders.states_folder()]
-        templates = given.templates or [default_folders.templates_folder()]
-        if given.check:
-            task = check_task(given.script, states, templates)
-            print(f"{given.script}: task '{task.name}' is in order, {len(list(task.root.leaf_states()))} states")
-        else:
-            output = given.output or generator.default_output_directory()
-            _, path = construct_task(given.script, states, templates, output)
-            print(path)
-    except (TaskFault, GenerationError, FileNotFoundError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
+    formats = ", ".join(f".{name}" for name in FORMATS)
+    parser.add_argument("--graph", type=Path, metavar="FILE", help=f"check, and draw the task into a file ({formats})")
+    parser.add_argument("--explain", metavar="STATE", help="say what a state does, takes and ends with")
+    parser.add_argument("--schema", action="store_true", help="print the JSON Schema of tasks, for editors")
+    return parser
+
+
+def _checked(given: argparse.Namespace, task: TaskSpec) -> str:
+    """Draw a checked task where asked to; return what to tell."""
+    if given.graph:
+        task_graph.write(task, given.graph)
+        return str(given.graph)
+    return f"{given.script}: task '{task.name}' is in order, {len(list(task.root.leaf_states()))} states"
+
+
+def _about_language(given: argparse.Namespace, states: StateCatalogue, templates: TemplateCatalogue) -> str:
+    if given.schema:
+        return json.dumps(task_schema(states, templates), indent=2)
+    name = states.resolve(given.explain)
+    if name is None:
+        raise UnknownStateError(f"state '{given.explain}' is unknown; {listing(states.names())}"
+                                f"{nearest(given.explain, states.names())}")
+    return explain(states.get(name))

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Describes the language of tasks as a JSON Schema, so that editors complete and check task scripts while typing."""
+from __future__ import annotations
+
+from typing import Any
+
+from modular_framework_core.task_constructor.explanation import option_meanings
+from modular_framework_core.task_constructor.option_types import or_reference
+from modular_framework_core.task_constructor.state_catalogue import (
+    STATE_KEYS,
+    StateCatalogue,
+    StateSource,
+    StateSourceError,
+)
+from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
+
+DRAFT = "http://json-schema.org/draft-07/schema#"
+_NAMES = {"type": "array", "items": {"type": "string"}, "minItems": 1, "uniqueItems": True}
+_KEYS = {"type": "array", "items": {"type": "string"}, "uniqueItems": True}
+_NAME_MAP = {"type": "object", "additionalProperties": {"type": "string"}}
+
+
+def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[str, Any]:
+    """Return the JSON Schema (draft 7) of tasks that use these states and templates.
+
+    States whose file cannot be read as a state are left out. What a schema cannot say (that a transition leads to a
+    label that exists, for example) is left to ``state_machine_generator --check``.
+    """
+    usable = [source for name in states.names() if (source := _readable(states, name)) is not None]
+    found = [template for name in templates.names() if (template := templates.get(name)) is not None]
+    definitions = {
+        "state": {"oneOf": [{"$ref": f"#/definitions/state_{source.name}"} for source in usable]
+                  + [{"$ref": f"#/definitions/machine_{template.name}"} for template in found]},
+        "states": {"type": "array", "minItems": 1, "items": {
+            "type": "object", "minProperties": 1, "maxProperties": 1,
+            "additionalProperties": {"$ref": "#/definitions/state"}}},
+        **{f"state_{source.name}": _state(source) for source in usable},
+        **{f"machine_{template.name}": _machine(template, is_root=False) for template in found},
+    }
+    return {"$schema": DRAFT, "title": "Task of the task constructor", "definitions": definitions,
+            "oneOf": [_machine(template, is_root=True) for template in found]}
+
+
+def _readable(states: StateCatalogue, name: str) -> StateSource | None:
+    try:
+        return states.get(name)
+    except StateSourceError:
+        return None
+
+
+def _state(source: StateSource) -> dict[str, Any]:
+    properties: dict[str, Any] = {"source": {"enum": [source.name, f"state_{source.name}"]},
+                                  "transitions": or_reference(_NAME_MAP), "params": {"type": "object"}}
+    meanings = option_meanings(source.doc)
+    for option in source.options.values():
+        kind = _NAMES if option.name == "outcomes" else _KEYS if option.name in STATE_KEYS else option.type.schema()
+        properties[option.name] = {**or_reference(kind), "description": meanings.get(option.name, "")}
+        if option.default_known:
+            properties[option.name]["default"] = option.default
+    return {"type": "object", "description": source.doc.split("\n\n")[0], "properties": properties,
+            "required": ["source"], "additionalProperties": source.takes_any_option}
+
+
+def _machine(template: TemplateSource, *, is_root: bool) -> dict[str, Any]:
+    properties: dict[str, Any] = {
+        "name": {"type": "string"}, "source": {"const": template.name}, "outcomes": or_reference(_NAMES),
+        "params": {"type": "object"}, "states": {"$ref": "#/definitions/states"},
+        **{key: {} for key in sorted(template.options)},
+    }
+    if template.concurrent:
+        properties["default_outcome"] = {"type": "string"}
+        properties["outcome_map"] = or_reference({"type": "object", "additionalProperties": _NAME_MAP})
+    if is_root:
+        properties["node_name"] = {"type": "string"}
+        required = ["name", "source", "outcomes", "states"]
+    else:
+        properties["userdata"] = {"const": "self.userdata"}
+        properties["transitions"] = or_reference(_NAME_MAP)
+        properties["input_keys"] = properties["output_keys"] = or_reference(_KEYS)
+        required = ["source", "states"]
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}

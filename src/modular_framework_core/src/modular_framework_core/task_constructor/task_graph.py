@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws a checked task with Graphviz: machines as frames inside each other, states, transitions and outcomes."""
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import graphviz
+
+from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, TaskSpec
+
+FORMATS = ("svg", "pdf", "png", "dot")
+RENDER_TIMEOUT_S = 60.0
+_FIRST_COLOUR, _LAST_COLOUR, _OTHER_COLOUR = "#2e7d32", "#c62828", "#455a64"
+
+
+class GraphError(Exception):
+    """The drawing cannot be made; says what is missing or which formats there are."""
+
+
+def draw(task: TaskSpec) -> graphviz.Digraph:
+    """Return the drawing of a task.
+
+    A machine is a frame: solid for one state after the other, dashed for states that run at the same time. Its
+    outcomes are the ovals in it, green for the first one and red for the last one.
+    """
+    graph = graphviz.Digraph(task.name, graph_attr={"compound": "true", "fontname": "sans-serif", "rankdir": "TB"},
+                             node_attr={"fontname": "sans-serif", "fontsize": "11"},
+                             edge_attr={"fontname": "sans-serif", "fontsize": "9"})
+    _machine(graph, task.root, task.root.label, None)
+    return graph
+
+
+def write(task: TaskSpec, file: Path) -> None:
+    """Write the drawing of a task; the suffix of the file chooses the format.
+
+    Raises:
+        GraphError: the suffix is none of ``FORMATS``, or Graphviz is not installed or fails.
+    """
+    kind = file.suffix.removeprefix(".").lower()
+    if kind not in FORMATS:
+        raise GraphError(f"{file}: the format '{kind}' is unknown; allowed suffixes: "
+                         + ", ".join(f".{name}" for name in FORMATS))
+    source = draw(task).source
+    if kind != "dot":
+        try:
+            done = subprocess.run(["dot", f"-T{kind}"], input=source.encode(), capture_output=True, check=True,
+                                  timeout=RENDER_TIMEOUT_S)
+        except FileNotFoundError as error:
+            raise GraphError(f"{file}: the program 'dot' is not installed; install Debian's package graphviz, or write "
+                             "a .dot file") from error
+        except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+            raise GraphError(f"{file}: Graphviz failed: {error}") from error
+        file.write_bytes(done.stdout)
+    else:
+        file.write_text(source, encoding="utf-8")
+
+
+def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: str | None) -> None:
+    style = "dashed,rounded" if machine.template.concurrent else "rounded"
+    together = " (at the same time)" if machine.template.concurrent else ""
+    with graph.subgraph(name=f"cluster_{path}") as frame:
+        frame.attr(label=_text(f"{machine.label}{together}"), style=style, tooltip=machine.template.name)
+        for number, outcome in enumerate(machine.outcomes):
+            last = number == len(machine.outcomes) - 1
+            colour = _FIRST_COLOUR if number == 0 else _LAST_COLOUR if last else _OTHER_COLOUR
+            frame.node(_outcome(path, outcome), _text(outcome), shape="oval", color=colour, fontcolor=colour)
+        if machine.states and parent is None:
+            frame.node(f"{path}|start", "", shape="point", width="0.15")
+        for child in machine.states:
+            inner = f"{path}/{child.label}"
+            if isinstance(child, MachineSpec):
+                _machine(frame, child, inner, path)
+            else:
+                frame.node(inner, _text(child.label), shape="box", style="rounded,filled", fillcolor="#eceff1",
+                           tooltip=f"{child.source.name}, {child.place}")
+        if parent is None:
+            for child in machine.states[:None if machine.template.concurrent else 1]:
+                _edge(frame, f"{path}|start", "", child, f"{path}/{child.label}")
+        if machine.template.concurrent:
+            _concurrent_edges(frame, machine, path)
+        else:
+            _sequential_edges(frame, machine, path)
+
+
+def _sequential_edges(graph: graphviz.Digraph, machine: MachineSpec, path: str) -> None:
+    by_label = {child.label: child for child in machine.states}
+    for child in machine.states:
+        implicit = {name: name for name in child.outcomes if name in machine.outcomes}
+        for outcome, target in {**implicit, **child.transitions}.items():
+            start, label = _leaving(child, f"{path}/{child.label}", outcome)
+            if target in by_label:
+                _edge(graph, start, label, by_label[target], f"{path}/{target}")
+            else:
+                graph.edge(start, _outcome(path, target), label=_text(label))
+
+
+def _concurrent_edges(graph: graphviz.Digraph, machine: MachineSpec, path: str) -> None:
+    by_label = {child.label: child for child in machine.states}
+    for outcome, conditions in machine.outcome_map.items():
+        for label, wanted in conditions.items():
+            start, text = _leaving(by_label[label], f"{path}/{label}", wanted)
+            graph.edge(start, _outcome(path, outcome), label=_text(text), style="dashed")
+    if machine.default_outcome is not None and machine.states:
+        graph.node(f"{path}|else", "otherwise", shape="plaintext", fontsize="9")
+        graph.edge(f"{path}|else", _outcome(path, machine.default_outcome), style="dashed")
+
+
+def _leaving(child: ChildSpec, path: str, outcome: str) -> tuple[str, str]:
+    """Return the node an outcome of a child leaves from, and what its arrow says."""
+    return (_outcome(path, outcome), "") if isinstance(child, MachineSpec) else (path, outcome)
+
+
+def _edge(graph: graphviz.Digraph, start: str, label: str, target: ChildSpec, path: str) -> None:
+    """Draw an arrow to a child; to a machine it ends at the frame."""
+    first, frame = path, {"lhead": f"cluster_{path}"} if isinstance(target, MachineSpec) else {}
+    while isinstance(target, MachineSpec):
+        target = target.states[0]
+        first = f"{first}/{target.label}"
+    graph.edge(start, first, label=_text(label), **frame)
+
+
+def _outcome(path: str, outcome: str) -> str:
+    return f"{path}|{outcome}"
+
+
+def _text(text: str) -> str:
+    return str(graphviz.escape(text))
