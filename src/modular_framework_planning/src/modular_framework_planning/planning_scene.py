@@ -2,17 +2,21 @@
 """Holds what the robot may bump into as immutable snapshots, so that plans under way never see a half-made change."""
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 
+import numpy as np
+
 from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_pairs
 from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
+from modular_framework_planning.padding import Padding
 from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Shape
+from modular_framework_planning.shapes import Octree, Shape
 from modular_framework_planning.spatial import Array, Transform
 
 _versions = count(1)
+OCTOMAP_ID = "<octomap>"
 Color = tuple[float, float, float, float]
 
 
@@ -51,6 +55,7 @@ class PlanningScene:
     """One version of the world: objects, attached objects, allowed collisions and the robot's positions.
 
     Every `with_...` method returns a new snapshot with a new version number; the old one stays as it is.
+    `geometry_version` is new whenever the verdict on a state may be another one.
     """
 
     model: RobotModel
@@ -60,6 +65,8 @@ class PlanningScene:
     attached: Mapping[str, AttachedObject] = field(default_factory=dict)
     colors: Mapping[str, Color] = field(default_factory=dict)
     fixed_frames: Mapping[str, Transform] = field(default_factory=dict)
+    padding: Padding = field(default_factory=Padding)
+    octomap: CollisionObject | None = None
     name: str = ""
     version: int = 0
     geometry_version: int = 0
@@ -67,7 +74,7 @@ class PlanningScene:
     def _changed(self, **changes: object) -> PlanningScene:
         number = next(_versions)
         geometry = self.geometry_version
-        if changes.keys() & {"objects", "attached", "acm"}:
+        if changes.keys() & {"objects", "attached", "acm", "padding", "octomap"}:
             geometry = number
         return replace(self, version=number, geometry_version=geometry, **changes)  # type: ignore[arg-type]
 
@@ -91,6 +98,38 @@ class PlanningScene:
         """Returns the scene with further named frames, given in the planning frame."""
         return self._changed(fixed_frames={**self.fixed_frames, **frames})
 
+    def with_padding(self, padding: Padding) -> PlanningScene:
+        """Returns the scene with another padding; raises UnknownNameError for a link the robot does not have."""
+        for link in (*padding.links, *padding.scales):
+            if not self.model.has_link(link):
+                raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link padding and scale: link", link,
+                                       self.model.frame_ids)
+        return self._changed(padding=padding)
+
+    def with_octomap(self, octree: Octree | None, pose: Transform = None) -> PlanningScene:
+        """Returns the scene with another octomap, its origin at a pose in the planning frame; None clears it."""
+        if octree is None:
+            return self._changed(octomap=None)
+        from pinocchio import SE3
+
+        body = CollisionObject(OCTOMAP_ID, SE3.Identity() if pose is None else pose, ((octree, SE3.Identity()),))
+        return self._changed(octomap=body)
+
+    def obstacles(self) -> tuple[CollisionObject, ...]:
+        """Returns what stands in the world: every object, and the octomap where it has an occupied voxel."""
+        if self.octomap is None or not len(self.octomap.shapes[0][0].centers):  # type: ignore[attr-defined]
+            return tuple(self.objects.values())
+        return (*self.objects.values(), self.octomap)
+
+    def link_margins(self) -> Array:
+        """Returns the distance [m] each of the model's link geometries keeps from the world; (n,), in their order."""
+        return np.array([self.padding.margin(item.link, float(item.geometry.aabb_radius))
+                         for item in self.model.link_geometries])
+
+    def held_margin(self) -> float:
+        """Returns the distance [m] held objects keep from the world."""
+        return self.padding.attached + self.padding.objects
+
     def with_object(self, body: CollisionObject) -> PlanningScene:
         """Adds an object, or replaces the one of that name.
 
@@ -113,12 +152,25 @@ class PlanningScene:
             return self.with_object(body)
         into_old = old.pose.inverse() * body.pose
         shapes = old.shapes + tuple((shape, into_old * pose) for shape, pose in body.shapes)
-        return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes)})
+        subframes = {**old.subframes, **{name: into_old * pose for name, pose in body.subframes.items()}}
+        return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes, subframes=subframes)})
 
-    def with_object_moved(self, name: str, pose: Transform) -> PlanningScene:
-        """Moves an object to another pose in the planning frame; raises UnknownNameError."""
+    def with_object_moved(self, name: str, pose: Transform,
+                          shape_poses: Sequence[Transform] = ()) -> PlanningScene:
+        """Moves an object to another pose in the planning frame and, if given, its shapes to other poses in the object.
+
+        Raises:
+            UnknownNameError: no such object.
+            GeometryError: there are poses of shapes, but not one for each shape.
+        """
         body = self.find_object(name)
-        return self._changed(objects={**self.objects, name: replace(body, pose=pose)})
+        shapes = body.shapes
+        if shape_poses:
+            if len(shape_poses) != len(shapes):
+                raise GeometryError(f"moving '{name}': {len(shape_poses)} poses of shapes for {len(shapes)} shapes; "
+                                    "give one for each shape, or none to move the object as a whole")
+            shapes = tuple((shape, place) for (shape, _), place in zip(shapes, shape_poses, strict=True))
+        return self._changed(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
 
     def without_object(self, name: str) -> PlanningScene:
         """Removes an object from the world; raises UnknownNameError."""
@@ -188,17 +240,27 @@ class PlanningScene:
             return self.model.link_transforms(self.positions if positions is None else positions)[frame]
         if frame in self.fixed_frames:
             return self.fixed_frames[frame]
-        body_name, _, subframe = frame.partition("/")
-        for name, inner in ((frame, ""), (body_name, subframe)):
-            pose = self._body_transform(name, positions)
-            if pose is not None and not inner:
-                return pose
-            if pose is not None:
-                subframes = (self.objects.get(name) or self.attached[name].body).subframes
-                if inner in subframes:
-                    return pose * subframes[inner]
-        known = [self.model.planning_frame, *self.model.frame_ids, *self.objects, *self.attached, *self.fixed_frames]
-        raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)
+        found = self._body_transform(frame, positions)
+        if found is None:
+            found = self._subframe_transform(frame, positions)
+        if found is None:
+            known = [self.model.planning_frame, *self.model.frame_ids, *self._body_frames(), *self.fixed_frames]
+            raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)
+        return found
+
+    def _bodies(self) -> dict[str, CollisionObject]:
+        return {**self.objects, **{name: item.body for name, item in self.attached.items()}}
+
+    def _body_frames(self) -> list[str]:
+        bodies = self._bodies()
+        return [*bodies, *(f"{name}/{inner}" for name, body in bodies.items() for inner in body.subframes)]
+
+    def _subframe_transform(self, frame: str, positions: Array | None) -> Transform | None:
+        for name, body in self._bodies().items():  # names of objects and of subframes may hold a slash themselves
+            inner = frame.removeprefix(f"{name}/")
+            if inner != frame and inner in body.subframes:
+                return self._body_transform(name, positions) * body.subframes[inner]
+        return None
 
     def _body_transform(self, name: str, positions: Array | None) -> Transform | None:
         if name in self.objects:

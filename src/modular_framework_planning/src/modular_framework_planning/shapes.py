@@ -11,6 +11,7 @@ import numpy as np
 
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.spatial import Array
+from modular_framework_planning.voxel_map import VoxelMap
 
 MAX_TRIANGLES = 2_000_000
 
@@ -138,3 +139,23 @@ class Mesh(Shape):
         model.endModel()
         model.computeLocalAABB()
         return model
+
+
+@dataclass(frozen=True, eq=False)
+class Octree(Shape):
+    """The occupied voxels of a map: axis-aligned cubes."""
+
+    voxels: VoxelMap
+
+    @cached_property
+    def centers(self) -> Array:
+        """Centres of the occupied voxels (n, 3) [m]."""
+        return self.voxels.occupied_centers()
+
+    @property
+    def resolution(self) -> float:
+        """Edge length of a voxel [m]."""
+        return self.voxels.resolution
+
+    def _build(self) -> Any:
+        return coal.makeOctree(self.centers, self.resolution)
