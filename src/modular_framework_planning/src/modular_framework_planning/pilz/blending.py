@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joins two motions without a stop: inside a sphere around their common point the link goes over from one to the other.
+
+Both motions go on in their own time; the link's pose is a mean of the two poses whose weight moves smoothly (a
+polynomial of fifth order) from the first to the second. The link enters and leaves the sphere with the velocity and
+the acceleration of the motion it comes from or goes to, and as a mean of two points of a ball it stays inside.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.pilz.joint_motion import JointState, follow, state_at
+from modular_framework_planning.pose_follower import PoseFollower
+from modular_framework_planning.spatial import Array, Transform
+from modular_framework_planning.trajectory import Trajectory
+
+SEARCH_PERIOD_S = 0.005
+CROSSING_TOLERANCE_S = 1.0e-9
+SAME_POSTURE = 1.0e-3  # [rad or m]
+SHORTEST_PIECE_S = 1.0e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transition:
+    """A link's motion inside the sphere.
+
+    Attributes:
+        first_from, second_from: times of the two trajectories at which the transition begins; the second's may be
+            below 0, when it has to wait.
+    """
+
+    first: Trajectory
+    second: Trajectory
+    follower: PoseFollower
+    first_from: float
+    second_from: float
+    duration_s: float
+
+    @property
+    def knots(self) -> Array:
+        """Times at which either motion has a point."""
+        times = np.concatenate([self.first.times - self.first_from, self.second.times - self.second_from])
+        inside = times[(times > 0.0) & (times < self.duration_s)]
+        return np.sort(np.concatenate([[0.0], inside, [self.duration_s]]))
+
+    def weight(self, time_s: float) -> float:
+        """Returns the second motion's share, with no velocity and acceleration at both ends."""
+        s = min(max(time_s / self.duration_s, 0.0), 1.0)
+        return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+
+    def pose(self, time_s: float) -> Transform:
+        """Returns the link's pose in the planning frame."""
+        one = self.follower.pose(state_at(self.first, time_s + self.first_from).positions)
+        other = self.follower.pose(state_at(self.second, time_s + self.second_from).positions)
+        weight = self.weight(time_s)
+        turn = pin.log3(one.rotation.T @ other.rotation)
+        return pin.SE3(one.rotation @ pin.exp3(weight * turn),
+                       one.translation + weight * (other.translation - one.translation))
+
+    def posture(self, time_s: float) -> JointState:
+        """Returns the mean of the joints, for a redundant arm to keep near to."""
+        one, other = state_at(self.first, time_s + self.first_from), state_at(self.second, time_s + self.second_from)
+        weight = self.weight(time_s)
+        return JointState(*(a + weight * (b - a) for a, b in (
+            (one.positions, other.positions), (one.velocities, other.velocities),
+            (one.accelerations, other.accelerations))))
+
+
+def _crossing(outside: Callable[[float], bool], times: Array) -> float | None:
+    """Returns when a motion crosses the sphere, looking along times that begin inside; None where it stays inside."""
+    inner = float(times[0])
+    for outer in (float(item) for item in times[1:]):
+        if not outside(outer):
+            inner = outer
+            continue
+        while abs(outer - inner) > CROSSING_TOLERANCE_S:
+            middle = 0.5 * (inner + outer)
+            inner, outer = (inner, middle) if outside(middle) else (middle, outer)
+        return outer
+    return None
+
+
+def _search_times(trajectory: Trajectory) -> Array:
+    return trajectory.sample_times(SEARCH_PERIOD_S)
+
+
+def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFollower,
+          period_s: float) -> tuple[Trajectory, float, float]:
+    """Joins two trajectories.
+
+    Args:
+        first, second: of one group; the second starts where the first ends.
+        radius: of the sphere around the common point [m].
+        follower: of the link the radius belongs to.
+        period_s: between two points in the sphere.
+
+    Returns:
+        The joined trajectory, and the times in it at which the link enters and leaves the sphere.
+
+    Raises:
+        PlanningError: a motion stays within the sphere, or the joints cannot follow the transition.
+    """
+    centre = follower.pose(first.positions[-1]).translation
+
+    def outside(trajectory: Trajectory) -> Callable[[float], bool]:
+        return lambda time_s: float(np.linalg.norm(
+            follower.pose(state_at(trajectory, time_s).positions).translation - centre)) >= radius
+
+    entry = _crossing(outside(first), _search_times(first)[::-1])
+    leave = _crossing(outside(second), _search_times(second))
+    if entry is None or leave is None:
+        which = "before" if entry is None else "after"
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blend_radius {radius} m: the motion {which} the blended "
+                            f"point stays within that distance of it; choose a radius shorter than the motion")
+    remaining = first.duration_s - entry
+    duration = max(remaining, leave)
+    transition = Transition(first, second, follower, entry, leave - duration, duration)
+    start, end = state_at(first, entry), state_at(second, leave)
+    middle = follow(transition, follower, period_s, start, end, transition.posture)
+    off = np.abs(middle.positions[-1] - end.positions)
+    if off.max() > SAME_POSTURE:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "blending: the arm would arrive in another posture than the "
+                            f"next motion has; joint '{first.joint_names[int(off.argmax())]}' is off by "
+                            f"{off.max():.3f}: choose a smaller blend_radius")
+    middle.positions[-1] = end.positions
+    parts = [_part(first, first.times < entry - SHORTEST_PIECE_S, 0.0),
+             _part(middle, np.ones(len(middle.times), dtype=bool), entry),
+             _part(second, second.times > leave + SHORTEST_PIECE_S, entry + duration - leave)]
+    return concatenated(parts), entry, entry + duration
+
+
+def _part(trajectory: Trajectory, chosen: Array, shift_s: float) -> Trajectory:
+    return Trajectory(trajectory.joint_names, trajectory.times[chosen] + shift_s, trajectory.positions[chosen],
+                      trajectory.velocities[chosen], trajectory.accelerations[chosen])
+
+
+def concatenated(parts: list[Trajectory]) -> Trajectory:
+    """Joins pieces whose times are already right."""
+    return Trajectory(parts[0].joint_names, *(np.concatenate([getattr(part, name) for part in parts]) for name in
+                                              ("times", "positions", "velocities", "accelerations")))
