@@ -12,7 +12,8 @@ import ompl.base as ob
 import ompl.geometric as og
 import ompl.util as ou
 
-from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.path_shortening import path_length
+from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.spatial import Array
 
 # PRM and PRMstar are left out: they wait for a thread of their own that needs the interpreter lock they hold.
@@ -66,33 +67,6 @@ class _EdgeValidator(ob.MotionValidator):
     def release(self) -> None:
         """Lets go of the collision world."""
         self._test = None
-
-
-def planner_name(planner_id: str, configurations: Mapping[str, Mapping[str, Any]]) -> tuple[str, dict[str, Any]]:
-    """Resolves a request's planner_id to an OMPL planner and its settings.
-
-    Args:
-        planner_id: a configuration's name, a planner's name ("RRTConnect", "geometric::RRTConnect"), the Setup
-            Assistant's "RRTConnectkConfigDefault", or empty for the default.
-        configurations: planner_configs of ompl_planning.yaml.
-
-    Raises:
-        PlanningError: no planner of that name; the text lists those there are.
-    """
-    name = planner_id.split("[")[-1].rstrip("]") if "[" in planner_id else planner_id
-    settings = dict(configurations.get(name) or {})
-    kind = str(settings.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
-    kind = kind or DEFAULT_PLANNER
-    if kind not in PLANNERS:
-        raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{planner_id}': OMPL {_version()} has no planner "
-                            f"'{kind}'; available: {', '.join(sorted(PLANNERS))}")
-    return kind, settings
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("ompl")
 
 
 def _make_planner(kind: str, settings: Mapping[str, Any], information: Any) -> Any:
@@ -160,3 +134,32 @@ def _vertices(definition: Any, count: int) -> Array | None:
     if not definition.hasExactSolution():
         return None
     return np.array([list(state[0:count]) for state in definition.getSolutionPath().getStates()])
+
+
+class OmplPlanner:
+    """Samples the joint space of the group with one of OMPL's geometric planners."""
+
+    planner_ids = (DEFAULT_PLANNER, *sorted(name for name in PLANNERS if name != DEFAULT_PLANNER))
+
+    def plan(self, problem: PlanningProblem) -> PlannedPath:
+        """Returns the shortest of `attempts` paths; the straight way where that is valid."""
+        begun = time.monotonic()
+        start, goals = problem.start_values, problem.goal_states()
+        for goal in goals:
+            if problem.edge_is_valid(start, goal):
+                return PlannedPath(np.vstack([start, goal]))
+        lower, upper = problem.bounds
+        lower = np.maximum(lower, np.minimum(start, goals.min(axis=0)) - 2.0 * np.pi)
+        upper = np.minimum(upper, np.maximum(start, goals.max(axis=0)) + 2.0 * np.pi)
+        search = JointProblem(lower, upper, start, goals, problem.state_is_valid, problem.edge_is_valid,
+                              problem.cancelled)
+        paths = []
+        for _ in range(max(1, problem.request.attempts)):
+            path = solve(search, problem.planner_id, problem.planner_parameters, problem.deadline_s)
+            if path is not None:
+                paths.append(path)
+            if problem.interrupted():
+                break
+        if not paths:
+            raise no_path(problem, begun, problem.planner_id)
+        return PlannedPath(min(paths, key=path_length))

@@ -1,43 +1,72 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns a request into a checked, timed motion: start, goals, search, shortening, rounding, timing, last check."""
+"""One planning pipeline: a planner, the request adapters around it, and the check every motion has to pass."""
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from modular_framework_planning import ompl_planning
-from modular_framework_planning.blended_path import choose_blends
-from modular_framework_planning.collision import ATTACHED, WORLD, CollisionChecker, Contact
+from modular_framework_planning.adapters.add_time_optimal_parameterization import AddTimeOptimalParameterization
+from modular_framework_planning.adapters.fix_start_state_bounds import FixStartStateBounds
+from modular_framework_planning.adapters.fix_start_state_collision import FixStartStateCollision
+from modular_framework_planning.adapters.request_adapter import RequestAdapter, chain
+from modular_framework_planning.collision import ATTACHED, WORLD, CollisionChecker
+from modular_framework_planning.contact_report import describe_contacts as describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.goals import GoalResolver
 from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.last_check import LastCheck
 from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.path_shortening import path_length, shorten
+from modular_framework_planning.ompl_planning import OmplPlanner
+from modular_framework_planning.path_shortening import shorten
+from modular_framework_planning.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_request import PipelineSettings, PlanningAnswer, PlanningRequest
 from modular_framework_planning.robot_model import JointGroup, RobotModel
 from modular_framework_planning.spatial import Array
-from modular_framework_planning.time_parameterization import parameterize
 from modular_framework_planning.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
 FINE_STEPS = 2.5  # shortening looks at states this many times further apart than the last check does
+BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
+CheckerSource = Callable[..., CollisionChecker]
 
 
-def describe_contacts(contacts: Sequence[Contact], most: int = 4) -> str:
-    """Joins the deepest contacts into one sentence."""
-    text = "; ".join(item.describe() for item in contacts[:most])
-    return text + (f"; and {len(contacts) - most} more" if len(contacts) > most else "")
+def default_adapters() -> tuple[RequestAdapter, ...]:
+    """Returns the adapters of a pipeline that names none."""
+    return AddTimeOptimalParameterization(), FixStartStateBounds(), FixStartStateCollision()
 
 
 class PlanningPipeline:
     """Plans for one robot; threads may share it, each plan has its own collision world."""
 
-    def __init__(self, model: RobotModel, kinematics: KinematicsPool, settings: PipelineSettings) -> None:
+    def __init__(self, model: RobotModel, kinematics: KinematicsPool, settings: PipelineSettings,
+                 planner: Planner | None = None, adapters: Sequence[RequestAdapter] | None = None,
+                 name: str = "ompl", checkers: CheckerSource = CollisionChecker) -> None:
+        """Stores the parts.
+
+        Args:
+            model: the robot.
+            kinematics: inverse kinematics of its groups.
+            settings: the pipeline's parameters.
+            planner: OMPL by default.
+            adapters: outermost first.
+            name: what `pipeline_id` calls it.
+            checkers: gives the collision checker for (scene, moving joints, tolerated contacts).
+        """
         self._model = model
         self._kinematics = kinematics
+        self._planner = planner if planner is not None else OmplPlanner()
+        self._adapters = tuple(adapters) if adapters is not None else default_adapters()
+        self._checkers = checkers
+        self.name = name
         self.settings = settings
+
+    @property
+    def planner_ids(self) -> tuple[str, ...]:
+        """What the planner takes as planner_id; empty where it takes anything."""
+        return tuple(getattr(self._planner, "planner_ids", ()))
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
         """Plans a motion.
@@ -46,179 +75,132 @@ class PlanningPipeline:
             PlanningError: with the code and the reason; nothing is returned by halves.
         """
         begun = time.monotonic()
+        problem = self._problem(request, begun)
+        run = chain(self._adapters, self._search)
+        fault = ""
+        for step in self._steps():
+            path = run(replace(problem, step=step, _goals=[]))
+            fault, answer = self._checked(problem, path, begun)
+            if answer is not None:
+                return answer
+            if path.is_short:
+                break
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion found fails the last check: {fault}; move "
+                            "the goal or the start away from contact")
+
+    def _steps(self) -> tuple[float, ...]:
+        """Edge steps of the search; a motion that fails the last check is searched again with the next."""
+        return self.settings.search_step, 0.4 * self.settings.search_step, self.settings.motion_step
+
+    def _checked(self, problem: PlanningProblem, path: PlannedPath,
+                 begun: float) -> tuple[str, PlanningAnswer | None]:
+        if path.trajectory is None:
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"pipeline '{self.name}': the path was not timed; add "
+                                "default_planner_request_adapters/AddTimeOptimalParameterization to request_adapters")
+        fault = problem.last_check.fault(problem, path)
+        if fault:
+            return fault, None
+        start = problem.start.copy()
+        start[problem.group.indices] = path.vertices[0]
+        return "", PlanningAnswer(path.trajectory, start, problem.motion.whole(path.vertices[-1]), path.vertices,
+                                  path.planner_id or problem.planner_id, path.found_s - begun,
+                                  time.monotonic() - begun)
+
+    def _search(self, problem: PlanningProblem) -> PlannedPath:
+        """The innermost step: checks the start, runs the planner, shortens its path."""
+        _require_start(problem)
+        found = self._planner.plan(problem)
+        now = time.monotonic()
+        if isinstance(found, Trajectory):
+            return PlannedPath(found.positions, found, 0, problem.planner_id, now, is_short=True)
+        path = replace(found, found_s=now)
+        if path.is_short or path.trajectory is not None:
+            return path
+        return replace(path, vertices=_shortened(problem, path.vertices))
+
+    def _problem(self, request: PlanningRequest, begun: float) -> PlanningProblem:
+        """Reads the request; everything that can be refused without planning is refused here."""
         if not request.allowed_time_s > 0.0:
             raise PlanningError(ErrorCode.TIMED_OUT, f"allowed_planning_time is {request.allowed_time_s} s; "
                                 "it must be above 0")
         group = self._model.group(request.group)
         if not group.joints:
             raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group.name}' has no joint that can be moved")
-        default = self.settings.group_defaults.get(group.name, "")
-        planner, parameters = ompl_planning.planner_name(request.planner_id or default,
-                                                         self.settings.planner_configs)
-        deadline = begun + request.allowed_time_s
-        return _Attempt(self, request, group, planner, parameters, begun, deadline).run()
-
-    def solver_pool(self) -> KinematicsPool:
-        """Inverse kinematics of the robot's groups."""
-        return self._kinematics
-
-
-class _Attempt:
-    """The work on one request."""
-
-    def __init__(self, pipeline: PlanningPipeline, request: PlanningRequest, group: JointGroup, planner: str,
-                 parameters: dict[str, object], begun: float, deadline: float) -> None:
-        self._settings = pipeline.settings
-        self._kinematics = pipeline.solver_pool()
-        self._request, self._group, self._planner, self._parameters = request, group, planner, parameters
-        self._begun, self._deadline = begun, deadline
-        self._model = request.scene.model
-        self._rng = np.random.default_rng(self._settings.seed)
-        self._steps = (self._settings.search_step, 0.4 * self._settings.search_step, self._settings.motion_step)
-
-    def run(self) -> PlanningAnswer:
-        """Plans; a path that fails the last check is searched again on a finer grid."""
-        start_all = self._start_within_bounds()
-        checker, contacts = self._start_checker(start_all)
-        motion = MotionChecker(checker, self._group.indices, start_all)
-        start = start_all[self._group.indices]
-        lead_in = self._leave_collision(checker, motion, start, contacts)
-        goals = GoalResolver(self._request, self._group, self._kinematics, checker, motion, self._rng).resolve()
-        for step in self._steps:
-            path = self._best_path(motion, lead_in[-1], goals, step)
-            found = time.monotonic()
-            path = self._shortened(motion, path, step)
-            trajectory = self._timed(motion, path, lead_in)
-            if trajectory is not None:
-                whole = np.vstack([lead_in[:-1], path])
-                return PlanningAnswer(trajectory, start_all, motion.whole(path[-1]), whole, self._planner,
-                                      found - self._begun, time.monotonic() - self._begun)
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "every path found touched an obstacle when checked at "
-                            f"{self._settings.motion_step} rad steps; move the goal or the start away from contact")
-
-    def _start_within_bounds(self) -> Array:
-        positions = np.array(self._request.scene.positions)
-        if not np.isfinite(positions).all():
+        planner_id, parameters = self._chosen_planner(request.planner_id, group.name)
+        start = np.array(request.scene.positions)
+        if not np.isfinite(start).all():
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "start state: a joint position is not finite")
-        inner = np.clip(positions, self._model.lower, self._model.upper)
-        indices = self._group.indices
-        if np.abs(positions - inner)[indices].max() > self._settings.start_state_max_bounds_error:
-            problems = self._model.bound_violations(positions, indices)
-            raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {'; '.join(problems)}; at most "
-                                f"{self._settings.start_state_max_bounds_error} beyond a bound is pulled back")
-        positions[indices] = inner[indices]
-        return positions
+        velocity, acceleration = self._scaled_limits(request, group)
+        seed = self.settings.seed if request.seed is None else request.seed
+        checker = self._checker(request, group, start)
+        return PlanningProblem(
+            request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
+            self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
+            begun + request.allowed_time_s, LastCheck(), planner_id, parameters, request.path_constraints)
 
-    def _start_checker(self, start: Array) -> tuple[CollisionChecker, list[Contact]]:
-        """Builds the collision world of this plan, with shallow contacts of held bodies tolerated."""
-        checker = CollisionChecker(self._request.scene, self._group.indices)
+    def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any]]:
+        """Returns the planner's name and settings; raises PlanningError with the names there are."""
+        name = asked or self.settings.default_planner(group)
+        if name.endswith("]") and "[" in name:
+            name = name.split("[")[-1].rstrip("]")
+        parameters = dict(self.settings.planner_configs.get(name) or {})
+        kind = str(parameters.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
+        known = self.planner_ids
+        kind = kind or (known[0] if known else "")
+        if known and kind not in known:
+            raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{asked}': pipeline '{self.name}' has no "
+                                f"planner '{kind}'; available: {', '.join(known)}")
+        return kind, parameters
+
+    def _checker(self, request: PlanningRequest, group: JointGroup, start: Array) -> CollisionChecker:
+        """Returns the collision world of this plan, with shallow contacts of held bodies tolerated."""
+        checker = self._checkers(request.scene, group.indices)
         fixed = checker.fixed_contacts(start)
         if fixed:
             raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
-                                f"joint of group '{self._group.name}' can change that; allow the pair or move it")
+                                f"joint of group '{group.name}' can change that; allow the pair or move it")
         if checker.is_free(start):
-            return checker, []
-        contacts = checker.contacts(start, include_fixed=False)
-        shallow = [item for item in contacts if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
-                   and item.depth <= self._settings.start_state_contact_tolerance]
-        if shallow:
-            checker = CollisionChecker(self._request.scene, self._group.indices, shallow)
-        return checker, [item for item in contacts if item not in shallow]
+            return checker
+        shallow = [item for item in checker.contacts(start, include_fixed=False)
+                   if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
+                   and item.depth <= self.settings.start_state_contact_tolerance]
+        return self._checkers(request.scene, group.indices, shallow) if shallow else checker
 
-    def _leave_collision(self, checker: CollisionChecker, motion: MotionChecker, start: Array,
-                         contacts: list[Contact]) -> Array:
-        """Returns vertices from the start to a free state; only the start itself where that is free."""
-        if not contacts and motion.state_is_free(start):
-            return start[None, :]
-        low, high = self._model.lower[self._group.indices], self._model.upper[self._group.indices]
-        reach = self._settings.jiggle_fraction * np.minimum(high - low, 2.0 * np.pi)
-        shallow = all(item.depth <= self._settings.start_state_collision_depth for item in contacts)
-        for number in range(self._settings.max_sampling_attempts if shallow else 0):
-            share = (number + 1) / self._settings.max_sampling_attempts
-            moved = np.clip(start + share * self._rng.uniform(-reach, reach), low, high)
-            if motion.state_is_free(moved):
-                return np.vstack([start, moved])
-        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, "start state in collision: "
-                            f"{describe_contacts(contacts)}; " + (
-                                f"no free state within {self._settings.jiggle_fraction:.0%} of the joints' ranges"
-                                if shallow else "too deep to move out of; allow the pair or move the object"))
-
-    def _best_path(self, motion: MotionChecker, start: Array, goals: Array, step: float) -> Array:
-        def edge(first: Array, second: Array) -> bool:
-            return motion.edge_is_free(first, second, step)
-
-        for goal in goals:
-            if edge(start, goal):
-                return np.vstack([start, goal])
-        lower = np.maximum(self._model.lower[self._group.indices], np.minimum(start, goals.min(axis=0)) - 2.0 * np.pi)
-        upper = np.minimum(self._model.upper[self._group.indices], np.maximum(start, goals.max(axis=0)) + 2.0 * np.pi)
-        problem = ompl_planning.JointProblem(lower, upper, start, goals, motion.state_is_free, edge,
-                                             self._request.cancelled)
-        paths = []
-        for _ in range(max(1, self._request.attempts)):
-            path = ompl_planning.solve(problem, self._planner, self._parameters, self._deadline)
-            if path is not None:
-                paths.append(path)
-            if self._request.cancelled() or time.monotonic() > self._deadline:
-                break
-        if not paths:
-            raise self._no_path()
-        return min(paths, key=path_length)
-
-    def _no_path(self) -> PlanningError:
-        spent = time.monotonic() - self._begun
-        if self._request.cancelled():
-            return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s")
-        code = ErrorCode.TIMED_OUT if time.monotonic() > self._deadline else ErrorCode.PLANNING_FAILED
-        return PlanningError(code, f"{self._planner} found no path in {spent:.2f} s (allowed "
-                             f"{self._request.allowed_time_s:.2f} s); start and goal are free, so the way between them "
-                             "is blocked or narrow: allow more time or choose another goal")
-
-    def _shortened(self, motion: MotionChecker, path: Array, step: float) -> Array:
-        """Shortens; what it accepts was also looked at on the fine grid."""
-        limit = min(max(self._deadline, time.monotonic() + 0.05), time.monotonic() + MAX_SHORTENING_S)
-        fine = min(step, FINE_STEPS * self._settings.motion_step)
-
-        def edge(first: Array, second: Array) -> bool:
-            return motion.edge_is_free(first, second, step) and motion.edge_is_free(first, second, fine)
-
-        return shorten(path, edge, limit, self._rng)
-
-    def _timed(self, motion: MotionChecker, path: Array, lead_in: Array) -> Trajectory | None:
-        """Rounds, times and checks a path; None where it touches something on the fine grid."""
-        fine = self._settings.motion_step
-        vertices = np.vstack([lead_in[:-1], path])
-        if len(vertices) == 2 and np.abs(vertices[1] - vertices[0]).max() < 1e-9:
-            vertices = vertices[1:]
-        velocity, acceleration = self._scaled_limits()
-        blends = choose_blends(vertices, self._settings.blend_deviation,
-                               lambda curve: motion.first_collision(curve, fine) is None)
-        for candidate in (blends, np.zeros_like(blends)):
-            try:
-                trajectory = parameterize(self._group.joints, vertices, candidate, velocity, acceleration)
-            except PlanningError:
-                if not candidate.any():
-                    raise
-                continue
-            samples = trajectory.positions
-            if len(lead_in) > 1:
-                samples = samples[np.argmin(np.linalg.norm(samples - lead_in[-1], axis=1)):]
-            if motion.first_collision(samples, fine) is None:
-                return trajectory
-            if not candidate.any():
-                return None
-        return None
-
-    def _scaled_limits(self) -> tuple[Array, Array]:
+    def _scaled_limits(self, request: PlanningRequest, group: JointGroup) -> tuple[Array, Array]:
         factors = []
         for name, value, default in (
-                ("max_velocity_scaling_factor", self._request.velocity_scaling,
-                 self._settings.default_velocity_scaling_factor),
-                ("max_acceleration_scaling_factor", self._request.acceleration_scaling,
-                 self._settings.default_acceleration_scaling_factor)):
+                ("max_velocity_scaling_factor", request.velocity_scaling,
+                 self.settings.default_velocity_scaling_factor),
+                ("max_acceleration_scaling_factor", request.acceleration_scaling,
+                 self.settings.default_acceleration_scaling_factor)):
             if not np.isfinite(value) or value < 0.0 or value > 1.0:
                 raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{name} is {value}; allowed is 0 < factor <= 1, "
                                     f"or 0 for the default {default}")
             factors.append(value if value > 0.0 else default)
-        return (self._model.max_velocity[self._group.indices] * factors[0],
-                self._model.max_acceleration[self._group.indices] * factors[1])
+        return (self._model.max_velocity[group.indices] * factors[0],
+                self._model.max_acceleration[group.indices] * factors[1])
+
+
+def _require_start(problem: PlanningProblem) -> None:
+    """Raises PlanningError unless the start is within bounds and free."""
+    faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
+    if faults:
+        raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {'; '.join(faults)}; move the robot within "
+                            "its bounds or use the adapter FixStartStateBounds")
+    if not problem.motion.state_is_free(problem.start_values):
+        contacts = problem.checker.contacts(problem.start, include_fixed=False)
+        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state in collision: "
+                            f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
+                            "FixStartStateCollision")
+
+
+def _shortened(problem: PlanningProblem, path: Array) -> Array:
+    """Shortens a path; what it accepts was also looked at on the fine grid."""
+    now = time.monotonic()
+    limit = min(max(problem.deadline_s, now + 0.05), now + MAX_SHORTENING_S)
+    fine = min(problem.step, FINE_STEPS * problem.settings.motion_step)
+
+    def edge(first: Array, second: Array) -> bool:
+        return problem.edge_is_valid(first, second) and problem.edge_is_valid(first, second, fine)
+
+    return shorten(path, edge, limit, problem.rng)

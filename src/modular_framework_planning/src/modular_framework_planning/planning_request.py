@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.spatial import Array, Transform
 from modular_framework_planning.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from modular_framework_planning.constraints import KinematicConstraints
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +42,16 @@ class PipelineSettings:
         start_state_contact_tolerance: depth of a held body's contact tolerated at the start [m].
         motion_step: distance of collision checks on the returned motion [rad or m].
         blend_deviation: most distance a rounded corner keeps from the corner [rad or m].
+        start_state_max_dt: longest way back from a start out of bounds to the bounds [s].
+        default_workspace_bounds: edge of the cube a request's workspace is where it gives none [m].
+        planner_configs: named settings of planners; groups: what the pipeline's parameters hold below each group.
+        parameters: everything below the pipeline's name on the parameter server.
+        robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
+        seed: of every plan of the pipeline; None for fresh random numbers each time.
     """
 
     start_state_max_bounds_error: float = 0.1
+    start_state_max_dt: float = 0.5
     jiggle_fraction: float = 0.02
     max_sampling_attempts: int = 100
     start_state_collision_depth: float = 0.01
@@ -49,11 +59,27 @@ class PipelineSettings:
     search_step: float = 0.05
     motion_step: float = 0.004
     blend_deviation: float = 0.1
+    default_workspace_bounds: float = 10.0
     default_velocity_scaling_factor: float = 0.1
     default_acceleration_scaling_factor: float = 0.1
     planner_configs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    group_defaults: Mapping[str, str] = field(default_factory=dict)
+    groups: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
+
+    def default_planner(self, group: str) -> str:
+        """Returns the planner of requests that name none; empty where no parameter says."""
+        return str(self.groups.get(group, {}).get("default_planner_config")
+                   or self.parameters.get("default_planner_config") or "")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Workspace:
+    """The box the robot may work in: lower and upper corner in the planning frame [m], each of shape (3,)."""
+
+    lower: Array
+    upper: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +90,11 @@ class PlanningRequest:
         scene: snapshot with the start positions and attached objects already in it.
         goals: alternatives; reaching one is enough.
         velocity_scaling, acceleration_scaling: 0 asks for the default.
+        pipeline_id, planner_id: empty for the default.
+        start_velocities: joint velocities at the start that are known [rad/s or m/s].
+        path_constraints: what every state of the motion must satisfy.
+        max_cartesian_speed: of cartesian_speed_limited_link [m/s]; 0 for none.
+        seed: makes the plan repeatable; None for the pipeline's own.
     """
 
     scene: PlanningScene
@@ -75,6 +106,13 @@ class PlanningRequest:
     velocity_scaling: float = 0.0
     acceleration_scaling: float = 0.0
     cancelled: Callable[[], bool] = field(default=lambda: False)
+    pipeline_id: str = ""
+    start_velocities: Mapping[str, float] = field(default_factory=dict)
+    path_constraints: KinematicConstraints | None = None
+    max_cartesian_speed: float = 0.0
+    cartesian_speed_limited_link: str = ""
+    workspace: Workspace | None = None
+    seed: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +120,7 @@ class PlanningAnswer:
     """A checked motion.
 
     Attributes:
+        start, goal: positions of the whole robot.
         planning_time_s: time until a path was found; total_time_s: until the checked, timed motion was ready.
         path: vertices of the shortened path, shape (n, joints).
     """

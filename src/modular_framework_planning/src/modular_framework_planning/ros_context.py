@@ -2,10 +2,13 @@
 """What the endpoints of the node share."""
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
+from modular_framework_planning.planning_request import PlanningAnswer, PlanningRequest
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.ros_execution import TrajectoryExecution
 from modular_framework_planning.ros_markers import MarkerPublisher
@@ -20,8 +23,24 @@ class MoveGroupContext:
     model: RobotModel
     monitor: SceneMonitor
     kinematics: KinematicsPool
-    pipeline: PlanningPipeline
-    pipeline_name: str
+    pipelines: Mapping[str, PlanningPipeline]
+    default_pipeline: str
     execution: TrajectoryExecution
     markers: MarkerPublisher
     reporter: Reporter
+
+    def plan(self, request: PlanningRequest) -> PlanningAnswer:
+        """Plans with the pipeline the request names, or the default one.
+
+        Raises:
+            PlanningError: no such pipeline, or no plan; code and reason.
+        """
+        return self.pipeline(request.pipeline_id).plan(request)
+
+    def pipeline(self, name: str) -> PlanningPipeline:
+        """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
+        name = name or self.default_pipeline
+        if name not in self.pipelines:
+            raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{name}' is not loaded; available: "
+                                f"{', '.join(self.pipelines)}")
+        return self.pipelines[name]

@@ -24,14 +24,9 @@ from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
 from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
-from modular_framework_planning.ros_execution import TrajectoryExecution
+from modular_framework_planning.ros_execution import load_execution
 from modular_framework_planning.ros_markers import MarkerPublisher
-from modular_framework_planning.ros_parameters import (
-    load_controllers,
-    load_execution_settings,
-    load_pipeline_settings,
-    load_robot_model,
-)
+from modular_framework_planning.ros_parameters import load_pipeline_settings, load_robot_model
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
 
@@ -56,9 +51,10 @@ def build_context() -> MoveGroupContext:
     name, settings = load_pipeline_settings()
     kinematics = KinematicsPool(model)
     monitor = SceneMonitor(model)
-    execution = TrajectoryExecution(load_controllers(), load_execution_settings(), monitor)
-    return MoveGroupContext(model, monitor, kinematics, PlanningPipeline(model, kinematics, settings), name, execution,
-                            MarkerPublisher(), Reporter())
+    execution = load_execution(monitor)
+    pipelines = {name: PlanningPipeline(model, kinematics, settings, name=name)}
+    return MoveGroupContext(model, monitor, kinematics, pipelines, name,
+                            execution, MarkerPublisher(), Reporter())
 
 
 def advertise(context: MoveGroupContext) -> None:
@@ -85,9 +81,9 @@ def main() -> int:
         if group.is_chain:
             context.kinematics.solver(group.name)
     advertise(context)
-    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipeline '%s', %d controllers, after %.1f s",
-                  context.model.name, ", ".join(context.model.groups), context.pipeline_name,
-                  len(context.execution.controllers), time.monotonic() - begun)
+    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipeline '%s', %s, after %.1f s",
+                  context.model.name, ", ".join(context.model.groups), context.default_pipeline,
+                  context.execution.describe(), time.monotonic() - begun)
     import toppra.algorithm  # noqa: F401 - half a second that would otherwise be part of the first plan
 
     rospy.spin()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import rospy
@@ -13,33 +13,6 @@ from modular_framework_planning.planning_request import PipelineSettings
 from modular_framework_planning.robot_model import RobotModel
 
 DESCRIPTION = "robot_description"
-
-
-@dataclass(frozen=True, slots=True)
-class ControllerSpec:
-    """One entry of controller_list."""
-
-    name: str
-    action_ns: str
-    kind: str
-    joints: tuple[str, ...]
-    max_effort: float = 0.0
-
-    @property
-    def action(self) -> str:
-        """Name of the controller's action."""
-        return f"{self.name}/{self.action_ns}" if self.action_ns else self.name
-
-
-@dataclass(frozen=True, slots=True)
-class ExecutionSettings:
-    """Parameters of trajectory execution; names as in MoveIt."""
-
-    execution_duration_monitoring: bool = True
-    allowed_execution_duration_scaling: float = 1.1
-    allowed_goal_duration_margin: float = 0.5
-    allowed_start_tolerance: float = 0.01
-    controller_connection_timeout: float = 5.0
 
 
 def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
@@ -81,31 +54,7 @@ def load_pipeline_settings() -> tuple[str, PipelineSettings]:
             if key in known and isinstance(value, int | float) and not isinstance(value, bool):
                 values[key] = value
     values["planner_configs"] = parameters.get("planner_configs") or {}
-    values["group_defaults"] = {group: str(item["default_planner_config"]) for group, item in parameters.items()
-                                if isinstance(item, dict) and item.get("default_planner_config")}
+    values["groups"] = {group: item for group, item in parameters.items()
+                        if isinstance(item, dict) and group != "planner_configs"}
+    values["parameters"], values["robot_planning"] = parameters, planning
     return name, PipelineSettings(**values)
-
-
-def load_execution_settings() -> ExecutionSettings:
-    """Returns the parameters below ~trajectory_execution."""
-    given = rospy.get_param("~trajectory_execution", {}) or {}
-    known = {item.name: item for item in fields(ExecutionSettings)}
-    return ExecutionSettings(**{key: type(known[key].default)(value) for key, value in given.items() if key in known})
-
-
-def load_controllers() -> tuple[ControllerSpec, ...]:
-    """Returns the controllers of ~controller_list.
-
-    Raises:
-        ModelError: an entry lacks a key or has an unknown type.
-    """
-    result = []
-    for number, entry in enumerate(rospy.get_param("~controller_list", []) or []):
-        missing = [key for key in ("name", "type", "joints") if key not in entry]
-        if missing or entry["type"] not in ("FollowJointTrajectory", "GripperCommand"):
-            raise ModelError(f"{rospy.resolve_name('~controller_list')}[{number}]: missing {missing}, type "
-                             f"'{entry.get('type')}'; needed are name, joints and type FollowJointTrajectory or "
-                             "GripperCommand")
-        result.append(ControllerSpec(str(entry["name"]), str(entry.get("action_ns", "")), str(entry["type"]),
-                                     tuple(entry["joints"]), float(entry.get("max_effort", 0.0))))
-    return tuple(result)

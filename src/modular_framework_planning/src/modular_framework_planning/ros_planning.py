@@ -30,9 +30,7 @@ def _core_request(context: MoveGroupContext, scene: PlanningScene, message: Any,
     refuse_constraints("path_constraints", message.path_constraints, ErrorCode.PLANNING_FAILED)
     for constraints in message.trajectory_constraints.constraints:
         refuse_constraints("trajectory_constraints", constraints, ErrorCode.PLANNING_FAILED)
-    if message.pipeline_id not in ("", context.pipeline_name):
-        raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{message.pipeline_id}' is not loaded; "
-                            f"available: {context.pipeline_name}")
+    context.pipeline(message.pipeline_id)
     if not np.isfinite(message.allowed_planning_time):
         raise PlanningError(ErrorCode.TIMED_OUT, "allowed_planning_time is not finite")
     scene = scene_with_state(scene, message.start_state, "start_state")
@@ -40,7 +38,8 @@ def _core_request(context: MoveGroupContext, scene: PlanningScene, message: Any,
     return PlanningRequest(scene, group.name, goals, message.planner_id, max(1, message.num_planning_attempts),
                            message.allowed_planning_time if message.allowed_planning_time > 0.0
                            else DEFAULT_PLANNING_TIME_S,
-                           message.max_velocity_scaling_factor, message.max_acceleration_scaling_factor, cancelled)
+                           message.max_velocity_scaling_factor, message.max_acceleration_scaling_factor, cancelled,
+                           message.pipeline_id)
 
 
 def plan(context: MoveGroupContext, message: Any, change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
@@ -64,7 +63,7 @@ def plan(context: MoveGroupContext, message: Any, change: Callable[[PlanningScen
         request = _core_request(context, scene, message, cancelled)
         scene = request.scene
         details["start"] = dict(zip(scene.model.joint_names, scene.positions.tolist(), strict=True))
-        answer = context.pipeline.plan(request)
+        answer = context.plan(request)
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
         response.error_code.val = context.reporter.failure("plan", error, **details)
         return response

@@ -9,7 +9,6 @@ from moveit_msgs.msg import PlannerInterfaceDescription
 from moveit_msgs.srv import QueryPlannerInterfaces, QueryPlannerInterfacesResponse
 
 from modular_framework_planning import capability_names as names
-from modular_framework_planning.ompl_planning import PLANNERS
 from modular_framework_planning.ros_context import MoveGroupContext
 
 
@@ -24,6 +23,6 @@ class QueryPlannersService:
         rospy.Service(names.QUERY_PLANNERS_SERVICE, QueryPlannerInterfaces, self._serve)
 
     def _serve(self, _: Any) -> QueryPlannerInterfacesResponse:
-        description = PlannerInterfaceDescription(name="OMPL", pipeline_id=self._context.pipeline_name,
-                                                  planner_ids=sorted(PLANNERS))
-        return QueryPlannerInterfacesResponse([description])
+        return QueryPlannerInterfacesResponse([
+            PlannerInterfaceDescription(name="OMPL", pipeline_id=name, planner_ids=sorted(pipeline.planner_ids))
+            for name, pipeline in self._context.pipelines.items()])

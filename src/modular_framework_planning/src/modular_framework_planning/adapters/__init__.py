@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Request adapters: steps around a planner that mend a request before and complete a path after."""

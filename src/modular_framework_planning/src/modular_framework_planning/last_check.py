@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The check every returned motion has passed, whatever planner and adapters made it."""
+from __future__ import annotations
+
+import numpy as np
+
+from modular_framework_planning.contact_report import describe_contacts
+from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.spatial import Array
+
+
+class LastCheck:
+    """Looks at a timed motion at `motion_step`; a motion it has seen and passed is not looked at twice."""
+
+    def __init__(self) -> None:
+        self._passed: set[tuple[bytes, int]] = set()
+
+    def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
+        """Returns what is wrong with the timed motion of a path; empty where nothing is.
+
+        Args:
+            problem: what was planned; its checker and constraints are asked.
+            path: with a trajectory.
+        """
+        samples = checked_part(path)
+        key = (samples.tobytes(), id(problem.checker))
+        if key in self._passed:
+            return ""
+        text = _not_in_order(path) or _collision(problem, samples) or _violation(problem, samples)
+        if not text:
+            self._passed.add(key)
+        return text
+
+
+def checked_part(path: PlannedPath) -> Array:
+    """Returns the samples of the timed motion after the way out of a colliding start."""
+    assert path.trajectory is not None
+    samples = path.trajectory.positions
+    if not path.lead_in:
+        return samples
+    first_free = path.vertices[path.lead_in]
+    return samples[int(np.argmin(np.linalg.norm(samples - first_free, axis=1))):]
+
+
+def _not_in_order(path: PlannedPath) -> str:
+    assert path.trajectory is not None
+    times = path.trajectory.times
+    if not np.isfinite(times).all() or not np.isfinite(path.trajectory.positions).all():
+        return "a sample of the motion is not finite"
+    bad = np.flatnonzero(np.diff(times) <= 0.0)
+    return f"the time of sample {int(bad[0]) + 1} is not after the one before" if len(bad) else ""
+
+
+def _collision(problem: PlanningProblem, samples: Array) -> str:
+    step = problem.settings.motion_step
+    hit = problem.motion.first_collision(samples, step)
+    if hit is None:
+        return ""
+    contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)
+    return f"{describe_contacts(contacts)} (checked at {step} rad steps)"
+
+
+def _violation(problem: PlanningProblem, samples: Array) -> str:
+    if problem.constraints is None:
+        return ""
+    for number, values in enumerate(samples):
+        whole = problem.motion.whole(values)
+        if not problem.constraints.satisfied(whole):
+            return f"sample {number} of {len(samples)} violates a path constraint: {problem.constraints.describe(whole)}"
+    return ""
