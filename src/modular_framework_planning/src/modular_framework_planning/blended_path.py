@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from modular_framework_planning.compiled_timing import PathPieces
 from modular_framework_planning.spatial import Array
 
 NEARLY_REVERSED = -0.9  # cosine of the turn below which the motion stops instead of swinging round
@@ -45,6 +46,10 @@ class BlendedPath:
                 starts.append(position)
         self.breaks = np.array(starts)
         self._points, self._tangents, self._curvatures = (np.array(x) for x in (points, tangents, curvatures))
+
+    def pieces(self) -> PathPieces:
+        """Returns the arrays of all pieces, for compiled code."""
+        return PathPieces(self.breaks, self._points, self._tangents, self._curvatures)
 
     @property
     def length(self) -> float:

@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The timed motion of a group: what every planner returns and the wire carries."""
+"""The timed motion of a group: what every planner returns and the wire carries, and the curve a controller makes of it.
+
+A JointTrajectoryController joins points that give positions, velocities and accelerations by quintic polynomials:
+limits hold for the robot only if they hold along that curve, not just at the points.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from modular_framework_planning.spatial import Array
+
+SAMPLE_PERIOD_S = 0.001  # of a controller
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,3 +35,48 @@ class Trajectory:
     def duration_s(self) -> float:
         """Length of the motion."""
         return float(self.times[-1])
+
+    def coefficients(self) -> Array:
+        """Returns the polynomials between the points, lowest power first, shape (n - 1, 6, joints)."""
+        span = np.diff(self.times)[:, None]
+        way = np.diff(self.positions, axis=0) / span
+        v0, v1 = self.velocities[:-1], self.velocities[1:]
+        a0, a1 = self.accelerations[:-1] * span, self.accelerations[1:] * span
+        return np.stack([self.positions[:-1], v0, 0.5 * a0 / span,
+                         (10.0 * way - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1) / span**2,
+                         (-15.0 * way + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1) / span**3,
+                         (6.0 * way - 3.0 * v0 - 3.0 * v1 - 0.5 * a0 + 0.5 * a1) / span**4], axis=1)
+
+    def at(self, times: Array) -> tuple[Array, Array, Array, Array]:
+        """Returns positions, velocities, accelerations and jerks of the curve at some times, shape (m, joints) each."""
+        if len(self.times) < 2:
+            still = np.zeros((len(times), self.positions.shape[1]))
+            return still + self.positions[0], still, still, still
+        segment = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        t = (np.clip(times, self.times[0], self.times[-1]) - self.times[segment])[:, None]
+        c0, c1, c2, c3, c4, c5 = np.moveaxis(self.coefficients()[segment], 1, 0)
+        return (c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
+                c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
+                2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
+                6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
+
+    def sample_times(self, period_s: float = SAMPLE_PERIOD_S) -> Array:
+        """Returns even times from start to end, both included, at most `period_s` apart."""
+        return np.linspace(0.0, self.duration_s, int(np.ceil(self.duration_s / period_s)) + 1)
+
+    def curve(self, step: float) -> Array:
+        """Returns positions along the curve, neighbours about `step` [rad or m, any joint] apart or nearer."""
+        if len(self.times) < 2:
+            return self.positions
+        reach = np.maximum(np.abs(np.diff(self.positions, axis=0)).max(axis=1),
+                           np.diff(self.times) * np.maximum(np.abs(self.velocities[:-1]).max(axis=1),
+                                                            np.abs(self.velocities[1:]).max(axis=1)))
+        counts = np.maximum(1, np.ceil(reach / step)).astype(int)
+        pieces = [np.linspace(low, high, count, endpoint=False)
+                  for low, high, count in zip(self.times[:-1], self.times[1:], counts, strict=True)]
+        return np.vstack([self.at(np.concatenate(pieces))[0], self.positions[-1:]])
+
+    def slowed(self, factor: float) -> Trajectory:
+        """Returns the same curve run `factor` times slower."""
+        return Trajectory(self.joint_names, self.times * factor, self.positions, self.velocities / factor,
+                          self.accelerations / factor**2)

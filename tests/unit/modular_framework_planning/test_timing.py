@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Timed motions keep the limits along the whole curve a controller runs, follow their path and are nearly fastest."""
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from modular_framework_planning.blended_path import BlendedPath
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.time_parameterization import WINDOW_S, parameterize
+from modular_framework_planning.trajectory import Trajectory
+
+VELOCITY = np.array([3.15, 3.15, 3.15, 3.2, 3.2, 3.2])
+ACCELERATION = np.array([5.0, 5.0, 5.0, 8.0, 8.0, 8.0])
+JOINTS = tuple("abcdef")
+
+
+def random_polyline(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices, and corner distances of which a fifth are 0."""
+    vertices = np.cumsum(rng.uniform(-1, 1, (rng.integers(2, 9), 6)) * rng.choice([0.01, 0.1, 1.0]), axis=0)
+    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
+    blends = rng.uniform(0.02, 0.45, max(0, len(vertices) - 2)) * np.minimum(lengths[:-1], lengths[1:])
+    return vertices, blends * (rng.random(len(blends)) < 0.8)
+
+
+def shares(motion: Trajectory, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[float, float]:
+    """Largest share of the limits at 1 ms samples of the controller's curve."""
+    _, velocities, accelerations, _ = motion.at(motion.sample_times(0.001))
+    return float((np.abs(velocities) / velocity).max()), float((np.abs(accelerations) / acceleration).max())
+
+
+def test_limits_hold_at_every_millisecond_of_the_controllers_curve() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        vertices, blends = random_polyline(rng)
+        velocity, acceleration = VELOCITY * rng.choice([0.1, 1.0]), ACCELERATION * rng.choice([0.01, 0.5, 1.0])
+        motion = parameterize(JOINTS, vertices, blends, velocity, acceleration)
+        assert motion.times[0] == 0.0 and np.diff(motion.times).min() > 1e-3
+        assert max(shares(motion, velocity, acceleration)) <= 1.0
+        assert np.array_equal(motion.positions[[0, -1]], vertices[[0, -1]])
+        for column in (motion.velocities, motion.accelerations):
+            assert np.allclose(column[[0, -1]], 0.0, atol=1e-9)
+        assert np.array_equal(motion.times, np.round(motion.times, 9)), "messages carry whole nanoseconds"
+
+
+def test_curve_is_the_one_a_joint_trajectory_controller_runs() -> None:
+    control = pytest.importorskip("modular_framework_control.trajectory", reason="source the workspace")
+    rng = np.random.default_rng(2)
+    vertices, blends = random_polyline(rng)
+    motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)
+    points = tuple(control.TrajectoryPoint(*(tuple(np.atleast_1d(item).tolist()) if number else float(item)
+                                             for number, item in enumerate(row)))
+                   for row in zip(motion.times, motion.positions, motion.velocities, motion.accelerations, strict=True))
+    spline = control.Spline(control.JointTrajectory(JOINTS, points))
+    assert np.allclose(motion.coefficients(), spline.coefficients, rtol=1e-6, atol=1e-6)
+
+
+def distance_to_path(path: BlendedPath, points: np.ndarray) -> float:
+    """Largest distance of some points from a path [rad]."""
+    dense = path.evaluate(np.linspace(0.0, path.length, int(path.length / 2e-4) + 2))
+    return max(float(np.abs(dense - point).max(axis=1).min()) for point in points)
+
+
+def test_motion_stays_on_its_path_but_for_the_averaging_of_curves() -> None:
+    rng = np.random.default_rng(3)
+    vertices = np.cumsum(rng.uniform(-1, 1, (5, 6)), axis=0)
+    blends = np.full(3, 0.2)
+    motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)
+    allowed = ACCELERATION.max() * WINDOW_S**2 / 24 + 3e-4
+    assert distance_to_path(BlendedPath(vertices, blends), motion.at(motion.sample_times(0.005))[0]) < allowed
+
+
+def fastest_duration(path: BlendedPath, velocity: np.ndarray, acceleration: np.ndarray) -> float:
+    """Duration found by the public TOPP-RA library on a fine grid."""
+    toppra = pytest.importorskip("toppra")
+    from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
+    from toppra.interpolator import AbstractGeometricPath
+
+    class Path(AbstractGeometricPath):
+        dof, path_interval = 6, np.array([0.0, path.length])
+
+        def __call__(self, positions: np.ndarray, order: int = 0) -> np.ndarray:
+            values = path.evaluate(np.atleast_1d(positions), order)
+            return values if np.ndim(positions) else values[0]
+
+    grid = np.unique(np.concatenate([path.breaks, path.breaks[1:-1] + 1e-6,
+                                     np.linspace(0.0, path.length, int(path.length / 0.004))]))
+    limits = [JointVelocityConstraint(np.column_stack([-velocity, velocity])),
+              JointAccelerationConstraint(np.column_stack([-acceleration, acceleration]),
+                                          discretization_scheme=DiscretizationType.Collocation)]
+    speeds = toppra.algorithm.TOPPRA(limits, Path(), gridpoints=grid,
+                                     solver_wrapper="seidel").compute_parameterization(0.0, 0.0)[1]
+    return float((2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])).sum())
+
+
+def test_motion_is_as_fast_as_the_public_library_finds_but_for_the_window() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(6):
+        vertices = np.cumsum(rng.uniform(-1, 1, (5, 6)), axis=0)
+        blends = np.full(3, 0.2)
+        motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)
+        fastest = fastest_duration(BlendedPath(vertices, blends), VELOCITY, ACCELERATION)
+        assert 0.99 * fastest < motion.duration_s < 1.03 * fastest + WINDOW_S
+
+
+def test_one_vertex_is_a_motion_of_one_point() -> None:
+    motion = parameterize(JOINTS, np.ones((1, 6)), np.zeros(0), VELOCITY, ACCELERATION)
+    assert motion.duration_s == 0.0 and np.array_equal(motion.positions, np.ones((1, 6)))
+    assert np.array_equal(motion.at(np.zeros(2))[0], np.ones((2, 6)))
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+def test_limits_that_are_no_limits_are_refused(bad: float) -> None:
+    with pytest.raises(PlanningError, match="finite and above 0"):
+        parameterize(JOINTS, np.zeros((2, 6)), np.zeros(0), VELOCITY * bad, ACCELERATION)
+
+
+def test_dense_curve_has_no_gap_wider_than_asked() -> None:
+    rng = np.random.default_rng(5)
+    vertices, blends = random_polyline(rng)
+    motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)
+    curve = motion.curve(0.004)
+    assert np.abs(np.diff(curve, axis=0)).max() < 1.2 * 0.004
+    assert np.array_equal(curve[0], motion.positions[0]) and np.array_equal(curve[-1], motion.positions[-1])
