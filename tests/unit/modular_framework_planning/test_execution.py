@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import rospy
 from moveit_msgs.msg import RobotTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from modular_framework_planning.controllers import ControllerSpec
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.execution_messages import MotionPart
+from modular_framework_planning.execution_settings import ExecutionSettings, parse_execution_settings
+from modular_framework_planning.ros_controllers import ActionControllers
 from modular_framework_planning.ros_execution import TrajectoryExecution
-from modular_framework_planning.ros_parameters import ControllerSpec, ExecutionSettings
 
+WHEEL = ControllerSpec("base", "follow", "FollowJointTrajectory", ("wheel",))
 ARM = ControllerSpec("arm", "follow", "FollowJointTrajectory", ("elbow",))
 GRIPPER = ControllerSpec("gripper", "gripper_cmd", "GripperCommand", ("finger",))
 
 
 class StandingRobot:
-    """What execution asks of the scene monitor: both joints stand at 0.3."""
+    """What execution asks of the scene monitor: the joints stand at 0.3, the wheel almost a turn further."""
 
-    model = SimpleNamespace(index={"elbow": 0, "finger": 1})
+    model = SimpleNamespace(index={"elbow": 0, "finger": 1, "wheel": 2}, follower_joints=frozenset({"mirror"}),
+                            is_continuous=lambda number: number == 2)
 
     def wait_for_state(self) -> None:
         return
@@ -32,81 +39,199 @@ class StandingRobot:
         return True
 
     def positions(self) -> Any:
-        return np.array([0.3, 0.3])
+        return np.array([0.3, 0.3, 0.3 + 2 * np.pi])
 
 
-class RecordedMotion(TrajectoryExecution):
-    """Notes what would have been sent to controllers."""
+class RecordedControllers(ActionControllers):
+    """Notes the parts of motions instead of sending them; `answers` says by controller what becomes of them."""
 
-    def __init__(self) -> None:
-        super().__init__((ARM, GRIPPER), ExecutionSettings(), StandingRobot())  # type: ignore[arg-type]
-        self.sent: list[str] = []
+    def __init__(self, *specs: ControllerSpec) -> None:
+        super().__init__(specs, 1.0)
+        self.sent: list[MotionPart] = []
+        self.cancelled: list[str] = []
+        self.answers: dict[str, Any] = {}
 
-    def _require_servers(self, parts: Any) -> None:
+    def connect(self) -> None:
         return
 
-    def _run(self, parts: Any, duration_s: float, cancelled: threading.Event) -> None:
-        self.sent += [part.controller.name for part in parts]
-
-    def _settle(self, joint_names: Any) -> None:
+    def prepare(self, parts: Any) -> None:
         return
 
+    def begin(self, part: MotionPart) -> Any:
+        self.sent.append(part)
+        name = part.controller.name
 
-def one_point(joint: str, position: float) -> RobotTrajectory:
-    motion = RobotTrajectory()
-    motion.joint_trajectory.joint_names = [joint] if joint else []
-    motion.joint_trajectory.points = [JointTrajectoryPoint(positions=[position] if joint else [])]
-    return motion
+        def is_done() -> bool:
+            answer = self.answers.get(name, True)
+            if isinstance(answer, Exception):
+                raise answer
+            return bool(answer)
+
+        return SimpleNamespace(is_done=is_done, cancel=lambda: self.cancelled.append(name))
+
+
+@pytest.fixture(autouse=True)
+def clock() -> Any:
+    """Simulated time that stands still until a test moves it."""
+    rospy.rostime.set_rostime_initialized(True)
+    rospy.rostime._set_rostime(rospy.Time(100))
+    yield rospy.rostime._set_rostime
+    rospy.rostime.switch_to_wallclock()
+    rospy.rostime.set_rostime_initialized(False)
+
+
+def executor(controllers: ActionControllers, **settings: Any) -> TrajectoryExecution:
+    settings = {"wait_for_trajectory_completion": False, **settings}
+    return TrajectoryExecution(controllers, ExecutionSettings(**settings), StandingRobot())  # type: ignore[arg-type]
+
+
+def motion(joints: str, *points: tuple[float, list[float]]) -> RobotTrajectory:
+    """A trajectory from (time, positions)."""
+    message = RobotTrajectory()
+    message.joint_trajectory.joint_names = joints.split()
+    message.joint_trajectory.points = [
+        JointTrajectoryPoint(positions=positions, velocities=[0.1] * len(positions),
+                             time_from_start=rospy.Duration.from_sec(at)) for at, positions in points]
+    return message
 
 
 def test_a_motion_to_where_the_arm_is_succeeds_without_bothering_its_controller() -> None:
-    execution = RecordedMotion()
-    execution.execute(one_point("elbow", 0.301), threading.Event())
-    assert execution.sent == []
+    controllers = RecordedControllers(ARM, GRIPPER)
+    executor(controllers).execute(motion("elbow", (0.0, [0.301])), threading.Event())
+    assert controllers.sent == []
+
+
+def test_a_motion_that_starts_elsewhere_is_refused_and_the_joint_named() -> None:
+    controllers = RecordedControllers(ARM, GRIPPER)
+    away = motion("elbow", (0.0, [0.8]), (1.0, [0.9]))
     with pytest.raises(PlanningError, match="'elbow' is 0.5000 from"):
-        execution.execute(one_point("elbow", 0.8), threading.Event())
+        executor(controllers).execute(away, threading.Event())
+    with pytest.raises(PlanningError, match="'elbow' is 0.5000 from"):
+        executor(controllers, joints_allowed_start_tolerance={"elbow": 0.4}).execute(away, threading.Event())
+    assert controllers.sent == []
+    executor(controllers, allowed_start_tolerance=0.0).execute(away, threading.Event())
+    executor(controllers, joints_allowed_start_tolerance={"elbow": 0.6}).execute(away, threading.Event())
+    assert len(controllers.sent) == 2
+
+
+def test_a_joint_without_end_starts_where_it_is_whatever_its_turns() -> None:
+    controllers = RecordedControllers(WHEEL)
+    executor(controllers).execute(motion("wheel", (0.0, [0.3]), (1.0, [0.5])), threading.Event())
+    assert len(controllers.sent) == 1
 
 
 def test_a_gripper_gets_its_goal_even_where_it_is_because_it_is_to_squeeze() -> None:
-    execution = RecordedMotion()
-    execution.execute(one_point("finger", 0.3), threading.Event())
-    assert execution.sent == ["gripper"]
+    controllers = RecordedControllers(ARM, GRIPPER)
+    executor(controllers).execute(motion("finger", (0.0, [0.3])), threading.Event())
+    assert [part.controller for part in controllers.sent] == [GRIPPER]
 
 
 def test_a_motion_that_names_no_joint_is_refused() -> None:
     with pytest.raises(PlanningError, match="no joint_names"):
-        RecordedMotion().execute(one_point("", 0.0), threading.Event())
+        executor(RecordedControllers(ARM)).execute(motion("", (0.0, [])), threading.Event())
 
 
-class EndlessMotion(TrajectoryExecution):
-    """Its controller never ends; the motion does when it is stopped."""
+def test_a_motion_is_cut_by_the_joints_of_its_controllers_and_mimicking_joints_are_nobodys() -> None:
+    controllers = RecordedControllers(ARM, GRIPPER)
+    whole = motion("finger mirror elbow", (0.0, [0.3, 0.0, 0.3]), (2.0, [0.1, 0.0, 0.7]))
+    executor(controllers).execute(whole, threading.Event())
+    sent = {part.controller.name: part.trajectory for part in controllers.sent}
+    assert {name: part.joint_names for name, part in sent.items()} == {"arm": ["elbow"], "gripper": ["finger"]}
+    assert sent["arm"].points[-1].positions == [0.7]
+    assert sent["gripper"].points[-1].positions == [0.1]
 
-    begun = threading.Event()
 
-    def _require_servers(self, parts: Any) -> None:
-        return
+def test_velocity_scaling_executes_the_same_motion_in_less_time() -> None:
+    controllers = RecordedControllers(ARM)
+    executor(controllers, execution_velocity_scaling=2.0).execute(
+        motion("elbow", (0.0, [0.3]), (1.0, [0.7])), threading.Event())
+    last = controllers.sent[0].trajectory.points[-1]
+    assert (last.time_from_start.to_sec(), list(last.positions), list(last.velocities)) == (0.5, [0.7], [0.2])
 
-    def _run(self, parts: Any, duration_s: float, cancelled: threading.Event) -> None:
-        self.begun.set()
-        assert self._stop.wait(5.0)
-        time.sleep(0.05)
-        raise PlanningError(ErrorCode.PREEMPTED, "the motion was stopped on request")
+
+def test_a_controller_that_fails_stops_the_others_and_its_words_are_passed_on() -> None:
+    controllers = RecordedControllers(ARM, GRIPPER)
+    controllers.answers = {"arm": False, "gripper": PlanningError(ErrorCode.CONTROL_FAILED, "the jaw is stuck")}
+    both = motion("elbow finger", (0.0, [0.3, 0.3]), (1.0, [0.5, 0.5]))
+    with pytest.raises(PlanningError, match="the jaw is stuck"):
+        executor(controllers).execute(both, threading.Event())
+    assert "arm" in controllers.cancelled
+
+
+@pytest.mark.parametrize(("settings", "spec", "late_s"), [
+    ({}, {}, 1.7), ({"allowed_execution_duration_scaling": 2.0}, {}, 2.6),
+    ({"allowed_goal_duration_margin": 2.0}, {}, 3.2), ({}, {"duration_scaling": 3.0, "duration_margin": 1.0}, 4.1)])
+def test_a_motion_that_takes_too_long_is_stopped(clock: Any, settings: Any, spec: Any, late_s: float) -> None:
+    controllers = RecordedControllers(replace(ARM, **spec))
+    controllers.answers["arm"] = False
+    execution = executor(controllers, **settings)
+    slow = motion("elbow", (0.0, [0.3]), (1.0, [0.5]))
+    ended: list[PlanningError] = []
+
+    def execute() -> None:
+        try:
+            execution.execute(slow, threading.Event())
+        except PlanningError as error:
+            ended.append(error)
+
+    thread = threading.Thread(target=execute)
+    thread.start()
+    while not controllers.sent:
+        time.sleep(0.005)
+    clock(rospy.Time.from_sec(100.0 + late_s - 0.2))
+    thread.join(0.1)
+    assert not ended
+    clock(rospy.Time.from_sec(100.0 + late_s))
+    thread.join(5.0)
+    assert ended[0].code is ErrorCode.TIMED_OUT
+    assert controllers.cancelled == ["arm"]
+
+
+def test_without_monitoring_a_motion_may_take_for_ever(clock: Any) -> None:
+    controllers = RecordedControllers(ARM)
+    controllers.answers["arm"] = False
+    execution = executor(controllers, execution_duration_monitoring=False)
+    clock(rospy.Time(100))
+    cancelled = threading.Event()
+    threading.Timer(0.1, lambda: clock(rospy.Time(900))).start()
+    threading.Timer(0.3, cancelled.set).start()
+    with pytest.raises(PlanningError, match="stopped on request"):
+        execution.execute(motion("elbow", (0.0, [0.3]), (1.0, [0.5])), cancelled)
+
+
+def test_a_node_that_only_plans_says_so() -> None:
+    execution = TrajectoryExecution(None, ExecutionSettings(), StandingRobot())  # type: ignore[arg-type]
+    with pytest.raises(PlanningError, match="allow_trajectory_execution is false"):
+        execution.execute(motion("elbow", (0.0, [0.3])), threading.Event())
+    assert execution.describe() == "no execution of motions"
 
 
 def test_closing_stops_the_motion_and_waits_until_it_has_ended() -> None:
-    execution = EndlessMotion((ARM,), ExecutionSettings(allowed_start_tolerance=0.0), None)  # type: ignore[arg-type]
-    motion = one_point("elbow", 0.0)
+    controllers = RecordedControllers(ARM)
+    controllers.answers["arm"] = False
+    execution = executor(controllers)
     ended = []
 
     def execute() -> None:
         with pytest.raises(PlanningError, match="stopped on request"):
-            execution.execute(motion, threading.Event())
+            execution.execute(motion("elbow", (0.0, [0.3]), (1.0, [0.5])), threading.Event())
         ended.append(True)
 
     thread = threading.Thread(target=execute)
     thread.start()
-    assert execution.begun.wait(5.0)
+    while not controllers.sent:
+        time.sleep(0.005)
     execution.close()
     thread.join(5.0)
     assert ended
+    assert controllers.cancelled == ["arm"]
     execution.close()  # a second time does nothing
+
+
+def test_settings_that_make_no_sense_keep_their_defaults_and_are_named() -> None:
+    settings, faults = parse_execution_settings({
+        "allowed_start_tolerance": 0, "allowed_goal_duration_margin": "much", "execution_velocity_scaling": 0.0,
+        "execution_duration_monitoring": "yes", "joints_allowed_start_tolerance": {"elbow": 1}, "unheard_of": 1})
+    assert settings == ExecutionSettings(allowed_start_tolerance=0.0, joints_allowed_start_tolerance={"elbow": 1})
+    assert [fault.split()[0] for fault in faults] == [
+        "execution_duration_monitoring", "allowed_goal_duration_margin", "execution_velocity_scaling"]

@@ -76,6 +76,7 @@ class RobotModel:
         if self.pin_model.nq != len(self.joint_names):
             raise ModelError(f"URDF: {self.pin_model.nq} position variables for {len(self.joint_names)} joints; "
                              "only joints with one degree of freedom are supported")
+        self.follower_joints = frozenset(self.document.mimics) | self.semantics.passive_joints
         self.planning_frame = self._planning_frame()
         self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
         self.limits = self._joint_limits(limits or {})
@@ -151,8 +152,7 @@ class RobotModel:
 
     def _build_group(self, spec: GroupSpec) -> JointGroup:
         members = self._group_joints(spec)
-        follower = set(self.document.mimics) | set(self.semantics.passive_joints)
-        joints = tuple(name for name in self.joint_names if name in members and name not in follower)
+        joints = tuple(name for name in self.joint_names if name in members and name not in self.follower_joints)
         links = tuple(self.document.joint_children[name] for name in members if name in self.document.joint_children)
         base, tip = self._chain_ends(spec, joints)
         ordered = tuple(link for link in self.document.links if link in links)
