@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.kinematics import InverseKinematics
+from modular_framework_planning.kinematics import NUMERIC, InverseKinematics, KinematicsSettings
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.spatial import pose_difference
 
@@ -55,8 +55,7 @@ def test_solutions_come_nearest_first_and_include_whole_turns_within_bounds(
 
 
 def test_numeric_search_solves_what_the_closed_form_solves(model: RobotModel, solver: InverseKinematics) -> None:
-    numeric = InverseKinematics(model, model.group("arm_and_manipulator"))
-    numeric._analytic = None
+    numeric = InverseKinematics(model, model.group("arm_and_manipulator"), KinematicsSettings(NUMERIC))
     rng = np.random.default_rng(2)
     for _ in range(20):
         target = model.link_transforms(random_positions(model, rng))[TIP]

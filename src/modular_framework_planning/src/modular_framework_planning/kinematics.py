@@ -2,107 +2,134 @@
 """Finds joint positions that bring a link to a pose: every closed-form solution where there are some, else numeric."""
 from __future__ import annotations
 
-import itertools
-import math
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-import pinocchio as pin
 
+from modular_framework_planning.chain_model import ChainModel
+from modular_framework_planning.closed_form import ClosedForm
+from modular_framework_planning.compiled_kinematics import (
+    Chain,
+    approach_seed,
+    polish,
+    search,
+    unique_rows,
+    whole_turns,
+)
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.robot_model import JointGroup, RobotModel
 from modular_framework_planning.spatial import Array, Transform
 
-POSE_TOLERANCE = 1.0e-6  # [m] and [rad]; every returned solution is checked by forward kinematics against this
-SAME_SOLUTION = 1.0e-5  # [rad]
-MAX_WRAPS = 4096
-NEWTON_STEPS = 8
+POSE_TOLERANCE = 1.0e-6  # [m] and [rad]; every returned solution reaches the pose at least this well
+ACCURACY = 1.0e-8  # what the compiled steps are asked for
+SAME_SOLUTION = 1.0e-5  # [rad or m]
+FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it is no solution
+MAX_TURNS = 4096
+POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 60, 20
+STARTS_A_BATCH = 16
+FRUITLESS_BATCHES = 8  # the numeric search ends after so many batches without a new solution
+ENOUGH = 16  # solutions of the numeric search
+APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
+SIMILAR = 0.1  # [rad]; distances from the seed that differ by less are decided by clearance
+NUMERIC = "numeric"
 
 
-class AnalyticSolver:
-    """Closed-form inverse kinematics of a six-joint chain by subproblem decomposition (EAIK)."""
+@dataclass(frozen=True, slots=True)
+class KinematicsSettings:
+    """How one group is solved; the keys of kinematics.yaml without their prefix.
 
-    def __init__(self, model: RobotModel, group: JointGroup, base_link: str, tip_link: str) -> None:
-        """Reads axes and offsets of the chain from the model with all joints at zero.
+    Attributes:
+        solver: plugin name of a config package, or "numeric" to leave closed forms out.
+        search_resolution: step of the held joint of a seven-joint chain [rad].
+        timeout_s: time one attempt of the numeric search may take, where a request gives none.
+        attempts: how many such times.
+    """
 
-        Raises:
-            PlanningError: the chain has no known decomposition.
-        """
-        from eaik.IK_HP import HPRobot
+    solver: str = ""
+    search_resolution: float = 0.1
+    timeout_s: float = 0.05
+    attempts: int = 1
 
-        data = model.pin_model.createData()
-        pin.framesForwardKinematics(model.pin_model, data, model.with_mimics(np.zeros(len(model.joint_names))))
-        base = data.oMf[model.frame_ids[base_link]].inverse()
-        tip = base * data.oMf[model.frame_ids[tip_link]]
-        axes, points = [], []
-        for name in group.joints:
-            number = model.pin_model.getJointId(name)
-            placement = base * data.oMi[number]
-            direction = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1)}
-            joint = model.pin_model.joints[number]
-            axis = _joint_axis(joint, direction)
-            axes.append(placement.rotation @ axis)
-            points.append(placement.translation)
-        points.append(tip.translation)
-        offsets = np.diff(np.vstack([np.zeros(3), points]), axis=0)
-        self._robot = HPRobot(np.array(axes), offsets)
-        if not self._robot.hasKnownDecomposition():
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"group '{group.name}': no closed-form solution is known")
-        self._tip_rotation_at_zero = tip.rotation.copy()
-
-    def solve(self, tip_in_base: Transform) -> list[Array]:
-        """Returns candidate joint vectors; least-squares approximations are left out by the caller's check."""
-        target = tip_in_base.homogeneous.copy()
-        target[:3, :3] = tip_in_base.rotation @ self._tip_rotation_at_zero.T
-        return [np.asarray(q, dtype=float) for q in self._robot.IK(target).Q]
+    def __post_init__(self) -> None:
+        if not (self.search_resolution > 0.0 and self.timeout_s > 0.0 and self.attempts >= 1):
+            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: kinematics_solver_search_resolution is "
+                                f"{self.search_resolution}, kinematics_solver_timeout is {self.timeout_s}, "
+                                f"kinematics_solver_attempts is {self.attempts}; allowed are numbers above 0, and "
+                                "whole attempts")
 
 
-def _joint_axis(joint: Any, direction: dict[str, tuple[int, int, int]]) -> Array:
-    """Returns the rotation axis of a revolute Pinocchio joint in its own frame."""
-    short = joint.shortname()
-    if short.startswith("JointModelR") and short[-1] in direction:
-        return np.array(direction[short[-1]], dtype=float)
-    if short == "JointModelRevoluteUnaligned":
-        return np.array(joint.extract().axis if hasattr(joint, "extract") else joint.axis, dtype=float)
-    raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"joint model {short} is not a plain revolute joint")
+def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSettings]:
+    """Reads the contents of kinematics.yaml: a mapping from group to its keys.
+
+    Raises:
+        PlanningError: a group's entry is not a mapping, or a value is not a number above 0.
+    """
+    result = {}
+    for group, entry in parameters.items():
+        if not isinstance(entry, Mapping):
+            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}' is {entry!r}; a mapping with "
+                                "kinematics_solver and its keys is needed")
+        default = KinematicsSettings()
+        try:
+            result[group] = KinematicsSettings(
+                str(entry.get("kinematics_solver", default.solver)),
+                float(entry.get("kinematics_solver_search_resolution", default.search_resolution)),
+                float(entry.get("kinematics_solver_timeout", default.timeout_s)),
+                int(entry.get("kinematics_solver_attempts", default.attempts)))
+        except (TypeError, ValueError) as error:
+            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
+                                "needed") from error
+    return result
 
 
 class InverseKinematics:
     """Solves for one group of the robot; safe to share between threads."""
 
-    def __init__(self, model: RobotModel, group: JointGroup) -> None:
+    def __init__(self, model: RobotModel, group: JointGroup,
+                 settings: KinematicsSettings = KinematicsSettings()) -> None:  # noqa: B008 - frozen
         if not group.is_chain:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"group '{group.name}' is not a chain of joints; inverse "
                                 "kinematics needs a chain from a base link to a tip link")
-        self.model = model
-        self.group = group
+        self.model, self.group, self.settings = model, group, settings
         self._members = frozenset(int(number) for number in group.indices)
         self._last_link = model.document.joint_children[group.joints[-1]]
         self.base_link = model.document.joint_parents[group.joints[0]]
-        self._analytic = self._try_analytic()
+        self._chain = ChainModel(model, group, self._last_link)
+        self._turning = np.array([model.document.joint_kinds[name] != "prismatic" for name in group.joints])
+        self._endless = np.array([model.is_continuous(int(number)) for number in group.indices])
+        self._closed = self._try_closed_form()
         self.reach = self._max_reach()
 
     @property
     def is_analytic(self) -> bool:
         """Whether the closed form is used."""
-        return self._analytic is not None
+        return self._closed is not None
 
-    def _try_analytic(self) -> AnalyticSolver | None:
-        kinds = {self.model.document.joint_kinds[name] for name in self.group.joints}
-        if len(self.group.joints) != 6 or not kinds <= {"revolute", "continuous"}:
+    @property
+    def locked_joint(self) -> str:
+        """The joint of a seven-joint chain whose values are tried in turn; empty where there is none."""
+        number = self._closed.locked if self._closed else None
+        return "" if number is None else self.group.joints[number]
+
+    def _try_closed_form(self) -> ClosedForm | None:
+        between = [name for name in self.model.chain_joints(self.base_link, self._last_link)
+                   if name in self.model.index]
+        if self.settings.solver == NUMERIC or between != list(self.group.joints):
             return None
         try:
-            return AnalyticSolver(self.model, self.group, self.base_link, self._last_link)
+            return ClosedForm(self.model, self.group, self.base_link, self._last_link)
         except PlanningError:
             return None
 
     def _max_reach(self) -> float:
-        """Returns an upper bound of the distance from the second joint to the last joint's link [m]."""
+        """Returns an upper bound of the distance from the first joint to the last joint's link [m]."""
         pin_model = self.model.pin_model
         numbers = [pin_model.getJointId(name) for name in self.group.joints]
-        return float(sum(np.linalg.norm(pin_model.jointPlacements[number].translation) for number in numbers[1:]))
+        steps = sum(float(np.linalg.norm(pin_model.jointPlacements[number].translation)) for number in numbers[1:])
+        sliding = self.group.indices[~self._turning]
+        return steps + float(np.maximum(np.abs(self.model.lower), np.abs(self.model.upper))[sliding].sum())
 
     def tip_offset(self, tip_link: str) -> Transform:
         """Returns the pose of the last joint's link in the frame of a tip rigidly fixed to it.
@@ -120,7 +147,7 @@ class InverseKinematics:
                                 f"'{self._last_link}', the end of group '{self.group.name}'; choose a link that is")
         return tip.placement.inverse() * last.placement
 
-    def solutions(self, tip_link: str, target: Transform, seed: Array, timeout_s: float = 0.05,
+    def solutions(self, tip_link: str, target: Transform, seed: Array, timeout_s: float | None = None,
                   rng: np.random.Generator | None = None) -> list[Array]:
         """Returns all solutions found, as positions of the whole robot, nearest to the seed first.
 
@@ -128,113 +155,109 @@ class InverseKinematics:
             tip_link: link to bring to the target; rigidly fixed to the end of the group's chain.
             target: pose of the link in the planning frame.
             seed: positions of the whole robot [rad or m]; joints outside the group stay there.
-            timeout_s: time the numeric search may take where there is no closed form.
+            timeout_s: time the search may take where there is no closed form; the group's by default.
             rng: source of restarts of the numeric search.
         """
-        last_in_world = target * self.tip_offset(tip_link)
-        data = self.model.pin_model.createData()
-        pin.framesForwardKinematics(self.model.pin_model, data, seed)
-        base = data.oMf[self.model.frame_ids[self.base_link]]
-        if self._analytic is not None:
-            candidates = self._analytic.solve(base.inverse() * last_in_world)
-            polished = [self._polish(data, seed, item, last_in_world) for item in candidates]
-            found = [item for item in polished if item is not None]
-        else:
-            found = self._numeric(data, seed, last_in_world, timeout_s, rng or np.random.default_rng(0))
-        return self._ranked(found, seed)
+        allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
+        problem = _Problem(self._chain.at(seed), target * self.tip_offset(tip_link), np.asarray(seed, dtype=float),
+                           np.array(seed[self.group.indices], dtype=float), *self._bounds(seed),
+                           time.monotonic() + allowed)
+        found = self._from_closed_form(problem)
+        if not len(found):
+            found = self._from_search(problem, rng or np.random.default_rng(0))
+        return self._ranked(problem, found)
 
-    def _embed(self, seed: Array, values: Array) -> Array:
-        result = np.array(seed)
-        result[self.group.indices] = values
-        return self.model.with_mimics(result, self._members)
+    def _bounds(self, seed: Array) -> tuple[Array, Array]:
+        """Returns the bounds of the group's joints; those without ends get three turns around the seed."""
+        values = seed[self.group.indices]
+        lower, upper = self.model.lower[self.group.indices], self.model.upper[self.group.indices]
+        return (np.where(self._endless, values - 3.0 * np.pi, lower),
+                np.where(self._endless, values + 3.0 * np.pi, upper))
 
-    def _error(self, data: Any, positions: Array, target: Transform) -> tuple[Array, Transform]:
-        pin.framesForwardKinematics(self.model.pin_model, data, positions)
-        current = data.oMf[self.model.frame_ids[self._last_link]]
-        return pin.log6(current.actInv(target)).vector, current
-
-    def _polish(self, data: Any, seed: Array, values: Array, target: Transform,
-                steps: int = NEWTON_STEPS) -> Array | None:
-        """Drives the pose error of a candidate below the tolerance by Newton steps; None where that fails."""
-        if not np.isfinite(values).all():
-            return None
-        frame = self.model.frame_ids[self._last_link]
-        values = values.copy()
-        for _ in range(steps):
-            positions = self._embed(seed, values)
-            error, _ = self._error(data, positions, target)
-            size = float(np.linalg.norm(error))
-            if size < POSE_TOLERANCE * 0.1:
-                return positions
-            if size > 0.5 and steps == NEWTON_STEPS:
-                return None
-            jacobian = pin.computeFrameJacobian(self.model.pin_model, data, positions, frame)[:, self.group.indices]
-            damping = min(1.0e-3, size * size) * np.eye(6)
-            step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
-            values = values + step * min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
-        positions = self._embed(seed, values)
-        error, _ = self._error(data, positions, target)
-        return positions if float(np.linalg.norm(error)) < POSE_TOLERANCE else None
-
-    def _numeric(self, data: Any, seed: Array, target: Transform, timeout_s: float,
-                 rng: np.random.Generator) -> list[Array]:
-        """Searches from the seed, then from random positions, until the time is over or eight were found."""
-        deadline = time.monotonic() + timeout_s
-        lower, upper = self._search_bounds()
-        found: list[Array] = []
-        start = np.clip(seed[self.group.indices], lower, upper)
-        while len(found) < 8:
-            result = self._polish(data, seed, start, target, steps=60)
-            if result is not None:
-                values = result[self.group.indices]
-                if np.all((values >= lower - 1e-9) & (values <= upper + 1e-9)) or len(self._wraps(values)):
-                    found.append(result)
-            if time.monotonic() > deadline:
+    def _from_closed_form(self, problem: _Problem) -> Array:
+        """Returns solutions without whole turns, shape (k, joints); some may turn out to be out of bounds."""
+        if self._closed is None:
+            return np.empty((0, len(self.group.joints)))
+        base = self.model.link_transforms(problem.whole_seed)[self.base_link] if not self._chain.is_own else (
+            self._fixed_base())
+        in_base = base.actInv(problem.target)
+        if self._closed.locked is None:
+            return self._polished(problem, self._closed.solve(in_base))
+        rows = []
+        for value in self._held_values(problem):
+            rows.append(self._polished(problem, self._closed.solve(in_base, value)))
+            if time.monotonic() > problem.deadline:
                 break
-            start = rng.uniform(lower, upper)
+        return np.vstack(rows)
+
+    def _fixed_base(self) -> Transform:
+        frame = self.model.pin_model.frames[self.model.frame_ids[self.base_link]]
+        return frame.placement
+
+    def _held_values(self, problem: _Problem) -> Array:
+        """Returns values of the held joint, the seed's first, then on a grid outward from it."""
+        assert self._closed is not None and self._closed.locked is not None
+        number = self._closed.locked
+        at = float(np.clip(problem.seed[number], problem.lower[number], problem.upper[number]))
+        step = self.settings.search_resolution
+        low = max(problem.lower[number], at - np.pi) if self._endless[number] else problem.lower[number]
+        high = min(problem.upper[number], at + np.pi) if self._endless[number] else problem.upper[number]
+        grid = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
+        return np.concatenate([[at], grid[np.argsort(np.abs(grid - at), kind="stable")]])
+
+    def _polished(self, problem: _Problem, candidates: Array) -> Array:
+        """Returns the candidates that Newton steps bring to the target."""
+        if not len(candidates):
+            return candidates
+        endless = np.full(candidates.shape[1], np.inf)
+        arrived = polish(problem.chain, candidates, problem.pose, -endless, endless, ACCURACY, FURTHEST_CANDIDATE,
+                         POLISH_STEPS)
+        return candidates[arrived]
+
+    def _from_search(self, problem: _Problem, rng: np.random.Generator) -> Array:
+        """Searches from the seed, then from random positions, until there are enough, no new ones, or no time left."""
+        lower = np.maximum(problem.lower, problem.seed - 2.0 * np.pi)
+        upper = np.minimum(problem.upper, problem.seed + 2.0 * np.pi)
+        found = np.empty((0, len(lower)))
+        fruitless = 0
+        starts = np.clip(problem.seed, lower, upper)[None, :]
+        while fruitless < FRUITLESS_BATCHES and len(found) < ENOUGH:
+            arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, ENOUGH)
+            rows = np.vstack([found, starts[arrived]])
+            rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
+            fruitless = fruitless + 1 if len(rows) == len(found) else 0
+            found = rows
+            if time.monotonic() > problem.deadline:
+                break
+            starts = rng.uniform(lower, upper, (STARTS_A_BATCH, len(lower)))
         return found
 
-    def _search_bounds(self) -> tuple[Array, Array]:
-        lower = np.maximum(self.model.lower[self.group.indices], -2.0 * np.pi)
-        upper = np.minimum(self.model.upper[self.group.indices], 2.0 * np.pi)
-        return lower, upper
-
-    def _wraps(self, values: Array) -> Array:
-        """Returns the vector and all turns of its rotary joints that are within bounds, shape (n, joints)."""
-        choices = [self._turns(int(number), float(value))
-                   for number, value in zip(self.group.indices, values, strict=True)]
-        rows = list(itertools.islice(itertools.product(*choices), MAX_WRAPS))
-        return np.array(rows, dtype=float).reshape(len(rows), len(values))
-
-    def _turns(self, number: int, value: float) -> list[float]:
-        """Returns a joint's value and what differs from it by whole turns, within bounds."""
-        lower, upper = float(self.model.lower[number]) - 1e-9, float(self.model.upper[number]) + 1e-9
-        if self.model.document.joint_kinds[self.model.joint_names[number]] == "prismatic":
-            return [value] if lower <= value <= upper else []
-        if self.model.is_continuous(number):
-            return [value + turn * 2.0 * np.pi for turn in (-1, 0, 1)]
-        first = math.ceil((lower - value) / (2.0 * math.pi))
-        last = math.floor((upper - value) / (2.0 * math.pi))
-        return [min(max(value + turn * 2.0 * math.pi, lower + 1e-9), upper - 1e-9) for turn in range(first, last + 1)]
-
-    def _ranked(self, found: list[Array], seed: Array) -> list[Array]:
-        """Drops duplicates, adds turns and puts the nearest to the seed first."""
-        indices = self.group.indices
-        unique: list[Array] = []
-        for positions in found:
-            values = positions[indices]
-            if all(np.abs(np.angle(np.exp(1j * (values - other)))).max() > SAME_SOLUTION for other in unique):
-                unique.append(values)
-        if not unique:
+    def _ranked(self, problem: _Problem, found: Array) -> list[Array]:
+        """Drops duplicates, adds whole turns and puts the nearest to the seed first."""
+        if not len(found):
             return []
-        rows = np.vstack([self._wraps(values) for values in unique])
-        order = np.argsort(np.linalg.norm(rows - seed[indices], axis=1), kind="stable")
-        result = np.tile(np.asarray(seed, dtype=float), (len(order), 1))
-        result[:, indices] = rows[order]
+        rows = found[unique_rows(found, self._turning, SAME_SOLUTION)]
+        rows = whole_turns(rows, self._turning, problem.lower, problem.upper, MAX_TURNS)
+        rows = rows[np.argsort(np.linalg.norm(rows - problem.seed, axis=1), kind="stable")]
+        if rows.shape[1] > 6 and len(rows):
+            rows = self._approached(problem, rows)
+        result = np.tile(problem.whole_seed, (len(rows), 1))
+        result[:, self.group.indices] = rows
         for follower, leader, multiplier, offset in self.model.mimics:
             if leader in self._members:
                 result[:, follower] = multiplier * result[:, leader] + offset
         return list(result)
+
+    @staticmethod
+    def _approached(problem: _Problem, rows: Array) -> Array:
+        """Adds solutions of a redundant chain that were moved nearer to the seed."""
+        nearer = rows[:APPROACHED].copy()
+        for values in nearer:
+            approach_seed(problem.chain, values, problem.seed, problem.pose, problem.lower, problem.upper, ACCURACY,
+                          APPROACH_STEPS)
+        rows = np.vstack([nearer, rows])
+        rows = rows[unique_rows(rows, np.zeros(rows.shape[1], dtype=bool), SAME_SOLUTION)]
+        return rows[np.argsort(np.linalg.norm(rows - problem.seed, axis=1), kind="stable")]
 
     def explain_unreachable(self, tip_link: str, target: Transform, seed: Array) -> str:
         """Says why a pose has no solution: too far away, or only out of joint bounds."""
@@ -249,6 +272,23 @@ class InverseKinematics:
         return (f"no inverse kinematics for '{tip_link}' at {where} m: '{self._last_link}' would be {distance:.3f} m "
                 f"from the shoulder (at most {self.reach:.3f} m), but no joint positions within the bounds of group "
                 f"'{self.group.name}' give this orientation there")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """One pose to solve: the last link's target, the seed of the whole robot and of the group, the group's bounds."""
+
+    chain: Chain
+    target: Transform
+    whole_seed: Array
+    seed: Array
+    lower: Array
+    upper: Array
+    deadline: float
+    pose: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", np.ascontiguousarray(self.target.homogeneous[:3]))
 
 
 def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: int = 1) -> list[Array]:
@@ -269,16 +309,30 @@ def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: 
     return free
 
 
+def clearest(free: list[Array], seed: Array, clearance: Callable[[Array], float]) -> Array:
+    """Returns, of free solutions ordered by distance from the seed, the nearest one.
+
+    Of several that are about as near as it, the one furthest from obstacles is taken.
+    """
+    distances = [float(np.linalg.norm(values - seed)) for values in free]
+    similar = [values for values, distance in zip(free, distances, strict=True) if distance <= distances[0] + SIMILAR]
+    if len(similar) == 1 or distances[0] < SAME_SOLUTION:
+        return free[0]
+    return max(similar, key=clearance)
+
+
 class KinematicsPool:
     """Builds the solver of each group once."""
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, model: RobotModel, settings: Mapping[str, KinematicsSettings] | None = None) -> None:
+        """Args: the robot; settings of groups, by name."""
         self._model = model
+        self._settings = dict(settings or {})
         self._solvers: dict[str, InverseKinematics] = {}
 
     def solver(self, group: str) -> InverseKinematics:
         """Returns the solver of a group; raises PlanningError for a group that is not a chain."""
         if group not in self._solvers:
-            self._solvers[group] = InverseKinematics(self._model, self._model.group(group))
+            settings = self._settings.get(group, KinematicsSettings())
+            self._solvers[group] = InverseKinematics(self._model, self._model.group(group), settings)
         return self._solvers[group]
-
