@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.pilz.joint_motion import JointState, follow, state_at
@@ -134,7 +135,7 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
     return concatenated(parts), entry, entry + duration
 
 
-def _part(trajectory: Trajectory, chosen: Array, shift_s: float) -> Trajectory:
+def _part(trajectory: Trajectory, chosen: NDArray[np.bool_], shift_s: float) -> Trajectory:
     return Trajectory(trajectory.joint_names, trajectory.times[chosen] + shift_s, trajectory.positions[chosen],
                       trajectory.velocities[chosen], trajectory.accelerations[chosen])
 
