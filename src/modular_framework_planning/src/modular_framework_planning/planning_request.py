@@ -83,6 +83,14 @@ class Workspace:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class AuxiliaryPoint:
+    """A point that shapes a motion: "center" or "interim" of a circle, in the planning frame [m], shape (3,)."""
+
+    name: str
+    position: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PlanningRequest:
     """One question to the planner.
 
@@ -95,6 +103,7 @@ class PlanningRequest:
         path_constraints: what every state of the motion must satisfy.
         max_cartesian_speed: of cartesian_speed_limited_link [m/s]; 0 for none.
         seed: makes the plan repeatable; None for the pipeline's own.
+        auxiliary_point: of a circular motion.
     """
 
     scene: PlanningScene
@@ -113,6 +122,7 @@ class PlanningRequest:
     cartesian_speed_limited_link: str = ""
     workspace: Workspace | None = None
     seed: int | None = None
+    auxiliary_point: AuxiliaryPoint | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
