@@ -13,9 +13,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.conversions import pose_message
 from modular_framework_planning.planning_request import PlanningAnswer
-from modular_framework_planning.planning_scene import PlanningScene
+from modular_framework_planning.planning_scene import Color, PlanningScene
+from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
-from modular_framework_planning.spatial import Transform
+from modular_framework_planning.spatial import Array, Transform
 
 OBJECT_COLOR = (0.45, 0.75, 0.35, 0.8)
 ATTACHED_COLOR = (0.75, 0.3, 0.75, 0.9)
@@ -56,7 +57,8 @@ class MarkerPublisher:
         for share in np.linspace(0.0, 1.0, INTERMEDIATE_GHOSTS + 2)[1:]:
             positions = answer.start.copy()
             positions[group.indices] = rows[int(round(share * (len(rows) - 1)))]
-            markers += _ghost(scene, positions, f"ghost_{share:.2f}", 0.6 if share == 1.0 else 0.15)
+            markers += robot_markers(scene.model, positions, f"ghost_{share:.2f}",
+                                     (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15))
         for number, marker in enumerate(markers):
             marker.id = number
         self._path.publish(MarkerArray(markers))
@@ -119,13 +121,16 @@ def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> Marker
     return line
 
 
-def _ghost(scene: PlanningScene, positions: Any, namespace: str, alpha: float) -> list[Marker]:
-    """Markers of what is seen of every link, at the given positions."""
-    transforms = scene.model.link_transforms(positions)
-    frame = scene.model.planning_frame
+def robot_markers(model: RobotModel, positions: Array, namespace: str, color: Color) -> list[Marker]:
+    """Markers of what is seen of every link, at the given positions (of the whole robot), in one colour.
+
+    Their ids are 0: number them, or give each robot a namespace and number within it, before publishing.
+    """
+    transforms = model.link_transforms(positions)
+    frame = model.planning_frame
     markers = [_shape_marker(shape, transforms[link] * origin, frame, namespace, 0)
-               for link, shapes in scene.model.document.visual_shapes.items() for shape, origin in shapes]
-    for link, visuals in scene.model.document.visual_meshes.items():
+               for link, shapes in model.document.visual_shapes.items() for shape, origin in shapes]
+    for link, visuals in model.document.visual_meshes.items():
         for uri, origin, scale in visuals:
             marker = _marker(Marker.MESH_RESOURCE, frame, namespace)
             marker.mesh_resource = uri
@@ -133,5 +138,5 @@ def _ghost(scene: PlanningScene, positions: Any, namespace: str, alpha: float) -
             marker.scale.x, marker.scale.y, marker.scale.z = scale
             markers.append(marker)
     for marker in markers:
-        _paint(marker, (*GHOST_COLOR, alpha))
+        _paint(marker, color)
     return markers
