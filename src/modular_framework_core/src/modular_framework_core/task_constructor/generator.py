@@ -112,12 +112,14 @@ def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept"
         keep_trailing_newline=False,
     )
     environment.filters["literal"] = literal
-    sections = [_section(environment, machine, task) for machine in task.root.machines()]
+    machines = list(task.root.machines())
+    compiled = {file: _compiled(environment, file) for file in {machine.template.file for machine in machines}}
+    sections = [_section(compiled[machine.template.file], machine, task) for machine in machines]
     text = "\n\n".join([_header(task, digest), *sections, _footer(task)])
     try:
         compile(text, f"{task.name}.py", "exec")
     except (SyntaxError, ValueError) as error:
-        names = sorted({machine.template.name for machine in task.root.machines()})
+        names = sorted({machine.template.name for machine in machines})
         raise GenerationError(
             f"the module generated for '{task.name}' is not valid Python: {error}; "
             f"look at the templates it was made with: {', '.join(names)}"
@@ -146,15 +148,21 @@ def write(task: TaskSpec, text: str, directory: Path) -> Path:
     return target
 
 
-def _section(environment: jinja2.Environment, machine: MachineSpec, task: TaskSpec) -> str:
+def _compiled(environment: jinja2.Environment, file: Path) -> jinja2.Template:
+    try:
+        return environment.from_string(file.read_text(encoding="utf-8"))
+    except jinja2.TemplateSyntaxError as error:
+        raise GenerationError(f"{file}:{error.lineno}: {error.message}") from error
+
+
+def _section(template: jinja2.Template, machine: MachineSpec, task: TaskSpec) -> str:
     file = machine.template.file
     try:
-        template = environment.from_string(file.read_text(encoding="utf-8"))
         return template.render(
             state_machine=machine, options=machine.options, task=task, is_root=machine is task.root
         ).strip("\n") + "\n"
     except jinja2.TemplateSyntaxError as error:
-        raise GenerationError(f"{file}:{error.lineno}: {error.message}") from error
+        raise GenerationError(f"{error.filename or file}:{error.lineno}: {error.message}") from error
     except (jinja2.TemplateError, GenerationError, TypeError, ValueError) as error:
         raise GenerationError(f"{file}: the template cannot be filled for '{machine.label}': {error}") from error
 

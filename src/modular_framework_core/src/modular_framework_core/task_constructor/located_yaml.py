@@ -2,22 +2,32 @@
 """Reads YAML (1.2, safe types only) into a tree that remembers the line and column of every key and value."""
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Union
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import ScalarNode, SequenceNode
+import yaml
 
 from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault
 
-MAX_NODES = 200_000
+MAX_NODES = 500_000
 """Largest number of values in a file after its aliases are expanded: a guard against files that blow up."""
+MAX_DEPTH = 100
+"""Deepest nesting of lists and mappings in a file."""
 
-_ALLOWED_SCALARS = (str, bool, int, float, type(None))
-_MERGE_TAG = "tag:yaml.org,2002:merge"
+_TAG = "tag:yaml.org,2002:"
+_MERGE_KEY = "<<"
+# the plain scalars of YAML 1.2's core schema that are no text: pattern and what makes the value
+_CORE: tuple[tuple[str, re.Pattern[str], Callable[[str], Any]], ...] = (
+    ("null", re.compile(r"null|Null|NULL|~|"), lambda text: None),
+    ("bool", re.compile(r"true|True|TRUE|false|False|FALSE"), lambda text: text[0] in "tT"),
+    ("int", re.compile(r"[-+]?[0-9]+"), int),
+    ("int", re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+"), lambda text: int(text, 0)),
+    ("float", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"), float),
+    ("float", re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"), lambda text: float(text.lower().replace(".", "", 1))),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +94,8 @@ def load(path: Path) -> Node:
     """Read a YAML file.
 
     Raises:
-        TaskFault: the file cannot be read, is empty, is no valid YAML, repeats a key, or has a value of another
-            type than text, number, truth value, list and mapping.
+        TaskFault: the file cannot be read, is empty, is no valid YAML, repeats a key, is nested too deeply, or has a
+            tag other than those of text, number, truth value, nothing, list and mapping.
     """
     start = Place(str(path), 1, 1)
     try:
@@ -97,105 +107,154 @@ def load(path: Path) -> Node:
 
 def loads(text: str, file: str) -> Node:
     """Read YAML from text; ``file`` is the name used in messages. Raises as ``load`` does."""
-    reader = YAML(typ="safe", pure=True)
     try:
-        root = reader.compose(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file, 1, 1)
-        context = f" {error.context}" if error.context else ""
-        raise TaskFault([Fault(place, f"this is not valid YAML: {error.problem}{context}")]) from error
-    except (YAMLError, RecursionError, ValueError, LookupError, TypeError) as error:
+        return _Reader(text, file).read()
+    except yaml.MarkedYAMLError as error:
+        raise TaskFault([_syntax_fault(error, text, file)]) from error
+    except yaml.reader.ReaderError as error:
+        raise TaskFault([Fault(_place_of(text, file, error.position), f"this is not valid YAML: {error.reason}")]
+                        ) from error
+    except (UnicodeEncodeError, yaml.YAMLError) as error:
         first_line = (str(error).splitlines() or [""])[0]
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else first_line
-        raise TaskFault([Fault(Place(file, 1, 1), f"this is not valid YAML: {reason}")]) from error
-    if root is None:
-        raise TaskFault([Fault(Place(file, 1, 1), "the file is empty; a task needs name, source, outcomes and states")])
-    return _Converter(reader, file).convert(root)
+        raise TaskFault([Fault(Place(file, 1, 1), f"this is not valid YAML: {first_line}")]) from error
 
 
-class _Converter:
-    """Turns ruamel's nodes into ours."""
+def _syntax_fault(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
+    mark, begun = error.problem_mark or error.context_mark, error.context_mark
+    place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file, 1, 1)
+    context = f" {error.context}" if error.context else ""
+    if begun and begun.line + 1 != place.line:
+        context += f" that begins in line {begun.line + 1}"
+    lines = text.splitlines()
+    rest = lines[place.line - 1][place.column - 1:] if place.line <= len(lines) else ""
+    hint = "; a tab is here: indent with spaces" if rest.startswith("\t") else ""
+    return Fault(place, f"this is not valid YAML: {error.problem}{context}{hint}")
 
-    def __init__(self, reader: YAML, file: str) -> None:
-        self._reader = reader
+
+def _place_of(text: str, file: str, position: int) -> Place:
+    before = text[:position]
+    return Place(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
+
+
+class _Reader:
+    """Builds the tree from the parser's events, which come one by one however deep the file is nested."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self._events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
         self._file = file
         self._faults = FaultList()
         self._count = 0
-        self._open: set[int] = set()
+        self._depth = 0
+        self._anchors: dict[str, tuple[Node, int]] = {}
+        self._open: set[str] = set()
 
-    def convert(self, root: Any) -> Node:
-        """Convert a whole document; raise ``TaskFault`` with all that is wrong with its values."""
-        node = self._node(root)
+    def read(self) -> Node:
+        """Return the one document of the file; raise ``TaskFault`` with all that is wrong with its values."""
+        root: Node | None = None
+        for event in self._events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                if root is not None:
+                    raise TaskFault([Fault(self._place(event), "the file has a second document; a task is one document, "
+                                                               "remove the '---'")])
+                root = self._node(next(self._events))
         self._faults.raise_if_any()
+        if root is None:
+            raise TaskFault([Fault(Place(self._file, 1, 1),
+                                   "the file is empty; a task needs name, source, outcomes and states")])
+        return root
+
+    def _place(self, event: Any) -> Place:
+        return Place(self._file, event.start_mark.line + 1, event.start_mark.column + 1)
+
+    def _node(self, event: Any) -> Node:
+        place = self._place(event)
+        if isinstance(event, yaml.AliasEvent):
+            return self._alias(event.anchor, place)
+        before = self._count
+        self._counted(1, place)
+        if event.anchor:
+            self._open.add(event.anchor)
+        node: Node = self._scalar(event, place) if isinstance(event, yaml.ScalarEvent) else self._collection(event, place)
+        if event.anchor:
+            self._open.discard(event.anchor)
+            self._anchors[event.anchor] = node, self._count - before
         return node
 
-    def _place(self, node: Any) -> Place:
-        return Place(self._file, node.start_mark.line + 1, node.start_mark.column + 1)
-
-    def _node(self, node: Any) -> Node:
-        self._count += 1
-        place = self._place(node)
+    def _counted(self, more: int, place: Place) -> None:
+        self._count += more
         if self._count > MAX_NODES:
             raise TaskFault([Fault(place, f"the file has more than {MAX_NODES} values once aliases are expanded")])
-        if id(node) in self._open:
+
+    def _alias(self, name: str, place: Place) -> Node:
+        if name in self._open:
             raise TaskFault([Fault(place, "this value contains itself through an alias")])
-        self._open.add(id(node))
-        try:
-            if isinstance(node, ScalarNode):
-                return self._scalar(node, place)
-            if not isinstance(node, ScalarNode) and not str(node.tag).endswith((":seq", ":map")):
-                self._faults.add(place, f"the tag {node.tag} cannot be used here")
-            if isinstance(node, SequenceNode):
-                return Sequence(tuple(self._node(item) for item in node.value), place)
-            return self._mapping(node, place)
-        finally:
-            self._open.discard(id(node))
+        if name not in self._anchors:
+            raise TaskFault([Fault(place, f"this is not valid YAML: the alias '*{name}' refers to no anchor before it")])
+        node, count = self._anchors[name]
+        self._counted(count, place)
+        return node
 
-    def _scalar(self, node: Any, place: Place) -> Scalar:
-        try:
-            value = self._reader.constructor.construct_object(node, deep=True)
-        except Exception:  # for a tag that does not fit the text, the library raises whatever comes first
-            self._faults.add(place, f"the tag or value '{node.value}' of type {node.tag} cannot be used here")
-            return Scalar(None, place)
-        if isinstance(value, _ALLOWED_SCALARS):
-            return Scalar(value, place)
-        self._faults.add(place, f"'{node.value}' is read as a {type(value).__name__}; put it in quotes to make it text")
-        return Scalar(None, place)
+    def _collection(self, event: Any, place: Place) -> Node:
+        is_list = isinstance(event, yaml.SequenceStartEvent)
+        if event.tag not in (None, "!", _TAG + ("seq" if is_list else "map")):
+            self._faults.add(place, f"the tag {event.tag} cannot be used here")
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise TaskFault([Fault(place, f"the file is nested more than {MAX_DEPTH} levels deep")])
+        node = self._list(place) if is_list else self._mapping(place)
+        self._depth -= 1
+        return node
 
-    def _mapping(self, node: Any, place: Place) -> Mapping:
+    def _list(self, place: Place) -> Sequence:
+        items: list[Node] = []
+        while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
+            items.append(self._node(event))
+        return Sequence(tuple(items), place)
+
+    def _scalar(self, event: Any, place: Place) -> Scalar:
+        text, tag = event.value, event.tag
+        if tag in ("!", _TAG + "str") or (tag is None and not event.implicit[0]):
+            return Scalar(text, place)
+        for kind, pattern, make in _CORE:
+            if tag in (None, _TAG + kind) and pattern.fullmatch(text):
+                try:
+                    return Scalar(make(text), place)
+                except ValueError as error:
+                    self._faults.add(place, f"the number '{text[:20]}...' cannot be read: {error}")
+                    return Scalar(None, place)
+        if tag is not None:
+            self._faults.add(place, f"the tag or value '{text}' of type {tag} cannot be used here")
+        return Scalar(text if tag is None else None, place)
+
+    def _mapping(self, place: Place) -> Mapping:
         entries: dict[str, Node] = {}
         keys: dict[str, Place] = {}
         merged: list[Mapping] = []
-        for key_node, value_node in node.value:
-            if str(key_node.tag) == _MERGE_TAG:
-                merged.extend(self._merged(value_node))
-                continue
-            key = self._key(key_node)
-            if key is None:
-                continue
-            if key in entries:
-                place_again = self._place(key_node)
-                self._faults.add(place_again, f"the key '{key}' is given twice; first in line {keys[key].line}")
-                continue
-            entries[key] = self._node(value_node)
-            keys[key] = self._place(key_node)
+        while not isinstance(event := next(self._events), yaml.MappingEndEvent):
+            key_place = self._place(event)
+            is_merge = isinstance(event, yaml.ScalarEvent) and event.value == _MERGE_KEY and event.implicit[0]
+            key = None if is_merge else self._key(self._node(event))
+            value = self._node(next(self._events))
+            if is_merge:
+                merged += self._merged(value)
+            elif key in entries:
+                self._faults.add(key_place, f"the key '{key}' is given twice; first in line {keys[key].line}")
+            elif key is not None:
+                entries[key], keys[key] = value, key_place
         for other in merged:
             for key in other:
                 if key not in entries:
                     entries[key], keys[key] = other.entries[key], other.keys[key]
         return Mapping(entries, keys, place)
 
-    def _merged(self, node: Any) -> list[Mapping]:
-        value = self._node(node)
+    def _merged(self, value: Node) -> list[Mapping]:
         found = list(value.items) if isinstance(value, Sequence) else [value]
         mappings = [item for item in found if isinstance(item, Mapping)]
         if len(mappings) != len(found):
             self._faults.add(value.place, f"'<<' takes a mapping or a list of mappings, found {kind_of(value)}")
         return mappings
 
-    def _key(self, node: Any) -> str | None:
-        value = self._node(node)
+    def _key(self, value: Node) -> str | None:
         if isinstance(value, Scalar) and isinstance(value.value, str) and value.value:
             return value.value
         self._faults.add(value.place, f"a key must be text, found {kind_of(value)}; put it in quotes")
