@@ -23,6 +23,7 @@ from modular_framework_planning.ompl_planning import OmplPlanner
 from modular_framework_planning.path_shortening import shorten
 from modular_framework_planning.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_request import PipelineSettings, PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import JointGroup, RobotModel
 from modular_framework_planning.spatial import Array
 from modular_framework_planning.trajectory import Trajectory
@@ -118,6 +119,29 @@ class PlanningPipeline:
             return path
         return replace(path, vertices=_shortened(problem, path.vertices))
 
+    def checker(self, scene: PlanningScene, group: JointGroup, start: Array) -> CollisionChecker:
+        """Returns the collision world of a motion, with shallow contacts of held bodies tolerated.
+
+        Args:
+            scene: the world.
+            group: the joints that will move.
+            start: positions of the whole robot the motion begins at.
+
+        Raises:
+            PlanningError: bodies touch that the group cannot separate.
+        """
+        checker = self._checkers(scene, group.indices)
+        fixed = checker.fixed_contacts(start)
+        if fixed:
+            raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
+                                f"joint of group '{group.name}' can change that; allow the pair or move it")
+        if checker.is_free(start):
+            return checker
+        shallow = [item for item in checker.contacts(start, include_fixed=False)
+                   if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
+                   and item.depth <= self.settings.start_state_contact_tolerance]
+        return self._checkers(scene, group.indices, shallow) if shallow else checker
+
     def _problem(self, request: PlanningRequest, begun: float) -> PlanningProblem:
         """Reads the request; everything that can be refused without planning is refused here."""
         if not request.allowed_time_s > 0.0:
@@ -132,7 +156,7 @@ class PlanningPipeline:
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "start state: a joint position is not finite")
         velocity, acceleration = self._scaled_limits(request, group)
         seed = self.settings.seed if request.seed is None else request.seed
-        checker = self._checker(request, group, start)
+        checker = self.checker(request.scene, group, start)
         return PlanningProblem(
             request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
             self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
@@ -151,20 +175,6 @@ class PlanningPipeline:
             raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{asked}': pipeline '{self.name}' has no "
                                 f"planner '{kind}'; available: {', '.join(known)}")
         return kind, parameters
-
-    def _checker(self, request: PlanningRequest, group: JointGroup, start: Array) -> CollisionChecker:
-        """Returns the collision world of this plan, with shallow contacts of held bodies tolerated."""
-        checker = self._checkers(request.scene, group.indices)
-        fixed = checker.fixed_contacts(start)
-        if fixed:
-            raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
-                                f"joint of group '{group.name}' can change that; allow the pair or move it")
-        if checker.is_free(start):
-            return checker
-        shallow = [item for item in checker.contacts(start, include_fixed=False)
-                   if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
-                   and item.depth <= self.settings.start_state_contact_tolerance]
-        return self._checkers(request.scene, group.indices, shallow) if shallow else checker
 
     def _scaled_limits(self, request: PlanningRequest, group: JointGroup) -> tuple[Array, Array]:
         factors = []

@@ -85,10 +85,13 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
 
 
 def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
-    """Returns the times of a trajectory's points: every period, every knot, the end; at least 0.1 ms apart."""
+    """Returns the times of a trajectory's points: every period, every knot, the end; at least 0.1 ms apart.
+
+    They are whole nanoseconds, as messages carry them.
+    """
     regular = np.arange(0.0, duration_s, period_s)
     kept = np.unique(np.concatenate([[0.0, duration_s], knots[(knots > 0.0) & (knots < duration_s)]]))
     kept = kept[np.concatenate([[True], np.diff(kept) >= SHORTEST_GAP_S])]
     kept[-1] = duration_s
     near = np.abs(regular[:, None] - kept[None, :]).min(axis=1) < SHORTEST_GAP_S
-    return np.sort(np.concatenate([kept, regular[~near]]))
+    return np.round(np.sort(np.concatenate([kept, regular[~near]])), 9)
