@@ -25,12 +25,14 @@ from modular_framework_planning.spatial import Array, Transform
 POSE_TOLERANCE = 1.0e-6  # [m] and [rad]; every returned solution reaches the pose at least this well
 ACCURACY = 1.0e-8  # what the compiled steps are asked for
 SAME_SOLUTION = 1.0e-5  # [rad or m]
+BOUND_SLACK = 0.05  # [rad]; how far out of bounds a candidate may be before it is polished
+COARSEST_SWEEP = 0.4  # [rad]; first step of the held joint of a seven-joint chain, halved while nothing is found
 FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it is no solution
 MAX_TURNS = 4096
 POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 60, 20
-STARTS_A_BATCH = 16
-FRUITLESS_BATCHES = 8  # the numeric search ends after so many batches without a new solution
-ENOUGH = 16  # solutions of the numeric search
+STARTS_A_BATCH = 4
+FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
+ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
 APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
 SIMILAR = 0.1  # [rad]; distances from the seed that differ by less are decided by clearance
 NUMERIC = "numeric"
@@ -175,7 +177,7 @@ class InverseKinematics:
                 np.where(self._endless, values + 3.0 * np.pi, upper))
 
     def _from_closed_form(self, problem: _Problem) -> Array:
-        """Returns solutions without whole turns, shape (k, joints); some may turn out to be out of bounds."""
+        """Returns the closed form's solutions within bounds, whole turns included, shape (k, joints)."""
         if self._closed is None:
             return np.empty((0, len(self.group.joints)))
         base = self.model.link_transforms(problem.whole_seed)[self.base_link] if not self._chain.is_own else (
@@ -183,46 +185,53 @@ class InverseKinematics:
         in_base = base.actInv(problem.target)
         if self._closed.locked is None:
             return self._polished(problem, self._closed.solve(in_base))
-        rows = []
-        for value in self._held_values(problem):
-            rows.append(self._polished(problem, self._closed.solve(in_base, value)))
-            if time.monotonic() > problem.deadline:
-                break
-        return np.vstack(rows)
+        half = 0.5 * (time.monotonic() + problem.deadline)  # the other half of the time is the search's
+        step, found = COARSEST_SWEEP, np.empty((0, len(self.group.joints)))
+        tried: Array = np.empty(0)
+        while not len(found) and step >= self.settings.search_resolution and time.monotonic() < half:
+            values = np.setdiff1d(self._held_values(problem, step), tried)
+            tried = np.concatenate([tried, values])
+            found = self._polished(problem, np.vstack([self._closed.solve(in_base, value) for value in values]))
+            step *= 0.5
+        return found
 
     def _fixed_base(self) -> Transform:
         frame = self.model.pin_model.frames[self.model.frame_ids[self.base_link]]
         return frame.placement
 
-    def _held_values(self, problem: _Problem) -> Array:
-        """Returns values of the held joint, the seed's first, then on a grid outward from it."""
+    def _held_values(self, problem: _Problem, step: float) -> Array:
+        """Returns values of the held joint: the seed's, and a grid over its bounds."""
         assert self._closed is not None and self._closed.locked is not None
         number = self._closed.locked
-        at = float(np.clip(problem.seed[number], problem.lower[number], problem.upper[number]))
-        step = self.settings.search_resolution
-        low = max(problem.lower[number], at - np.pi) if self._endless[number] else problem.lower[number]
-        high = min(problem.upper[number], at + np.pi) if self._endless[number] else problem.upper[number]
+        at, low, high = problem.seed[number], problem.lower[number], problem.upper[number]
+        if self._endless[number]:
+            low, high = at - np.pi, at + np.pi
         grid = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
-        return np.concatenate([[at], grid[np.argsort(np.abs(grid - at), kind="stable")]])
+        return np.append(grid, np.clip(at, low, high))
 
     def _polished(self, problem: _Problem, candidates: Array) -> Array:
-        """Returns the candidates that Newton steps bring to the target."""
+        """Returns the candidates that Newton steps bring to the target, without those that are out of bounds."""
+        excess = candidates - (problem.upper + BOUND_SLACK)
+        lowered = candidates - np.where(self._turning, 2.0 * np.pi * np.ceil(excess / (2.0 * np.pi)), 0.0)
+        candidates = candidates[(lowered >= problem.lower - BOUND_SLACK).all(axis=1)]
         if not len(candidates):
             return candidates
         endless = np.full(candidates.shape[1], np.inf)
         arrived = polish(problem.chain, candidates, problem.pose, -endless, endless, ACCURACY, FURTHEST_CANDIDATE,
                          POLISH_STEPS)
-        return candidates[arrived]
+        rows = candidates[arrived]
+        rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
+        return whole_turns(rows, self._turning, problem.lower, problem.upper, MAX_TURNS)
 
     def _from_search(self, problem: _Problem, rng: np.random.Generator) -> Array:
         """Searches from the seed, then from random positions, until there are enough, no new ones, or no time left."""
         lower = np.maximum(problem.lower, problem.seed - 2.0 * np.pi)
         upper = np.minimum(problem.upper, problem.seed + 2.0 * np.pi)
         found = np.empty((0, len(lower)))
-        fruitless = 0
+        fruitless, enough = 0, ENOUGH if len(lower) <= 6 else ENOUGH_REDUNDANT
         starts = np.clip(problem.seed, lower, upper)[None, :]
-        while fruitless < FRUITLESS_BATCHES and len(found) < ENOUGH:
-            arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, ENOUGH)
+        while fruitless < FRUITLESS_BATCHES and len(found) < enough:
+            arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, enough)
             rows = np.vstack([found, starts[arrived]])
             rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
             fruitless = fruitless + 1 if len(rows) == len(found) else 0
@@ -230,16 +239,14 @@ class InverseKinematics:
             if time.monotonic() > problem.deadline:
                 break
             starts = rng.uniform(lower, upper, (STARTS_A_BATCH, len(lower)))
-        return found
+        return whole_turns(found, self._turning, problem.lower, problem.upper, MAX_TURNS)
 
     def _ranked(self, problem: _Problem, found: Array) -> list[Array]:
-        """Drops duplicates, adds whole turns and puts the nearest to the seed first."""
+        """Puts the nearest to the seed first; returns positions of the whole robot."""
         if not len(found):
             return []
-        rows = found[unique_rows(found, self._turning, SAME_SOLUTION)]
-        rows = whole_turns(rows, self._turning, problem.lower, problem.upper, MAX_TURNS)
-        rows = rows[np.argsort(np.linalg.norm(rows - problem.seed, axis=1), kind="stable")]
-        if rows.shape[1] > 6 and len(rows):
+        rows = found[np.argsort(np.linalg.norm(found - problem.seed, axis=1), kind="stable")]
+        if rows.shape[1] > 6:
             rows = self._approached(problem, rows)
         result = np.tile(problem.whole_seed, (len(rows), 1))
         result[:, self.group.indices] = rows
