@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from modular_framework_planning.compiled_voxels import cells_of_points, cells_on_rays, distinct, merged
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.spatial import Array
 
@@ -21,10 +22,9 @@ Values = NDArray[np.float32]
 
 LEVELS = 16  # the tree's depth; an axis has 2**16 voxels
 AXIS_CENTER = 1 << (LEVELS - 1)  # voxel that begins at coordinate 0
-HIT = np.float32(0.8472979)  # log odds of probability 0.7
-MISS = np.float32(-0.4054651)  # log odds of probability 0.4
-LOWEST = np.float32(-2.0)  # clamps
-HIGHEST = np.float32(3.5)
+HIT, MISS, LOWEST, HIGHEST = (float(np.float32(np.log(chance / (1.0 - chance))))
+                              for chance in (0.7, 0.4, 0.1192, 0.971))
+"""Log odds of the chance that a voxel is occupied: steps of a hit and of a miss, lower and upper clamp."""
 MAX_VOXELS = 16_000_000
 
 
@@ -90,9 +90,7 @@ class VoxelMap:
 
     def keys_of_points(self, points: Array) -> Keys:
         """Returns the codes of the voxels that points (n, 3) [m] lie in; points beyond the tree are left out."""
-        cells = np.floor(np.asarray(points, dtype=float) / self.resolution)
-        inside = (np.abs(cells + 0.5) < AXIS_CENTER).all(axis=1)
-        return keys_of_cells(cells[inside].astype(np.int64) + AXIS_CENTER)
+        return cells_of_points(np.asarray(points, dtype=float).reshape(-1, 3), self.resolution, AXIS_CENTER)
 
     def value_at(self, point: Array) -> float | None:
         """Returns the log odds of the voxel a point (3,) [m] lies in; None where nothing is known."""
@@ -108,32 +106,35 @@ class VoxelMap:
             occupied: voxels in which rays ended; they count as occupied even if other rays went through.
             masked: voxels in which rays ended on the robot or on a known object; they become free at once.
         """
-        occupied = np.setdiff1d(occupied, masked)
-        free = np.setdiff1d(np.setdiff1d(free, masked), occupied, assume_unique=True)
-        masked = np.unique(masked)
         keys = np.concatenate([free, occupied, masked])
-        order = np.argsort(keys)
-        steps = np.concatenate([np.full(len(free), MISS), np.full(len(occupied), HIT),
-                                np.full(len(masked), LOWEST - HIGHEST)]).astype(np.float32)
-        return VoxelMap(self.resolution, *merge(self.keys, self.values, keys[order], steps[order]))
+        steps = np.repeat(np.array([MISS, HIT, LOWEST - HIGHEST], np.float32), [len(free), len(occupied), len(masked)])
+        order = np.argsort(keys, kind="stable")
+        keys, steps = keys[order], steps[order]
+        last = np.append(keys[1:] != keys[:-1], True)[:len(keys)]  # of several verdicts on a voxel the strongest
+        return VoxelMap(self.resolution, *merged(self.keys, self.values, keys[last], steps[last], LOWEST, HIGHEST))
+
+    def with_look(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:
+        """Returns the map after a sensor looked: rays end at points and clear what they go through.
+
+        Args:
+            origin: where the sensor is (3,) [m].
+            hits: points on things that are not known otherwise (n, 3) [m].
+            masked: points on the robot and on known objects (n, 3) [m].
+            clipped: points along rays that ended beyond the sensor's range (n, 3) [m].
+        """
+        occupied, known, beyond = (distinct(self.keys_of_points(points)) for points in (hits, masked, clipped))
+        ends = self.centers(np.concatenate([occupied, known, beyond])) / self.resolution + AXIS_CENTER
+        start = np.asarray(origin, dtype=float) / self.resolution + AXIS_CENTER
+        if not ((start >= 0.0) & (start < 2 * AXIS_CENTER)).all():
+            raise GeometryError(f"octomap: the sensor is at {np.round(origin, 2).tolist()} m; a map with voxels of "
+                                f"{self.resolution} m reaches {AXIS_CENTER * self.resolution:.0f} m in each direction")
+        return self.updated(np.sort(cells_on_rays(start, ends)), occupied, known)
 
     def freed(self, keys: Keys) -> VoxelMap:
         """Returns the map in which the given voxels, where they are known, are free."""
         values = self.values.copy()
         values[np.isin(self.keys, keys, assume_unique=True)] = LOWEST
         return VoxelMap(self.resolution, self.keys, values)
-
-
-def merge(keys: Keys, values: Values, new_keys: Keys, steps: Values) -> tuple[Keys, Values]:
-    """Adds steps to the voxels of sorted `new_keys`, clamps, and returns the joint sorted arrays."""
-    places = np.searchsorted(keys, new_keys)
-    known = np.zeros(len(new_keys), dtype=bool)
-    within = places < len(keys)
-    known[within] = keys[places[within]] == new_keys[within]
-    values = values.copy()
-    values[places[known]] = np.clip(values[places[known]] + steps[known], LOWEST, HIGHEST)
-    fresh = np.clip(steps[~known], LOWEST, HIGHEST)
-    return (np.insert(keys, places[~known], new_keys[~known]), np.insert(values, places[~known], fresh))
 
 
 def empty_map(resolution: float) -> VoxelMap:
