@@ -31,7 +31,7 @@ def shares(motion: Trajectory, velocity: np.ndarray, acceleration: np.ndarray) -
 
 def test_limits_hold_at_every_millisecond_of_the_controllers_curve() -> None:
     rng = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(150):
         vertices, blends = random_polyline(rng)
         velocity, acceleration = VELOCITY * rng.choice([0.1, 1.0]), ACCELERATION * rng.choice([0.01, 0.5, 1.0])
         motion = parameterize(JOINTS, vertices, blends, velocity, acceleration)

@@ -23,6 +23,7 @@ class BlendedPath:
 
     def __init__(self, vertices: Array, blends: Array) -> None:
         """Args: vertices of shape (n, joints), n >= 2; distance d of each inner corner, shape (n - 2,), above 0."""
+        self.start, self.end = vertices[0], vertices[-1]
         spans = np.diff(vertices, axis=0)
         lengths = np.linalg.norm(spans, axis=1)
         directions = spans / lengths[:, None]

@@ -11,11 +11,12 @@ from modular_framework_planning.errors import ModelError
 
 DEFAULT_VELOCITY = 1.0  # [rad/s] or [m/s] where no source names one
 DEFAULT_ACCELERATION = 1.0  # [rad/s^2] or [m/s^2] where no source names one
+DEFAULT_JERK = 1000.0  # [rad/s^3] or [m/s^3] where no source names one
 
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2].
+    """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2], jerk [1/s^3].
 
     Attributes:
         deceleration: most braking, above 0; None where it is that of speeding up.
@@ -26,6 +27,7 @@ class JointLimits:
     velocity: float
     acceleration: float
     deceleration: float | None = None
+    jerk: float = DEFAULT_JERK
 
     @property
     def braking(self) -> float:
@@ -58,10 +60,12 @@ def tighten(name: str, limits: JointLimits, entry: Mapping[str, Any]) -> JointLi
     deceleration = _value(name, entry, braking_flag, "max_deceleration")
     if deceleration is not None and deceleration >= 0:
         raise ModelError(f"joint_limits/{name}/max_deceleration: {deceleration}; it must be below 0")
-    if lower > upper or (velocity is not None and velocity <= 0) or (acceleration is not None and acceleration <= 0):
+    jerk = _value(name, entry, "has_jerk_limits", "max_jerk")
+    if lower > upper or any(value is not None and value <= 0 for value in (velocity, acceleration, jerk)):
         raise ModelError(f"joint_limits/{name}: bounds [{lower}, {upper}], velocity {velocity}, acceleration "
-                         f"{acceleration}; the bounds must leave room and the rest must be above 0")
+                         f"{acceleration}, jerk {jerk}; the bounds must leave room and the rest must be above 0")
     return JointLimits(lower, upper,
                        limits.velocity if velocity is None else min(velocity, limits.velocity),
                        limits.acceleration if acceleration is None else acceleration,
-                       None if deceleration is None else -deceleration)
+                       None if deceleration is None else -deceleration,
+                       DEFAULT_JERK if jerk is None else jerk)

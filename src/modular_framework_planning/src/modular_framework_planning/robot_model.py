@@ -80,9 +80,9 @@ class RobotModel:
         self.planning_frame = self._planning_frame()
         self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
         self.limits = self._joint_limits(limits or {})
-        self.lower, self.upper, self.max_velocity, self.max_acceleration = (
+        self.lower, self.upper, self.max_velocity, self.max_acceleration, self.max_jerk = (
             np.array([getattr(self.limits[name], key) for name in self.joint_names])
-            for key in ("lower", "upper", "velocity", "acceleration"))
+            for key in ("lower", "upper", "velocity", "acceleration", "jerk"))
         self.max_deceleration = np.array([self.limits[name].braking for name in self.joint_names])
         self.mimics = [(self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
                        for name, mimic in self.document.mimics.items()]

@@ -8,16 +8,18 @@ controller's quintics follow it exactly on straight pieces and nearly so in roun
 """
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from modular_framework_planning.blended_path import BlendedPath
-from modular_framework_planning.compiled_timing import PathMotion, averaged, fastest_motion, largest_shares
+from modular_framework_planning.compiled_timing import averaged, fastest_motion, largest_shares
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.spatial import Array
 from modular_framework_planning.trajectory import Trajectory
 
 WINDOW_S = 0.04  # over which the fastest motion is averaged
-LONGEST_PERIOD_S, SHORTEST_PERIOD_S = 0.02, 0.004  # between two points
+LONGEST_PERIOD_S, SHORTEST_PERIOD_S = 0.02, 0.004  # between two points, unless longer ones are asked for
 GRID_STEP = 0.02  # [rad or m] between changes of the path acceleration, at most
 FEWEST_INTERVALS = 12  # a straight or curved piece is cut into
 JUMP = 0.05  # jump of an acceleration, as a share of its limit, that is worth a point
@@ -25,17 +27,15 @@ MARGIN = 1.0e-3  # share of the limits kept free for what happens between the sa
 SAMPLES_PER_SEGMENT = 24
 
 
-def _point_times(motion: PathMotion) -> Array:
-    """Times of the points: where the slope of the averaged acceleration jumps, and evenly between."""
-    end = float(motion.times[-1]) + WINDOW_S
-    jumps = motion.times[motion.jumps > JUMP]
+def point_times(wanted: Array, end: float, longest_period_s: float = LONGEST_PERIOD_S) -> Array:
+    """Returns times from 0 to `end`: the wanted ones, where not too near to each other, and evenly between."""
     kept = [0.0]
-    for time in np.sort(np.concatenate([jumps, jumps + WINDOW_S, [WINDOW_S, end - WINDOW_S]])).tolist():
+    for time in np.sort(wanted).tolist():
         if kept[-1] + SHORTEST_PERIOD_S <= time <= end - SHORTEST_PERIOD_S:
             kept.append(time)
     kept.append(end)
     spans = np.diff(kept)
-    counts = np.ceil(spans / LONGEST_PERIOD_S).astype(int)
+    counts = np.ceil(spans / longest_period_s).astype(int)
     places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.append(np.repeat(kept[:-1], counts) + places * np.repeat(spans / counts, counts), end)
 
@@ -47,17 +47,19 @@ def overrun(trajectory: Trajectory, velocity: Array, acceleration: Array) -> flo
     return max(1.0, fastest, float(np.sqrt(hardest)))
 
 
-def _section(joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, acceleration: Array) -> Trajectory:
-    """Times one section from rest to rest; times are whole nanoseconds, as messages carry them."""
+def _section(joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, acceleration: Array,
+             longest_period_s: float) -> Trajectory:
+    """Times one section from rest to rest."""
     pieces = path.pieces()
     motion = fastest_motion(pieces, velocity, acceleration, GRID_STEP, FEWEST_INTERVALS)
-    times = _point_times(motion)
-    draft = Trajectory(joint_names, times, *averaged(pieces, motion, times, WINDOW_S))
-    factor = overrun(draft, velocity, acceleration)
-    rounded = np.round(times * factor, 9) / factor
-    positions, velocities, accelerations = averaged(pieces, motion, rounded, WINDOW_S)
+    jumps = motion.times[motion.jumps > JUMP]
+    end = float(motion.times[-1]) + WINDOW_S
+    times = point_times(np.concatenate([jumps, jumps + WINDOW_S, [WINDOW_S, end - WINDOW_S]]), end, longest_period_s)
+    positions, velocities, accelerations = averaged(pieces, motion, times, WINDOW_S)
     velocities[[0, -1]] = accelerations[[0, -1]] = 0.0
-    return Trajectory(joint_names, rounded, positions, velocities, accelerations).slowed(factor)
+    positions[0], positions[-1] = path.start, path.end
+    draft = Trajectory(joint_names, times, positions, velocities, accelerations)
+    return draft.slowed(overrun(draft, velocity, acceleration))
 
 
 def _sections(vertices: Array, blends: Array) -> list[BlendedPath]:
@@ -68,7 +70,7 @@ def _sections(vertices: Array, blends: Array) -> list[BlendedPath]:
 
 
 def parameterize(joint_names: tuple[str, ...], vertices: Array, blends: Array, velocity: Array,
-                 acceleration: Array) -> Trajectory:
+                 acceleration: Array, longest_period_s: float = LONGEST_PERIOD_S) -> Trajectory:
     """Times a polyline with blended corners.
 
     Args:
@@ -76,6 +78,7 @@ def parameterize(joint_names: tuple[str, ...], vertices: Array, blends: Array, v
         vertices: shape (n, joints), neighbours differ.
         blends: corner distances of shape (n - 2,); 0 stops at the corner.
         velocity, acceleration: limits of shape (joints,), scaling already applied.
+        longest_period_s: between two points [s].
 
     Returns:
         Points whose curve (see Trajectory) keeps the limits; it leaves the path by no more than the averaging of
@@ -92,12 +95,15 @@ def parameterize(joint_names: tuple[str, ...], vertices: Array, blends: Array, v
         still = np.zeros_like(vertices)
         return Trajectory(joint_names, np.zeros(1), vertices.copy(), still, still.copy())
     kept = 1.0 - MARGIN
-    parts = [_section(joint_names, section, velocity * kept, acceleration * kept)
-             for section in _sections(vertices, blends)]
+    return joined([_section(joint_names, section, velocity * kept, acceleration * kept, longest_period_s)
+                   for section in _sections(vertices, blends)])
+
+
+def joined(parts: Sequence[Trajectory]) -> Trajectory:
+    """Returns one trajectory of several that follow each other, from rest to rest each."""
     ends = np.cumsum([0.0, *(part.duration_s for part in parts)])
     times = np.concatenate([parts[0].times, *(part.times[1:] + end
                                               for part, end in zip(parts[1:], ends[1:-1], strict=True))])
     columns = [np.concatenate([getattr(parts[0], name), *(getattr(part, name)[1:] for part in parts[1:])])
                for name in ("positions", "velocities", "accelerations")]
-    columns[0][0], columns[0][-1] = vertices[0], vertices[-1]
-    return Trajectory(joint_names, np.round(times, 9), *columns)
+    return Trajectory(parts[0].joint_names, np.round(times, 9), *columns)

@@ -77,6 +77,9 @@ class Trajectory:
         return np.vstack([self.at(np.concatenate(pieces))[0], self.positions[-1:]])
 
     def slowed(self, factor: float) -> Trajectory:
-        """Returns the same curve run `factor` times slower."""
-        return Trajectory(self.joint_names, self.times * factor, self.positions, self.velocities / factor,
-                          self.accelerations / factor**2)
+        """Returns the same curve run `factor` times slower; its times are whole nanoseconds, as messages carry them."""
+        times = np.round(self.times * factor, 9)
+        positions, velocities, accelerations, _ = self.at(times / factor)
+        positions[0], positions[-1] = self.positions[0], self.positions[-1]
+        velocities[[0, -1]], accelerations[[0, -1]] = self.velocities[[0, -1]], self.accelerations[[0, -1]]
+        return Trajectory(self.joint_names, times, positions, velocities / factor, accelerations / factor**2)

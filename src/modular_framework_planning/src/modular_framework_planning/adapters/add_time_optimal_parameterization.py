@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from modular_framework_planning.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.blended_path import choose_blends
-from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planner_interface import PlannedPath, PlanNext, PlanningProblem
-from modular_framework_planning.time_parameterization import parameterize
+from modular_framework_planning.spatial import Array
+from modular_framework_planning.time_parameterization import LONGEST_PERIOD_S, SHORTEST_PERIOD_S, parameterize
 
 
 class AddTimeOptimalParameterization(RequestAdapter):
-    """Times what is not timed yet."""
+    """Times what is not timed yet.
+
+    Parameters of the pipeline: `path_tolerance` (most distance of a rounded corner from the corner [rad or m], the
+    pipeline's blend_deviation by default), `resample_dt` (longest time between two points [s], 0.02 by default).
+    """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
         """Plans, then times the path; the path without rounded corners where the rounded one fails the last check."""
@@ -23,21 +29,36 @@ class AddTimeOptimalParameterization(RequestAdapter):
 
 
 def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
-    """Returns the path with a trajectory; raises PlanningError where no timing is found."""
+    """Returns the path with a trajectory; raises PlanningError where a limit or a parameter is not usable."""
     vertices = path.vertices
     if len(vertices) == 2 and np.abs(vertices[1] - vertices[0]).max() < 1e-9:
         vertices = vertices[1:]
-    fine = problem.settings.motion_step
-    blends = choose_blends(vertices, problem.settings.blend_deviation,
-                           lambda curve: problem.motion.first_collision(curve, fine) is None)
-    stops = np.zeros_like(blends)
+    period = _number(problem.settings.parameters, "resample_dt", LONGEST_PERIOD_S, SHORTEST_PERIOD_S)
+    tolerance = _number(problem.settings.parameters, "path_tolerance", problem.settings.blend_deviation, 0.0)
+
+    def timed(blends: Array) -> PlannedPath:
+        return replace(path, trajectory=parameterize(problem.group.joints, vertices, blends, problem.max_velocity,
+                                                     problem.max_acceleration, period))
+
+    blends = choose_blends(vertices, tolerance, lambda curve: _is_valid(problem, curve))
     if blends.any():
-        try:
-            timed = replace(path, trajectory=parameterize(problem.group.joints, vertices, blends,
-                                                          problem.max_velocity, problem.max_acceleration))
-        except PlanningError:
-            timed = None
-        if timed is not None and not problem.last_check.fault(problem, timed):
-            return timed
-    return replace(path, trajectory=parameterize(problem.group.joints, vertices, stops, problem.max_velocity,
-                                                 problem.max_acceleration))
+        rounded = timed(blends)
+        if not problem.last_check.fault(problem, rounded):
+            return rounded
+    return timed(np.zeros_like(blends))
+
+
+def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
+    """Whether a rounded corner is free and keeps the path constraints."""
+    if problem.constraints is not None and not all(
+            problem.constraints.satisfied(problem.motion.whole(values)) for values in curve):
+        return False
+    return problem.motion.first_collision(curve, problem.settings.motion_step) is None
+
+
+def _number(parameters: Any, name: str, default: float, lowest: float) -> float:
+    value = parameters.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not lowest <= value < np.inf:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"parameter {name} of the pipeline is {value!r}; allowed is "
+                            f"a number of at least {lowest}")
+    return float(value)
