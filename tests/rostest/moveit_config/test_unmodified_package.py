@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A config package as the MoveIt Setup Assistant writes it launches, plans and executes as it is."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import moveit_commander
+import numpy as np
+import pytest
+import rosgraph
+import rospy
+from moveit_commander import MoveGroupCommander
+from moveit_msgs.msg import MoveItErrorCodes
+from sensor_msgs.msg import JointState
+
+PACKAGES = Path(__file__).parents[2] / "packages"
+READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
+REACHING = [0.6, 0.3, 0.0, -1.7, 0.0, 2.0, 0.785]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def workspace() -> Iterator[None]:
+    """The packages are found as those of a user: along ROS_PACKAGE_PATH."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_PACKAGE_PATH", str(PACKAGES), prepend=":")
+        yield
+
+
+@pytest.fixture(scope="module")
+def demo(workspace: None, ros_launch: Callable[..., Any]) -> Iterator[Any]:
+    session = ros_launch(PACKAGES / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
+    session.wait_for_service("plan_kinematic_path", 60.0)
+    yield session
+    assert session.alive(), session.log()
+
+
+@pytest.fixture(scope="module")
+def arm(demo: Any) -> MoveGroupCommander:
+    return commander("panda_arm")
+
+
+def commander(group: str) -> MoveGroupCommander:
+    group = MoveGroupCommander(group, wait_for_servers=30.0)
+    group.set_max_velocity_scaling_factor(1.0)
+    group.set_max_acceleration_scaling_factor(1.0)
+    return group
+
+
+def test_the_package_knows_nothing_of_this_project() -> None:
+    folder = PACKAGES / "panda_moveit_config"
+    texts = [path.read_text() for path in (*folder.glob("launch/*"), *folder.glob("config/*"))]
+    assert len(texts) > 25
+    assert not [text for text in texts if "modular_framework" in text]
+
+
+def test_the_robot_starts_where_fake_controllers_put_it(arm: MoveGroupCommander) -> None:
+    assert arm.get_current_joint_values() == pytest.approx(READY)
+    assert commander("hand").get_current_joint_values() == pytest.approx([0.035, 0.035]), "the mirrored finger follows"
+
+
+def test_a_motion_is_planned_and_executed(arm: MoveGroupCommander) -> None:
+    arm.set_named_target("reaching")
+    worked, trajectory, _, _ = arm.plan()
+    assert worked
+    states: list[JointState] = []
+    listener = rospy.Subscriber("move_group/fake_controller_joint_states", JointState, states.append)
+    begun = time.monotonic()
+    assert arm.execute(trajectory)
+    duration_s = trajectory.joint_trajectory.points[-1].time_from_start.to_sec()
+    assert time.monotonic() - begun >= duration_s, "a fake robot takes its time"
+    listener.unregister()
+    assert arm.get_current_joint_values() == pytest.approx(REACHING, abs=1e-3)
+    travelled = np.array([state.position for state in states if state.name == trajectory.joint_trajectory.joint_names])
+    assert len(travelled) > 5 and np.allclose(travelled[-1], REACHING, atol=1e-3)
+
+
+def test_a_pose_is_reached(arm: MoveGroupCommander) -> None:
+    pose = arm.get_current_pose()
+    pose.pose.position.z += 0.05
+    arm.set_pose_target(pose)
+    assert arm.go()
+    reached = arm.get_current_pose().pose.position
+    assert [reached.x, reached.y, reached.z] == pytest.approx(
+        [pose.pose.position.x, pose.pose.position.y, pose.pose.position.z], abs=2e-3)
+
+
+def test_the_hand_closes_and_arm_and_hand_move_together(demo: Any) -> None:
+    hand, both = commander("hand"), commander("panda_arm_hand")
+    hand.set_joint_value_target({"panda_finger_joint1": 0.03})
+    assert hand.go()
+    assert hand.get_current_joint_values() == pytest.approx([0.03, 0.03], abs=1e-3)
+    both.set_joint_value_target({**{f"panda_joint{n + 1}": value for n, value in enumerate(READY)},
+                                 "panda_finger_joint1": 0.02})
+    assert both.go()
+    assert both.get_current_joint_values() == pytest.approx([*READY, 0.02, 0.02], abs=1e-3)
+
+
+def test_a_stop_leaves_the_robot_on_its_way(arm: MoveGroupCommander) -> None:
+    arm.set_joint_value_target(READY)
+    assert arm.go()
+    arm.set_max_velocity_scaling_factor(0.2)
+    arm.set_named_target("reaching")
+    assert arm.go(wait=False)
+    deadline = time.monotonic() + 10.0
+    while np.allclose(arm.get_current_joint_values(), READY, atol=0.02):
+        assert time.monotonic() < deadline, "the motion has not begun"
+    arm.stop()
+    time.sleep(0.5)
+    stopped = arm.get_current_joint_values()
+    time.sleep(0.5)
+    assert arm.get_current_joint_values() == stopped
+    assert not np.allclose(stopped, REACHING, atol=0.05)
+    arm.set_max_velocity_scaling_factor(1.0)
+
+
+def test_a_start_elsewhere_is_refused(arm: MoveGroupCommander, demo: Any) -> None:
+    arm.set_named_target("ready")
+    worked, trajectory, _, _ = arm.plan()
+    assert worked
+    for point in trajectory.joint_trajectory.points:
+        point.positions = [value + 0.2 for value in point.positions]
+    assert not arm.execute(trajectory)
+    assert "allowed_start_tolerance 0.01" in demo.log()
+    arm.set_named_target("ready")
+    assert arm.go()
+
+
+def test_every_planner_of_the_package_is_offered_or_refused_with_a_reason(arm: MoveGroupCommander) -> None:
+    offered = arm.get_interface_description()
+    assert "RRTConnect" in offered.planner_ids
+    for pipeline in ("ompl", "chomp"):
+        arm.set_planning_pipeline_id(pipeline)
+        arm.set_named_target("reaching")
+        worked, _, _, code = arm.plan()
+        assert worked == (pipeline == "ompl")
+        assert (code.val == MoveItErrorCodes.SUCCESS) == worked
+    arm.set_planning_pipeline_id("")
+
+
+def test_nodes_and_names_are_those_clients_look_for(demo: Any) -> None:
+    publishers, _, services = rosgraph.Master("/test").getSystemState()
+    assert {"/move_group/monitored_planning_scene", "/move_group/display_planned_path",
+            "/move_group/fake_controller_joint_states", "/joint_states", "/tf", "/tf_static"
+            } <= {name for name, _ in publishers}
+    assert {"/plan_kinematic_path", "/compute_ik", "/compute_fk", "/get_planning_scene", "/apply_planning_scene",
+            "/clear_octomap", "/query_planner_interface", "/check_state_validity"} <= {name for name, _ in services}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def commanders() -> Iterator[None]:
+    yield
+    moveit_commander.roscpp_shutdown()
