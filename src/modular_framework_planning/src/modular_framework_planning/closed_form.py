@@ -56,12 +56,13 @@ class ClosedForm:
 
     def _robot(self, held: float) -> Any:
         key = 0.0 if self.locked is None else round(held, 9)
-        if key not in self._robots:
+        robot = self._robots.get(key)
+        if robot is None:
             if len(self._robots) >= MAX_KEPT:
                 self._robots.clear()
-            axes = [] if self.locked is None else [(self.locked, key)]
-            self._robots[key] = HPRobot(self._axes, self._offsets, axes)
-        return self._robots[key]
+            robot = HPRobot(self._axes, self._offsets, [] if self.locked is None else [(self.locked, key)])
+            self._robots[key] = robot
+        return robot
 
 
 def _axes_and_offsets(model: RobotModel, group: JointGroup, base_link: str,

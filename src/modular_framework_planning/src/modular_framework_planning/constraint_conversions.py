@@ -69,7 +69,7 @@ def frame_on_robot(scene: PlanningScene, name: str) -> FrameOnRobot:
     """
     name = name.removeprefix("/")
     pose = scene.frame_transform(name)
-    holder = name if scene.model.has_link(name) else _holding_link(scene, name)
+    holder = holding_link(scene, name)
     if not holder:
         return FrameOnRobot(name or scene.model.planning_frame, 0, pose)
     frame = scene.model.pin_model.frames[scene.model.frame_ids[holder]]
@@ -77,7 +77,10 @@ def frame_on_robot(scene: PlanningScene, name: str) -> FrameOnRobot:
     return FrameOnRobot(name, int(frame.parentJoint), placement)
 
 
-def _holding_link(scene: PlanningScene, name: str) -> str:
+def holding_link(scene: PlanningScene, name: str) -> str:
+    """Returns the link a frame is fixed to: the link of that name, or the one that holds the object; else empty."""
+    if scene.model.has_link(name):
+        return name
     if name in scene.objects or name in scene.fixed_frames:
         return ""
     held = scene.attached.get(name) or scene.attached.get(name.partition("/")[0])
@@ -119,7 +122,7 @@ class _Reader:
     def _link(self, name: str, where: str) -> FrameOnRobot:
         name = (name or self._tip).removeprefix("/")
         scene = self._scene
-        if not scene.model.has_link(name) and not _holding_link(scene, name):
+        if not holding_link(scene, name):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"{where}: link", name,
                                    [*scene.model.frame_ids, *scene.attached])
         return frame_on_robot(scene, name)

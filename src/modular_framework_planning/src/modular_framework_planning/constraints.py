@@ -23,6 +23,7 @@ SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a re
 INSIDE = 1.0e-5  # [m] or [rad]; projections aim this far inside a tolerance, not at its border
 MAX_STEP = 0.3  # [rad or m]; of any joint in one step of a projection
 DAMPING = 1.0e-6
+LOOSE = 0.02  # [m] or [rad]; tolerances above this are worth looking around in
 Index = Sequence[int] | NDArray[np.int64]
 Row = tuple[Array, float]  # one linearised condition: (joint velocities -> change, change that is wanted)
 
@@ -290,6 +291,36 @@ class KinematicConstraints:
     def describe(self, positions: Array) -> str:
         """Says which constraints a state violates and by how much; empty where it keeps all."""
         return "; ".join(item.text for item in self.evaluate(positions) if not item.satisfied)
+
+    @property
+    def pose_link(self) -> str:
+        """The link whose pose the constraints are about: one position and one orientation of it; else empty."""
+        if self.joints or len(self.positions) != 1 or len(self.orientations) != 1:
+            return ""
+        name = self.positions[0].link.name
+        return name if name == self.orientations[0].link.name else ""
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether quite different states satisfy, so that looking around the middle of the tolerances pays."""
+        return (any(solid.extent > LOOSE for item in self.positions for solid, _ in item.regions)
+                or any(float(item.tolerances.max()) > LOOSE for item in self.orientations))
+
+    def pose_target(self, positions: Array, rng: np.random.Generator | None = None) -> Transform:
+        """Returns a pose of `pose_link` in the planning frame that satisfies.
+
+        Args:
+            positions: state that says where moving frames are.
+            rng: draws a random one; without it, it is the middle of the first region, turned as asked.
+        """
+        pin.forwardKinematics(self.model.pin_model, self._data, positions)
+        point, turn = self.positions[0], self.orientations[0]
+        number = 0 if rng is None else int(rng.integers(len(point.regions)))
+        solid, pose = point.regions[number]
+        at = (point.reference.pose(self._data) * pose).act(np.zeros(3) if rng is None else solid.sample(rng))
+        inner = turn.target if rng is None else turn.sample(rng)
+        rotation = turn.reference.pose(self._data).rotation @ inner
+        return pin.SE3(rotation, at - rotation @ point.offset)
 
     def bounds(self, indices: Index, positions: Array) -> tuple[Array, Array]:
         """Returns the lower and upper values of the given joints that bounds and joint constraints leave.

@@ -7,14 +7,14 @@ from typing import Any
 
 import genpy
 import numpy as np
-import pinocchio as pin
 from geometry_msgs.msg import Pose, PoseStamped
 from moveit_msgs.msg import RobotState, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_planning.collision import ATTACHED, LINK, WORLD
-from modular_framework_planning.errors import ErrorCode, GeometryError, PlanningError, UnknownNameError
-from modular_framework_planning.planning_request import JointGoal, PoseGoal
+from modular_framework_planning.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.planning_request import ConstraintGoal, JointGoal, PoseGoal
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.scene_conversions import apply_attached_object, attached_to_message
@@ -96,65 +96,31 @@ def state_message(scene: PlanningScene, positions: Array | None = None, with_att
     return message
 
 
-def goals_from_constraints(scene: PlanningScene, constraints: Sequence[Any], tip: str) -> tuple[Any, ...]:
+def goals_from_constraints(scene: PlanningScene, constraints: Sequence[Any],
+                           tip: str) -> tuple[JointGoal | PoseGoal | ConstraintGoal, ...]:
     """Reads goal_constraints; each entry is one alternative.
 
     Raises:
-        PlanningError: an entry is empty, mixes kinds, or asks for what is not supported.
+        PlanningError: an entry is empty or has no meaning.
     """
     return tuple(_goal(scene, item, tip, f"goal_constraints[{number}]") for number, item in enumerate(constraints))
 
 
-def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | PoseGoal:
-    if item.visibility_constraints:
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: visibility constraints are not supported; "
-                            "use joint constraints, or a position and an orientation constraint")
-    pose = len(item.position_constraints) + len(item.orientation_constraints)
-    if item.joint_constraints and not pose:
-        return _joint_goal(scene, item.joint_constraints, where)
-    if not item.joint_constraints and (len(item.position_constraints), len(item.orientation_constraints)) == (1, 1):
-        return _pose_goal(scene, item.position_constraints[0], item.orientation_constraints[0], tip, where)
-    raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: {len(item.joint_constraints)} joint, "
-                        f"{len(item.position_constraints)} position and {len(item.orientation_constraints)} "
-                        "orientation constraints; allowed: joints alone, or one position with one orientation")
-
-
-def _joint_goal(scene: PlanningScene, constraints: Sequence[Any], where: str) -> JointGoal:
-    for item in constraints:
-        if item.joint_name not in scene.model.index:
-            raise UnknownNameError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint", item.joint_name,
-                                   scene.model.joint_names)
-        if not np.isfinite([item.position, item.tolerance_above, item.tolerance_below]).all():
-            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint '{item.joint_name}' has a "
-                                "position or tolerance that is not finite")
-    return JointGoal({item.joint_name: float(item.position) for item in constraints},
-                     {item.joint_name: abs(float(item.tolerance_below)) for item in constraints},
-                     {item.joint_name: abs(float(item.tolerance_above)) for item in constraints})
-
-
-def _pose_goal(scene: PlanningScene, position: Any, orientation: Any, tip: str, where: str) -> PoseGoal:
-    links = {name or tip for name in (position.link_name, orientation.link_name)}
-    if len(links) != 1:
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: position is for '{position.link_name}', "
-                            f"orientation for '{orientation.link_name}'; both must name one link")
-    region = position.constraint_region
-    centres = list(region.primitive_poses) + list(region.mesh_poses)
-    if not centres:
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: the position constraint's region is empty; "
-                            "give a primitive with its pose")
-    centre = Pose()
-    centre.position = centres[0].position
-    centre.orientation.w = 1.0
-    point = scene.frame_transform(position.header.frame_id) * transform_from_pose(centre, f"{where} position")
-    turned = Pose(orientation=orientation.orientation)
-    rotation = (scene.frame_transform(orientation.header.frame_id)
-                * transform_from_pose(turned, f"{where} orientation")).rotation
-    offset = position.target_point_offset
-    shift = np.array([offset.x, offset.y, offset.z])
-    if not np.isfinite(shift).all():
-        raise GeometryError(f"{where}: target_point_offset is not finite", ErrorCode.INVALID_GOAL_CONSTRAINTS)
-    link = links.pop()
-    return PoseGoal(link, pin.SE3(rotation, point.translation - rotation @ shift))
+def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | PoseGoal | ConstraintGoal:
+    constraints = constraints_from_message(scene, item, where, ErrorCode.INVALID_GOAL_CONSTRAINTS, tip)
+    if constraints.is_empty:
+        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: no constraint; give joint, position or "
+                            "orientation constraints")
+    joints = constraints.joints
+    if len({joint.name for joint in joints}) == len(joints) and not (constraints.positions or constraints.orientations):
+        return JointGoal({joint.name: joint.target for joint in joints}, {joint.name: joint.below for joint in joints},
+                         {joint.name: joint.above for joint in joints})
+    name = constraints.pose_link
+    if not name:
+        return ConstraintGoal(constraints)
+    link = holding_link(scene, name)
+    in_link = scene.frame_transform(link).actInv(scene.frame_transform(name))
+    return PoseGoal(link, constraints.pose_target(scene.positions) * in_link.inverse(), constraints)
 
 
 def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:

@@ -2,28 +2,38 @@
 """Turns the goals of a request into free joint vectors, or says why there is none."""
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool, first_free
+from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool, first_free
 from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.planning_request import JointGoal, PlanningRequest, PoseGoal
+from modular_framework_planning.planning_request import ConstraintGoal, JointGoal, PlanningRequest, PoseGoal
 from modular_framework_planning.robot_model import JointGroup
 from modular_framework_planning.spatial import Array
 
 MAX_GOAL_STATES = 8
 IK_TIMEOUT_S = 0.2
+SAMPLING_TIME_S = 0.5  # spent at most on looking around in the tolerances of one goal
+MOST_SAMPLES = 64
 
 
 class GoalResolver:
     """Resolves the goals of one request."""
 
     def __init__(self, request: PlanningRequest, group: JointGroup, kinematics: KinematicsPool,
-                 checker: CollisionChecker, motion: MotionChecker, rng: np.random.Generator) -> None:
+                 checker: CollisionChecker, motion: MotionChecker, rng: np.random.Generator,
+                 path_constraints: KinematicConstraints | None = None) -> None:
+        """Args: the request; its group; solvers; collision checks; random numbers; what goal states must satisfy."""
         self._request, self._group, self._kinematics = request, group, kinematics
         self._checker, self._motion, self._rng = checker, motion, rng
+        self._path_constraints = path_constraints
         self._model = request.scene.model
+        self._start = request.scene.positions[group.indices]
 
     def resolve(self) -> Array:
         """Returns free goal vectors of the group, nearest to the start first, shape (n, joints).
@@ -38,47 +48,132 @@ class GoalResolver:
         failures: list[PlanningError] = []
         for goal in self._request.goals:
             try:
-                vectors += [self._joint(goal)] if isinstance(goal, JointGoal) else self._pose(goal)
+                vectors += self._vectors(goal)
             except PlanningError as error:
                 failures.append(error)
         if not vectors:
             raise failures[0]
-        start = self._request.scene.positions[self._group.indices]
-        vectors.sort(key=lambda values: float(np.linalg.norm(values - start)))
+        vectors.sort(key=lambda values: float(np.linalg.norm(values - self._start)))
         return np.array(vectors[:MAX_GOAL_STATES])
 
+    def _vectors(self, goal: JointGoal | PoseGoal | ConstraintGoal) -> list[Array]:
+        match goal:
+            case JointGoal():
+                return [self._joint(goal)]
+            case PoseGoal():
+                return self._pose(goal)
+            case ConstraintGoal():
+                return self._region(goal.constraints)
+        raise TypeError(f"{type(goal).__name__} is not a goal")
+
+    def _is_good(self, values: Array) -> bool:
+        """Whether a state satisfies the path constraints and is free."""
+        constraints = self._path_constraints
+        return (constraints is None or constraints.satisfied(self._motion.whole(values))) and (
+            self._motion.state_is_free(values))
+
+    def _why_not(self, values: Array, what: str) -> PlanningError:
+        """Says what is wrong with the best candidate of a goal."""
+        whole, constraints = self._motion.whole(values), self._path_constraints
+        if constraints is not None and not constraints.satisfied(whole):
+            return PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, f"{what} violates the path constraints: "
+                                 f"{constraints.describe(whole)}; move the goal or widen the tolerances")
+        contacts = self._checker.contacts(whole, include_fixed=False)
+        return PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}")
+
     def _joint(self, goal: JointGoal) -> Array:
-        values = np.array(self._request.scene.positions[self._group.indices])
-        for name, target in goal.positions.items():
+        """Returns the exact target; where that is not free, the first free state found within the tolerances."""
+        target, low, high = self._joint_ranges(goal)
+        if self._is_good(target):
+            return target
+        if (high > low).any():
+            for number in range(MOST_SAMPLES):
+                share = (number + 1) / MOST_SAMPLES
+                values = target + share * (self._rng.uniform(low, high) - target)
+                if self._is_good(values):
+                    return values
+        raise self._why_not(target, "goal")
+
+    def _joint_ranges(self, goal: JointGoal) -> tuple[Array, Array, Array]:
+        """Returns target, lowest and highest allowed values of the group's joints; a turn without ends is nearest."""
+        values = np.array(self._start)
+        low, high = values.copy(), values.copy()
+        for name, wanted in goal.positions.items():
             if name not in self._group.joints:
                 raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal: joint '{name}' is not in group "
                                     f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}")
-            number = self._model.index[name]
-            low = max(self._model.lower[number], target - goal.below.get(name, 0.0))
-            high = min(self._model.upper[number], target + goal.above.get(name, 0.0))
-            if low > high + 1e-6:
-                raise PlanningError(ErrorCode.GOAL_STATE_INVALID, f"goal: joint '{name}' at {target:.4f} is outside "
+            number, place = self._model.index[name], self._group.joints.index(name)
+            if self._model.is_continuous(number):
+                wanted += 2.0 * np.pi * np.round((values[place] - wanted) / (2.0 * np.pi))
+            least = max(self._model.lower[number], wanted - goal.below.get(name, 0.0))
+            most = min(self._model.upper[number], wanted + goal.above.get(name, 0.0))
+            if least > most + 1e-6:
+                raise PlanningError(ErrorCode.GOAL_STATE_INVALID, f"goal: joint '{name}' at {wanted:.4f} is outside "
                                     f"[{self._model.lower[number]:.4f}, {self._model.upper[number]:.4f}]")
-            values[self._group.joints.index(name)] = np.clip(target, min(low, high), max(low, high))
-        self._require_free(values, "goal")
-        return values
-
-    def _require_free(self, values: Array, what: str) -> None:
-        from modular_framework_planning.pipeline import describe_contacts
-
-        if not self._motion.state_is_free(values):
-            contacts = self._checker.contacts(self._motion.whole(values), include_fixed=False)
-            raise PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}")
+            low[place], high[place] = min(least, most), max(least, most)
+            values[place] = np.clip(wanted, low[place], high[place])
+        return values, low, high
 
     def _pose(self, goal: PoseGoal) -> list[Array]:
-        solver = self._kinematics.solver(self._group.name)
-        seed = self._request.scene.positions
-        found = solver.solutions(goal.link, goal.target, seed, IK_TIMEOUT_S, self._rng)
-        if not found:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
+        """Returns free solutions at the target; where there are none, at other poses that are allowed."""
+        seed, allowed = self._request.scene.positions, goal.allowed
+        try:
+            solver = self._kinematics.solver(self._group.name)
+            found = solver.solutions(goal.link, goal.target, seed, IK_TIMEOUT_S, self._rng)
+        except PlanningError:
+            if allowed is None:
+                raise
+            return self._region(allowed)  # no chain to that link: least squares instead of inverse kinematics
         candidates = [positions[self._group.indices] for positions in found]
-        free = first_free(candidates, self._motion.state_is_free, MAX_GOAL_STATES)
-        if not free:
-            self._require_free(candidates[0], f"goal: all {len(found)} inverse kinematics solutions "
-                               f"for '{goal.link}' collide; the nearest is")
-        return free
+        free = first_free(candidates, self._is_good, MAX_GOAL_STATES)
+        if allowed is not None and allowed.is_loose:
+            nearest = allowed.project(seed, self._group.indices)
+            if nearest is not None and self._is_good(nearest[self._group.indices]):
+                free.append(nearest[self._group.indices])
+            if not free:
+                others = self._at_other_poses(goal, allowed, solver)
+                free, candidates = first_free(others, self._is_good, MAX_GOAL_STATES), candidates + others
+        if free:
+            return free
+        if not candidates:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
+        raise self._why_not(candidates[0], f"goal: all {len(candidates)} inverse kinematics solutions for "
+                            f"'{goal.link}' collide; the nearest is" if self._path_constraints is None else
+                            f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; "
+                            "the nearest")
+
+    def _at_other_poses(self, goal: PoseGoal, allowed: KinematicConstraints, solver: InverseKinematics) -> list[Array]:
+        """Returns solutions at random poses within the tolerances."""
+        seed, indices = self._request.scene.positions, self._group.indices
+        to_link = allowed.pose_target(seed).inverse() * goal.target
+        deadline = time.monotonic() + SAMPLING_TIME_S
+        found: list[Array] = []
+        for _ in range(MOST_SAMPLES):
+            target = allowed.pose_target(seed, self._rng) * to_link
+            found += [positions[indices] for positions in solver.solutions(goal.link, target, seed, IK_TIMEOUT_S,
+                                                                           self._rng) if allowed.satisfied(positions)]
+            if time.monotonic() > deadline:
+                break
+        return found
+
+    def _region(self, constraints: KinematicConstraints) -> list[Array]:
+        """Returns free states that satisfy: the nearest to the start, then random ones."""
+        seed, indices = self._request.scene.positions, self._group.indices
+        deadline = time.monotonic() + SAMPLING_TIME_S
+        free: list[Array] = []
+        rejected: list[Array] = []
+        for number in range(MOST_SAMPLES):
+            found = constraints.project(seed, indices) if number == 0 else (
+                constraints.sample(self._rng, seed, indices, 1))
+            if found is not None:
+                (free if self._is_good(found[indices]) else rejected).append(found[indices])
+            if len(free) >= MAX_GOAL_STATES or time.monotonic() > deadline:
+                break
+        if free:
+            return free
+        if rejected:
+            raise self._why_not(rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; "
+                                "the nearest is")
+        raise PlanningError(ErrorCode.GOAL_CONSTRAINTS_VIOLATED, "goal region was empty: no state of group "
+                            f"'{self._group.name}' within its joint bounds satisfies all constraints; from the start, "
+                            f"{constraints.describe(seed)}")

@@ -25,10 +25,18 @@ class JointGoal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """A link's target pose in the planning frame."""
+    """A link's target pose in the planning frame; `allowed` says which other poses would do as well."""
 
     link: str
     target: Transform
+    allowed: KinematicConstraints | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstraintGoal:
+    """Any state that satisfies constraints of any mix."""
+
+    constraints: KinematicConstraints
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +116,7 @@ class PlanningRequest:
 
     scene: PlanningScene
     group: str
-    goals: tuple[JointGoal | PoseGoal, ...]
+    goals: tuple[JointGoal | PoseGoal | ConstraintGoal, ...]
     planner_id: str = ""
     attempts: int = 1
     allowed_time_s: float = 5.0

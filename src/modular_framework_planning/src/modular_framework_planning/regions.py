@@ -16,6 +16,10 @@ from modular_framework_planning.spatial import Array
 class Solid(Protocol):
     """A convex solid around its own origin; points are in its own frame [m]."""
 
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point of the solid from its origin [m]."""
+
     def nearest(self, point: Array) -> Array:
         """Returns the point of the solid nearest to `point`: the point itself where it is inside."""
 
@@ -40,6 +44,11 @@ class BoxSolid:
     def __post_init__(self) -> None:
         _require_lengths("box", x=self.x, y=self.y, z=self.z)
 
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return 0.5 * float(np.linalg.norm((self.x, self.y, self.z)))
+
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the box."""
         half = (0.5 * self.x, 0.5 * self.y, 0.5 * self.z)
@@ -58,6 +67,11 @@ class SphereSolid:
 
     def __post_init__(self) -> None:
         _require_lengths("sphere", radius=self.radius)
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return self.radius
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the ball."""
@@ -87,6 +101,11 @@ class CylinderSolid:
     def __post_init__(self) -> None:
         _require_lengths("cylinder", height=self.height, radius=self.radius)
 
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return float(np.hypot(0.5 * self.height, self.radius))
+
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the cylinder."""
         distance = float(np.hypot(point[0], point[1]))
@@ -108,6 +127,11 @@ class ConeSolid:
 
     def __post_init__(self) -> None:
         _require_lengths("cone", height=self.height, radius=self.radius)
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return float(np.hypot(0.5 * self.height, self.radius))
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the cone, looked for in the triangle that makes the cone by turning."""
@@ -151,6 +175,11 @@ class HullSolid:
         self._corners = points[hull.simplices]
         volumes = np.abs(np.linalg.det(self._corners - self._middle))
         self._shares = volumes / volumes.sum()
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return float(np.linalg.norm(self._vertices, axis=1).max())
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the hull: the shortest convex combination of vertices seen from the point."""
