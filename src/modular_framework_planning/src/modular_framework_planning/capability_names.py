@@ -15,6 +15,11 @@ CLEAR_OCTOMAP_SERVICE = "clear_octomap"
 MOVE_ACTION = "move_group"
 SEQUENCE_ACTION = "sequence_move_group"
 EXECUTE_ACTION = "execute_trajectory"
+PICKUP_ACTION = "pickup"
+PLACE_ACTION = "place"
+
+SAVE_MAP_SERVICE = "~save_map"
+LOAD_MAP_SERVICE = "~load_map"
 
 JOINT_STATES_TOPIC = "joint_states"
 SCENE_TOPIC = "planning_scene"

@@ -22,24 +22,25 @@ class LastCheck:
             problem: what was planned; its checker and constraints are asked.
             path: with a trajectory.
         """
-        samples = checked_part(path)
-        key = (samples.tobytes(), id(problem.checker))
+        assert path.trajectory is not None
+        key = (path.trajectory.positions.tobytes() + path.trajectory.velocities.tobytes(), id(problem.checker))
         if key in self._passed:
             return ""
-        text = _not_in_order(path) or _collision(problem, samples) or _violation(problem, samples)
+        text = _not_in_order(path)
+        if not text:
+            curve = path.trajectory.curve(problem.settings.motion_step)
+            text = _collision(problem, _after(curve, path, path.lead_in)) or _violation(
+                problem, _after(curve, path, path.unconstrained))
         if not text:
             self._passed.add(key)
         return text
 
 
-def checked_part(path: PlannedPath) -> Array:
-    """Returns the samples of the timed motion after the way out of a colliding start."""
-    assert path.trajectory is not None
-    samples = path.trajectory.positions
-    if not path.lead_in:
-        return samples
-    first_free = path.vertices[path.lead_in]
-    return samples[int(np.argmin(np.linalg.norm(samples - first_free, axis=1))):]
+def _after(curve: Array, path: PlannedPath, vertices: int) -> Array:
+    """Returns the part of the motion from a vertex on."""
+    if not vertices:
+        return curve
+    return curve[int(np.argmin(np.linalg.norm(curve - path.vertices[vertices], axis=1))):]
 
 
 def _not_in_order(path: PlannedPath) -> str:

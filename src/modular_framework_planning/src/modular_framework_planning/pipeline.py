@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from modular_framework_planning.adapters.add_time_optimal_parameterization import AddTimeOptimalParameterization
-from modular_framework_planning.adapters.fix_start_state_bounds import FixStartStateBounds
-from modular_framework_planning.adapters.fix_start_state_collision import FixStartStateCollision
 from modular_framework_planning.adapters.request_adapter import RequestAdapter, chain
 from modular_framework_planning.collision import ATTACHED, WORLD, CollisionChecker
 from modular_framework_planning.contact_report import describe_contacts as describe_contacts
@@ -19,8 +16,9 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.last_check import LastCheck
 from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.ompl_planning import OmplPlanner
 from modular_framework_planning.path_shortening import shorten
+from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, make_adapters, make_planner
+from modular_framework_planning.planner_configurations import PlannerConfigurations
 from modular_framework_planning.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_request import PipelineSettings, PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_scene import PlanningScene
@@ -31,12 +29,8 @@ from modular_framework_planning.trajectory import Trajectory
 MAX_SHORTENING_S = 1.0
 FINE_STEPS = 2.5  # shortening looks at states this many times further apart than the last check does
 BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
+DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 CheckerSource = Callable[..., CollisionChecker]
-
-
-def default_adapters() -> tuple[RequestAdapter, ...]:
-    """Returns the adapters of a pipeline that names none."""
-    return AddTimeOptimalParameterization(), FixStartStateBounds(), FixStartStateCollision()
 
 
 class PlanningPipeline:
@@ -52,22 +46,45 @@ class PlanningPipeline:
             kinematics: inverse kinematics of its groups.
             settings: the pipeline's parameters.
             planner: OMPL by default.
-            adapters: outermost first.
+            adapters: outermost first; DEFAULT_ADAPTERS by default.
             name: what `pipeline_id` calls it.
             checkers: gives the collision checker for (scene, moving joints, tolerated contacts).
         """
         self._model = model
         self._kinematics = kinematics
-        self._planner = planner if planner is not None else OmplPlanner()
-        self._adapters = tuple(adapters) if adapters is not None else default_adapters()
+        self._planner = planner if planner is not None else make_planner(DEFAULT_PLANNER, model, settings)
+        self._adapters = tuple(adapters) if adapters is not None else make_adapters(DEFAULT_ADAPTERS)
         self._checkers = checkers
         self.name = name
         self.settings = settings
+        self.configurations = PlannerConfigurations(settings.planner_configs)
 
     @property
     def planner_ids(self) -> tuple[str, ...]:
         """What the planner takes as planner_id; empty where it takes anything."""
         return tuple(getattr(self._planner, "planner_ids", ()))
+
+    @property
+    def description(self) -> str:
+        """What the planner calls itself."""
+        return str(getattr(self._planner, "description", type(self._planner).__name__))
+
+    @property
+    def auxiliary_constraints(self) -> tuple[str, ...]:
+        """Names of path constraints that are input of the planner and need not be kept."""
+        return tuple(getattr(self._planner, "auxiliary_constraints", ()))
+
+    def group_planners(self, group: str) -> tuple[str, ...]:
+        """Returns the names in a group's planner_configs whose planner there is."""
+        names = [str(name) for name in self.settings.groups.get(group, {}).get("planner_configs") or ()]
+        known = self.planner_ids
+        return tuple(name for name in names if not known or self._kind(name, group)[0] in known)
+
+    def parameter_faults(self, name: str, group: str = "") -> list[str]:
+        """Returns what is wrong with the settings of a planner, one sentence each; nothing where it cannot tell."""
+        kind, parameters = self._kind(name, group)
+        check = getattr(self._planner, "parameter_faults", None)
+        return list(check(kind, parameters)) if check else []
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
         """Plans a motion.
@@ -113,7 +130,7 @@ class PlanningPipeline:
         found = self._planner.plan(problem)
         now = time.monotonic()
         if isinstance(found, Trajectory):
-            return PlannedPath(found.positions, found, 0, problem.planner_id, now, is_short=True)
+            return PlannedPath(found.positions, found, found_s=now, is_short=True)
         path = replace(found, found_s=now)
         if path.is_short or path.trajectory is not None:
             return path
@@ -167,14 +184,20 @@ class PlanningPipeline:
         name = asked or self.settings.default_planner(group)
         if name.endswith("]") and "[" in name:
             name = name.split("[")[-1].rstrip("]")
-        parameters = dict(self.settings.planner_configs.get(name) or {})
-        kind = str(parameters.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
+        kind, parameters = self._kind(name, group)
         known = self.planner_ids
         kind = kind or (known[0] if known else "")
         if known and kind not in known:
             raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{asked}': pipeline '{self.name}' has no "
                                 f"planner '{kind}'; available: {', '.join(known)}")
         return kind, parameters
+
+    def _kind(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
+        """Returns the planner that a name stands for, and its settings with those of the group."""
+        own = self.configurations.get(name, group)
+        kind = str(own.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
+        return kind, {**{key: value for key, value in self.settings.groups.get(group, {}).items()
+                         if key not in ("planner_configs", "default_planner_config")}, **own}
 
     def _scaled_limits(self, request: PlanningRequest, group: JointGroup) -> tuple[Array, Array]:
         factors = []

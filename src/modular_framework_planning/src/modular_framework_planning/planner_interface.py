@@ -87,9 +87,22 @@ class PlanningProblem:
             PlanningError: there is none; says why.
         """
         if not self._goals:
-            self._goals.append(GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
-                                            self.rng).resolve())
+            free = GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
+                                self.rng, self.constraints).resolve()
+            self._goals.append(self._constrained(free))
         return self._goals[0]
+
+    def _constrained(self, goals: Array) -> Array:
+        """Returns the goals that satisfy the path constraints; raises PlanningError where none does."""
+        constraints = self.constraints
+        if constraints is None:
+            return goals
+        kept = [values for values in goals if constraints.satisfied(self.motion.whole(values))]
+        if not kept:
+            raise PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, "goal: "
+                                f"{constraints.describe(self.motion.whole(goals[0]))}; none of {len(goals)} free goal "
+                                "states satisfies the path constraints: move the goal or widen the tolerances")
+        return np.array(kept)
 
     def state_is_valid(self, values: Array) -> bool:
         """Whether a joint vector is free of collisions and satisfies the path constraints."""
@@ -135,6 +148,7 @@ class PlannedPath:
         vertices: joint vectors from start to goal, shape (n, joints).
         trajectory: the timed motion, once there is one.
         lead_in: number of vertices before the first that has to be free: the way out of a colliding start.
+        unconstrained: number of vertices before the first that has to satisfy the path constraints.
         planner_id: what the answer calls the planner; empty for the problem's own planner_id.
         found_s: time.monotonic() when the planner was done.
         is_short: no shortening is wanted (a planner that follows a given line).
@@ -143,6 +157,7 @@ class PlannedPath:
     vertices: Array
     trajectory: Trajectory | None = None
     lead_in: int = 0
+    unconstrained: int = 0
     planner_id: str = ""
     found_s: float = 0.0
     is_short: bool = False

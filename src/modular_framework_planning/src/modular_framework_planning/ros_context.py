@@ -2,16 +2,15 @@
 """What the endpoints of the node share."""
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
 from modular_framework_planning.planning_request import PlanningAnswer, PlanningRequest
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.ros_execution import TrajectoryExecution
 from modular_framework_planning.ros_markers import MarkerPublisher
+from modular_framework_planning.ros_pipelines import PipelineSet
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
 
@@ -23,8 +22,7 @@ class MoveGroupContext:
     model: RobotModel
     monitor: SceneMonitor
     kinematics: KinematicsPool
-    pipelines: Mapping[str, PlanningPipeline]
-    default_pipeline: str
+    pipelines: PipelineSet
     execution: TrajectoryExecution
     markers: MarkerPublisher
     reporter: Reporter
@@ -35,12 +33,13 @@ class MoveGroupContext:
         Raises:
             PlanningError: no such pipeline, or no plan; code and reason.
         """
-        return self.pipeline(request.pipeline_id).plan(request)
+        return self.pipelines.choose(request.pipeline_id).plan(request)
+
+    @property
+    def default_pipeline(self) -> str:
+        """Name of the pipeline of requests that name none."""
+        return self.pipelines.default
 
     def pipeline(self, name: str) -> PlanningPipeline:
         """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
-        name = name or self.default_pipeline
-        if name not in self.pipelines:
-            raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{name}' is not loaded; available: "
-                                f"{', '.join(self.pipelines)}")
-        return self.pipelines[name]
+        return self.pipelines.choose(name)

@@ -7,9 +7,12 @@ import time
 
 import rospy
 
+from modular_framework_planning.capabilities.cartesian_path_service import CartesianPathService
 from modular_framework_planning.capabilities.execute_trajectory_action import ExecuteTrajectory
 from modular_framework_planning.capabilities.kinematics_service import KinematicsService
 from modular_framework_planning.capabilities.move_action import MoveAction
+from modular_framework_planning.capabilities.pickup_action import PickupAction
+from modular_framework_planning.capabilities.place_action import PlaceAction
 from modular_framework_planning.capabilities.plan_service import PlanService
 from modular_framework_planning.capabilities.planning_scene_services import (
     ApplyPlanningSceneService,
@@ -21,18 +24,21 @@ from modular_framework_planning.capabilities.state_validation_service import Sta
 from modular_framework_planning.capabilities.tf_publisher import TfPublisher
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.pipeline import PlanningPipeline
 from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.ros_execution import load_execution
 from modular_framework_planning.ros_markers import MarkerPublisher
-from modular_framework_planning.ros_parameters import load_pipeline_settings, load_robot_model
+from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
+from modular_framework_planning.ros_padding import load_padding
+from modular_framework_planning.ros_parameters import load_robot_model
+from modular_framework_planning.ros_pipelines import load_pipelines
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
 
 # Every endpoint of the node under the name MoveIt's parameters `capabilities` and `disable_capabilities` use.
 CAPABILITIES = (
     Capability("move_group/MoveGroupPlanService", PlanService),
+    Capability("move_group/MoveGroupCartesianPathService", CartesianPathService),
     Capability("move_group/MoveGroupKinematicsService", KinematicsService),
     Capability("move_group/MoveGroupStateValidationService", StateValidationService),
     Capability("move_group/MoveGroupGetPlanningSceneService", GetPlanningSceneService),
@@ -41,6 +47,8 @@ CAPABILITIES = (
     Capability("move_group/MoveGroupQueryPlannersService", QueryPlannersService),
     Capability("move_group/MoveGroupMoveAction", MoveAction),
     Capability("move_group/MoveGroupExecuteTrajectoryAction", ExecuteTrajectory),
+    Capability("move_group/MoveGroupPickPlaceAction", PickupAction),
+    Capability("move_group/MoveGroupPickPlaceAction", PlaceAction),
     Capability("move_group/TfPublisher", TfPublisher, default=False),
 )
 
@@ -48,19 +56,18 @@ CAPABILITIES = (
 def build_context() -> MoveGroupContext:
     """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
     model = load_robot_model()
-    name, settings = load_pipeline_settings()
     kinematics = KinematicsPool(model)
-    monitor = SceneMonitor(model)
+    monitor = SceneMonitor(model, load_padding(model))
     execution = load_execution(monitor)
-    pipelines = {name: PlanningPipeline(model, kinematics, settings, name=name)}
-    return MoveGroupContext(model, monitor, kinematics, pipelines, name,
-                            execution, MarkerPublisher(), Reporter())
+    return MoveGroupContext(model, monitor, kinematics, load_pipelines(model, kinematics), execution,
+                            MarkerPublisher(), Reporter())
 
 
 def advertise(context: MoveGroupContext) -> None:
     """Starts every endpoint that is not disabled."""
     context.monitor.listeners.append(context.markers.show_scene)
     context.monitor.connect()
+    OctomapMonitor(context.monitor).connect()
     context.markers.show_scene(context.monitor.snapshot())
     context.execution.connect()
     rospy.on_shutdown(context.execution.close)
@@ -81,9 +88,9 @@ def main() -> int:
         if group.is_chain:
             context.kinematics.solver(group.name)
     advertise(context)
-    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipeline '%s', %s, after %.1f s",
-                  context.model.name, ", ".join(context.model.groups), context.default_pipeline,
-                  context.execution.describe(), time.monotonic() - begun)
+    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
+                  context.model.name, ", ".join(context.model.groups), ", ".join(context.pipelines),
+                  context.default_pipeline,                   context.execution.describe(), time.monotonic() - begun)
     import toppra.algorithm  # noqa: F401 - half a second that would otherwise be part of the first plan
 
     rospy.spin()

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from modular_framework_planning.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.adapters.way_in import with_way_in
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planner_interface import PlannedPath, PlanNext, PlanningProblem
+
+NEGLIGIBLE = 1.0e-6  # [rad or m]; a start this near to its bounds is taken as being on them
 
 
 class FixStartStateBounds(RequestAdapter):
     """Parameter `start_state_max_bounds_error` [rad or m]: how far beyond a bound is mended."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans from the nearest state within bounds."""
+        """Plans from the nearest state within bounds; the motion begins where the robot is."""
         indices = problem.group.indices
         inner = np.clip(problem.start[indices], *problem.bounds)
         beyond = np.abs(problem.start[indices] - inner).max()
@@ -25,4 +28,5 @@ class FixStartStateBounds(RequestAdapter):
             return plan_next(problem)
         start = problem.start.copy()
         start[indices] = inner
-        return plan_next(problem.with_start(start))
+        path = plan_next(problem.with_start(start))
+        return path if beyond < NEGLIGIBLE else with_way_in(problem, path)

@@ -2,11 +2,10 @@
 """Leads a start state that collides a little out to a free state nearby."""
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from modular_framework_planning.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.adapters.way_in import with_way_in
 from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planner_interface import PlannedPath, PlanNext, PlanningProblem
@@ -22,7 +21,7 @@ class FixStartStateCollision(RequestAdapter):
             return plan_next(problem)
         free = self._free_state(problem)
         path = plan_next(problem.with_start(problem.motion.whole(free)))
-        return replace(path, vertices=np.vstack([problem.start_values, path.vertices]), lead_in=path.lead_in + 1)
+        return with_way_in(problem, path, collides=True)
 
     def _free_state(self, problem: PlanningProblem) -> Array:
         settings, start = problem.settings, problem.start_values

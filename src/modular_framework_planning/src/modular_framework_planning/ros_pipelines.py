@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Builds the planning pipelines from the parameters of the node, in the layouts config packages load them."""
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from typing import Any
+
+import rospy
+
+from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
+from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.pipeline import DEFAULT_PLANNER, PlanningPipeline
+from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, make_adapters, make_planner
+from modular_framework_planning.planning_request import PipelineSettings
+from modular_framework_planning.robot_model import RobotModel
+
+ROBOT_PLANNING = "robot_description_planning"
+PARENT = "~planning_pipelines"
+
+
+class PipelineSet(Mapping[str, PlanningPipeline]):
+    """The pipelines of the node, by name."""
+
+    def __init__(self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str]) -> None:
+        """Args: the pipelines; which one an empty name means; why others, which the parameters name, are not there."""
+        self._loaded, self.default, self._refused = dict(loaded), default, dict(refused)
+
+    def __getitem__(self, name: str) -> PlanningPipeline:
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._loaded)
+
+    def __len__(self) -> int:
+        return len(self._loaded)
+
+    def choose(self, name: str) -> PlanningPipeline:
+        """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
+        name = name or self.default
+        if name in self._loaded:
+            return self._loaded[name]
+        reason = f" ({self._refused[name]})" if name in self._refused else ""
+        raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{name}' is not loaded{reason}; available: "
+                            f"{', '.join(self._loaded)}")
+
+
+def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
+    """Returns the parameters of every pipeline and the default's name.
+
+    Noetic's layout is ~planning_pipelines/<name>/... and ~default_planning_pipeline; older config packages load the
+    parameters of their only pipeline into the node's own namespace.
+    """
+    own = rospy.get_param("~", {}) or {}
+    given = own.get("planning_pipelines") or {}
+    pipelines = {name: dict(item) for name, item in given.items() if isinstance(item, dict)}
+    default = str(own.get("default_planning_pipeline") or "")
+    if not pipelines:
+        name = default or str(own.get("planning_plugin") or DEFAULT_PLANNER).split("_interface")[0].split("/")[0]
+        inner = own.get(name)
+        pipelines = {name: dict(inner if isinstance(inner, dict) else own)}
+    if not default:
+        default = "ompl" if "ompl" in pipelines else next(iter(pipelines))
+    return pipelines, default
+
+
+def pipeline_settings(parameters: Mapping[str, Any]) -> PipelineSettings:
+    """Reads the settings of one pipeline; its own value comes before the node's, and that before the robot's."""
+    planning = rospy.get_param(ROBOT_PLANNING, {}) or {}
+    known = {item.name for item in fields(PipelineSettings)}
+    values: dict[str, Any] = {}
+    for source in (planning, rospy.get_param("~", {}) or {}, parameters):
+        for key, value in source.items():
+            if key in known and isinstance(value, int | float) and not isinstance(value, bool):
+                values[key] = value
+    values["planner_configs"] = {name: item for name, item in (parameters.get("planner_configs") or {}).items()
+                                 if isinstance(item, dict)}
+    values["groups"] = {name: item for name, item in parameters.items()
+                        if isinstance(item, dict) and name != "planner_configs"}
+    return PipelineSettings(**values, parameters=parameters, robot_planning=planning)
+
+
+def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet:
+    """Builds every pipeline; one that cannot be built is left out, with its reason in the log.
+
+    Raises:
+        ModelError: the default pipeline is not among the parameters, or cannot be built.
+    """
+    parameters, default = pipeline_parameters()
+    loaded: dict[str, PlanningPipeline] = {}
+    refused: dict[str, str] = {}
+    for name, item in parameters.items():
+        try:
+            loaded[name] = _build(name, item, model, kinematics)
+        except PlanningError as error:
+            refused[name] = error.reason
+    if default not in loaded:
+        reason = refused.get(default, f"there is none of that name below {rospy.resolve_name(PARENT)}")
+        raise ModelError(f"{rospy.resolve_name('~default_planning_pipeline')}: pipeline '{default}' cannot be used: "
+                         f"{reason}; usable: {', '.join(loaded) or 'none'}")
+    for name, reason in refused.items():
+        rospy.logwarn("planning pipeline '%s' is left out: %s", name, reason)
+    return PipelineSet(loaded, default, refused)
+
+
+def _build(name: str, parameters: Mapping[str, Any], model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
+    settings = pipeline_settings(parameters)
+    planner = make_planner(str(parameters.get("planning_plugin") or DEFAULT_PLANNER), model, settings)
+    given = parameters.get("request_adapters")
+    adapters = make_adapters(DEFAULT_ADAPTERS if given is None else
+                             " ".join(given) if isinstance(given, list) else str(given))
+    pipeline = PlanningPipeline(model, kinematics, settings, planner, adapters, name)
+    for configuration in pipeline.configurations.names():
+        for fault in pipeline.parameter_faults(configuration):
+            rospy.logwarn("planning pipeline '%s', planner_configs/%s: %s", name, configuration, fault)
+    return pipeline
