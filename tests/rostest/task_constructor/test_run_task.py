@@ -14,6 +14,7 @@ import pytest
 import rospy
 from ros_session import RosSession
 from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger
 
 STOPPED_WITHIN_S = 1.0
 """From the signal to the last line [s]."""
@@ -41,6 +42,7 @@ class Stay(FrameworkState):
         super().__init__(outcomes, input_keys, output_keys, io_keys)
 
     def execute(self, userdata):
+        self.feedback = "staying"
         self.wait_until(lambda: False, None)
         return self.stopped()
 """,
@@ -91,7 +93,7 @@ BAD = task(
     "  - A:\n      source: give\n      answer: false\n      why: the door is locked\n"
     "      transitions: {success: done, fail: gave_up}\n"
 )
-LONG = task("  - A:\n      source: stay\n      transitions: {success: done, fail: A}\n")
+LONG = task("  - A:\n      source: stay\n      transitions: {success: done, fail: A}\n").replace(", gave_up]", "]")
 
 
 class TaskProcess:
@@ -197,6 +199,8 @@ def test_the_outcome_and_the_states_are_published(run, status: Heard) -> None:
     outcome.wait_for(lambda messages: messages == ["gave_up"])
     outcome.close()
     events = [event for event in map(json.loads, status.messages) if event["state"] != "Nap"]
+    assert any(event["event"] == "running" and event["active"] == ["Nap"] and event["state_elapsed_s"] >= 0.3
+               for event in map(json.loads, status.messages))
     assert [(event["event"], event["state"]) for event in events] == [("start", "A"), ("end", "A"), ("task_end", "")]
     assert events[1]["outcome"] == "fail"
     assert events[1]["reason"] == "the door is locked"
@@ -252,11 +256,40 @@ def test_a_signal_stops_the_running_state_within_a_second(run, status: Heard, nu
     assert f"stopped by {signal.Signals(number).name}" in output
 
 
+def test_the_stop_service_stops_the_running_state_within_a_second(run, status: Heard) -> None:
+    process = run(LONG)
+    wait_for_start(status)
+    before = time.monotonic()
+    assert rospy.ServiceProxy("/run_task/stop", Trigger)().success
+    code, output = process.end()
+    assert process.ended_at() - before < STOPPED_WITHIN_S
+    assert code == 1, output
+    assert "stopped by the service ~stop" in output
+
+
+def test_what_a_running_state_says_it_does_is_published(run, status: Heard) -> None:
+    process = run(LONG)
+    status.wait_for(lambda messages: any(json.loads(text).get("feedback") == {"A": "staying"} for text in messages))
+    process.process.send_signal(signal.SIGINT)
+    process.end()
+
+
+def test_the_record_of_a_run_tells_of_every_state(run, tmp_path: Path) -> None:
+    run(BAD, f"_record_directory:={tmp_path / 'records'}").end()
+    (file,) = (tmp_path / "records").glob("tiny_*.json")
+    record = json.loads(file.read_text())
+    assert (record["task"], record["outcome"], record["succeeded"]) == ("tiny", "gave_up", False)
+    (state,) = record["states"]
+    assert (state["path"], state["outcome"], state["reason"]) == ("A", "fail", "the door is locked")
+    assert 0.0 <= state["started_s"] <= state["ended_s"] < 10.0
+    assert abs(record["begun"] - time.time()) < 30.0
+
+
 def test_a_state_in_a_concurrence_in_a_nested_machine_is_stopped_too(run, status: Heard) -> None:
     inner = (
         "  - Nested:\n      source: state_machine\n      outcomes: [done, gave_up]\n      states:\n"
         "        - Both:\n            source: concurrent_state_machine\n            outcomes: [done, gave_up]\n"
-        "            default_outcome: gave_up\n            states:\n"
+        "            default_outcome: gave_up\n            outcome_map: {done: {A: success}}\n            states:\n"
         "              - A: {source: stay}\n              - B: {source: stay}\n"
     )
     process = run(task(inner))

@@ -34,6 +34,7 @@ class FrameworkState(smach.State):
     Attributes:
         outcomes: the outcomes in the order they were declared.
         reason: why the last execution did not succeed; "" after a success or before the first execution.
+        feedback: what the state is doing now, in words, for whoever watches the task; a state may set it while it runs.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class FrameworkState(smach.State):
         )
         self.outcomes = names
         self.reason = ""
+        self.feedback = ""
         self._preempt_event = threading.Event()
 
     def succeed(self) -> str:

@@ -9,8 +9,10 @@ Parameters (used where there is no argument):
     ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
     ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list).
     ``/run_id``: written by roslaunch; tells when the launch began.
-Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched); for viewers
-    those of ``ros_task_introspection``.
+    ``~record_directory``: where the record of the run is written (default: ``$ROS_HOME/modular_framework/task_records``).
+Services: ``~stop`` (std_srvs/Trigger) stops the task as SIGINT does, and answers when the request has been passed on.
+Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched: at every start
+    and end of a state, and twice a second while states run), for viewers those of ``ros_task_introspection``.
 Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
 """
 from __future__ import annotations
@@ -27,16 +29,20 @@ from typing import Any
 
 import rospy
 from std_msgs.msg import String
+from std_srvs.srv import Trigger, TriggerResponse
 
 import smach
 from modular_framework_core.ros_task_introspection import shown
 from modular_framework_core.task_constructor import default_folders, generator, loading, pipeline
 from modular_framework_core.task_constructor.faults import TaskFault
-from modular_framework_core.task_record import StateRecord, TaskRecorder
+from modular_framework_core.task_record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
 
 STOP_GRACE_S = 1.5
 """How long running states have to stop [s] before the node gives up on them."""
+
+STATUS_PERIOD_S = 0.5
+"""Time between two messages about states that are still running [s]."""
 
 PUBLISH_TIME_S = 0.2
 """Time for the last messages to leave the process [s]."""
@@ -95,6 +101,22 @@ class TaskReporter:
         if ended:
             rospy.loginfo(f"state {record.path} ended with '{record.outcome}'")
 
+    def on_running(self, states: tuple[RunningState, ...]) -> None:
+        """Publish for how long the states that run now have been running, and what they say they are doing."""
+        if not states:
+            return
+        self._publish(
+            {
+                "task": self._name,
+                "event": "running",
+                "state": states[-1].path,
+                "active": [state.path for state in states],
+                "elapsed_s": round(time.monotonic() - self._started, 3),
+                "state_elapsed_s": round(states[-1].elapsed_s, 3),
+                "feedback": {state.path: state.feedback for state in states if state.feedback},
+            }
+        )
+
     def _publish(self, status: dict[str, Any]) -> None:
         self._status.publish(String(json.dumps(status)))
 
@@ -128,24 +150,47 @@ def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:
         number: signal.signal(number, lambda received, frame: asked_by.append(signal.Signals(received).name))
         for number in (signal.SIGINT, signal.SIGTERM)
     }
-    reporter = TaskReporter(name)
-    run = TaskRun(name, shown(name, factory), TaskRecorder(reporter.on_state))
+    reporter, begun = TaskReporter(name), time.time()
+    recorder = TaskRecorder(reporter.on_state)
+    run = TaskRun(name, shown(name, factory), recorder)
     run.start()
+    stop = rospy.Service("~stop", Trigger, lambda request: _asked(asked_by))
     try:
-        _wait(run, asked_by)
+        _wait(run, asked_by, lambda: reporter.on_running(recorder.running()))
     finally:
+        stop.shutdown("the task has ended")
         for number, handler in previous.items():
             signal.signal(number, handler)
     result = run.result()
+    _keep_record(name, begun, result, recorder)
     reporter.on_end(result)
     time.sleep(PUBLISH_TIME_S)
     return result.exit_code
 
 
-def _wait(run: TaskRun, asked_by: list[str]) -> None:
+def _asked(asked_by: list[str]) -> TriggerResponse:
+    asked_by.append("the service ~stop")
+    return TriggerResponse(success=True, message="the running states have been asked to stop")
+
+
+def _keep_record(name: str, begun: float, result: TaskResult, recorder: TaskRecorder) -> None:
+    folder = Path(str(rospy.get_param("~record_directory", "") or default_folders.framework_home() / "task_records"))
+    try:
+        path = write_record(folder, name, begun, result.outcome, result.succeeded, result.error, recorder.records())
+    except OSError as error:
+        rospy.logwarn(f"the record of the run is not kept: {error}; set ~record_directory to a folder that can be written")
+        return
+    rospy.loginfo(f"record of the run: {path}")
+
+
+def _wait(run: TaskRun, asked_by: list[str], tell: Callable[[], None]) -> None:
     """Wait for the end of a run; pass a request to stop on to it, and give up a little later."""
     give_up: float | None = None
+    next_status = time.monotonic() + STATUS_PERIOD_S
     while not run.wait(0.02):
+        if time.monotonic() > next_status:
+            next_status = time.monotonic() + STATUS_PERIOD_S
+            tell()
         if give_up is None and (asked_by or rospy.is_shutdown()):
             run.request_stop(asked_by[0] if asked_by else "the shutdown of ROS")
             give_up = time.monotonic() + STOP_GRACE_S

@@ -5,10 +5,13 @@ The recorder looks at any smach state, so a user's own states are recorded like 
 """
 from __future__ import annotations
 
+import json
+import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import smach
@@ -33,6 +36,21 @@ class StateRecord:
     outcome: str | None = None
     failed: bool = False
     reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunningState:
+    """A state that runs now.
+
+    Attributes:
+        path: labels from the root to the state, joined by "/".
+        elapsed_s: for how long it has been running [s].
+        feedback: what it says it is doing; "" when it says nothing.
+    """
+
+    path: str
+    elapsed_s: float
+    feedback: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +98,7 @@ class TaskRecorder:
         self._lock = threading.Lock()
         self._tell_lock = threading.Lock()
         self._records: list[StateRecord] = []
-        self._active: dict[int, str] = {}
+        self._active: dict[int, tuple[str, smach.State]] = {}
 
     def elapsed_s(self) -> float:
         """Return the time since the task started [s]."""
@@ -99,9 +117,10 @@ class TaskRecorder:
         execute = state.execute
 
         def recorded(userdata: Any) -> str:
-            if hasattr(state, "reason"):
-                state.reason = ""
-            number = self._begin(path)
+            for text in ("reason", "feedback"):
+                if hasattr(state, text):
+                    setattr(state, text, "")
+            number = self._begin(path, state)
             try:
                 outcome = execute(userdata)
             except BaseException as error:
@@ -115,11 +134,11 @@ class TaskRecorder:
 
         state.execute = recorded  # type: ignore[method-assign]
 
-    def _begin(self, path: str) -> int:
+    def _begin(self, path: str, state: smach.State) -> int:
         with self._lock:
             number = len(self._records)
             self._records.append(StateRecord(path, self.elapsed_s()))
-            self._active[number] = path
+            self._active[number] = path, state
         self._tell(number)
         return number
 
@@ -138,7 +157,7 @@ class TaskRecorder:
             return
         with self._tell_lock:  # so that what is told last is what holds now
             with self._lock:
-                record, active = self._records[number], tuple(self._active.values())
+                record, active = self._records[number], tuple(path for path, _ in self._active.values())
             self._listener(record, active)
 
     def records(self) -> tuple[StateRecord, ...]:
@@ -149,7 +168,14 @@ class TaskRecorder:
     def active(self) -> tuple[str, ...]:
         """Return the paths of the states that run now."""
         with self._lock:
-            return tuple(self._active.values())
+            return tuple(path for path, _ in self._active.values())
+
+    def running(self) -> tuple[RunningState, ...]:
+        """Return what the states that run now say about themselves."""
+        now = self.elapsed_s()
+        with self._lock:
+            return tuple(RunningState(path, now - self._records[number].started_s, str(getattr(state, "feedback", "")))
+                         for number, (path, state) in self._active.items())
 
     def failures(self) -> tuple[FailureSummary, ...]:
         """Return one summary for each state that failed, in the order they failed first."""
@@ -161,3 +187,32 @@ class TaskRecorder:
             reasons = [record.reason for record in mine if record.failed]
             summaries.append(FailureSummary(path, len(reasons), len(mine), reasons[-1], len(set(reasons))))
         return tuple(summaries)
+
+
+def write_record(
+    folder: Path, task: str, begun: float, outcome: str, succeeded: bool, error: str, records: tuple[StateRecord, ...]
+) -> Path:
+    """Write the record of one run as JSON, for tools that compare runs.
+
+    The file has ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``: for each
+    execution of a state the fields of ``StateRecord``, times in seconds since the task started.
+
+    Args:
+        folder: where to write; made when it is not there.
+        task: name of the task.
+        begun: when the task started [s since 1970].
+        outcome: outcome of the task.
+        succeeded: whether that is its success outcome.
+        error: what went wrong outside of the states' own reasons; "" when nothing did.
+        records: what the states did.
+
+    Returns:
+        The path of the file: ``<task>_<date>_<time>_<process>.json``.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    stamp = time.strftime("%Y%m%d_%H%M%S", time.gmtime(begun))
+    path = folder / f"{task.replace('/', '_')}_{stamp}_{os.getpid()}.json"
+    content = {"task": task, "begun": begun, "outcome": outcome, "succeeded": succeeded, "error": error,
+               "states": [asdict(record) for record in records]}
+    path.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    return path

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the framework's own states and templates are, in the devel space as in the install space."""
+"""Where the framework's own states and templates are, in the devel space as in the install space, and what it writes."""
 from __future__ import annotations
 
 import importlib.util
+import os
 from pathlib import Path
 
 import rospkg
 
 STATES_PACKAGE = "modular_framework_states.states"
 TEMPLATES_PACKAGE = "modular_framework_core"
+
+
+def framework_home() -> Path:
+    """Return where the framework writes files of its own: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework``."""
+    return Path(os.environ.get("ROS_HOME") or Path.home() / ".ros") / "modular_framework"
 
 
 def states_folder() -> Path:

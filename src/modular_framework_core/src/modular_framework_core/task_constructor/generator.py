@@ -13,6 +13,7 @@ from typing import Any
 
 import jinja2
 
+from modular_framework_core.task_constructor import default_folders
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.task_spec import MachineSpec, TaskSpec
 
@@ -70,8 +71,7 @@ def literal(value: Any) -> str:
 
 def default_output_directory() -> Path:
     """Return where generated modules go: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework/state_machines``."""
-    ros_home = os.environ.get("ROS_HOME") or str(Path.home() / ".ros")
-    return Path(ros_home) / "modular_framework" / "state_machines"
+    return default_folders.framework_home() / "state_machines"
 
 
 def digest_line(task: TaskSpec, templates: Iterable[Path]) -> str:
