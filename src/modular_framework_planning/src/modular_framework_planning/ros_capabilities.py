@@ -47,7 +47,7 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[Callable[[MoveGroup
                        for name in _words(settings.get("capabilities", ""))]
     disabled = [(rospy.resolve_name("~disable_capabilities"), name)
                 for name in _words(rospy.get_param("~disable_capabilities", ""))]
-    known = [item.name for item in table]
+    known = list(dict.fromkeys(item.name for item in table))
     for where, name in (*wanted, *disabled):
         if name not in known:
             rospy.logwarn("%s names '%s', which is not offered; known: %s", where, name, ", ".join(known))
