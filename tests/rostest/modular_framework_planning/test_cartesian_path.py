@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, PlanningScene, RobotState
 from moveit_msgs.srv import ApplyPlanningScene, GetCartesianPath, GetCartesianPathRequest, GetPositionFK
 from planning_wire import ARM, DOWN, GROUP, LAUNCH, OK, START, FakeArm, add, box, call, report_of
@@ -161,14 +161,14 @@ def test_the_link_keeps_its_speed_limit(home: Pose) -> None:
 
 NAN = float("nan")
 CODES = MoveItErrorCodes
-FAR = PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 0.5, 0.95), DOWN)).pose
 
 
 @pytest.mark.parametrize(("changes", "code"), [
     ({"group_name": "nobody"}, CODES.INVALID_GROUP_NAME), ({"link_name": "nobody"}, CODES.INVALID_LINK_NAME),
-    ({"header": Header(frame_id="nowhere")}, CODES.FRAME_TRANSFORM_FAILURE), ({"waypoints": []}, CODES.INVALID_MOTION_PLAN),
-    ({"max_step": 0.0}, CODES.INVALID_MOTION_PLAN), ({"max_step": NAN}, CODES.INVALID_MOTION_PLAN),
-    ({"jump_threshold": -1.0}, CODES.INVALID_MOTION_PLAN), ({"revolute_jump_threshold": NAN}, CODES.INVALID_MOTION_PLAN),
+    ({"header": Header(frame_id="nowhere")}, CODES.FRAME_TRANSFORM_FAILURE),
+    ({"waypoints": []}, CODES.INVALID_MOTION_PLAN), ({"max_step": 0.0}, CODES.INVALID_MOTION_PLAN),
+    ({"max_step": NAN}, CODES.INVALID_MOTION_PLAN), ({"jump_threshold": -1.0}, CODES.INVALID_MOTION_PLAN),
+    ({"revolute_jump_threshold": NAN}, CODES.INVALID_MOTION_PLAN),
     ({"waypoints": [Pose()]}, CODES.FAILURE), ({"waypoints": [Pose(Point(NAN, 0, 0), DOWN)]}, CODES.FAILURE),
     ({"max_cartesian_speed": NAN}, CODES.INVALID_MOTION_PLAN), ({"link_name": "base_link"}, CODES.NO_IK_SOLUTION),
     ({"max_cartesian_speed": 0.1, "cartesian_speed_limited_link": "nobody"}, CODES.INVALID_LINK_NAME),

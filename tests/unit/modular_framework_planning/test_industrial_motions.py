@@ -35,8 +35,10 @@ STRAIGHT_M = 1.0e-4
 
 @pytest.fixture(scope="module")
 def pipeline(model: RobotModel) -> PlanningPipeline:
-    settings = PipelineSettings(parameters={"default_planner_config": "PTP"}, robot_planning={"cartesian_limits": LIMITS})
-    return PlanningPipeline(model, KinematicsPool(model), settings, CommandPlanner.configure(model, settings), (), "pilz")
+    settings = PipelineSettings(parameters={"default_planner_config": "PTP"},
+                                robot_planning={"cartesian_limits": LIMITS})
+    planner = CommandPlanner.configure(model, settings)
+    return PlanningPipeline(model, KinematicsPool(model), settings, planner, (), "pilz")
 
 
 @pytest.fixture(scope="module")
@@ -222,7 +224,7 @@ def test_refusals_have_a_code_and_a_reason(model: RobotModel, pipeline: Planning
     half = AuxiliaryPoint("center", home.translation + np.array([0.05, 0, 0]))
     flat = AuxiliaryPoint("interim", home.translation + np.array([0.05, 0, 0]))
     cases = [
-        (dataclasses.replace(line, start_velocities={"elbow_joint": 0.2}), ErrorCode.INVALID_ROBOT_STATE, "elbow_joint"),
+        (dataclasses.replace(line, start_velocities={"elbow_joint": 0.2}), ErrorCode.INVALID_ROBOT_STATE, "elbow"),
         (dataclasses.replace(line, goals=line.goals * 2), ErrorCode.INVALID_GOAL_CONSTRAINTS, "2 alternatives"),
         (dataclasses.replace(line, planner_id="RRT"), ErrorCode.PLANNING_FAILED, "PTP, LIN, CIRC"),
         (dataclasses.replace(line, velocity_scaling=1.5), ErrorCode.INVALID_MOTION_PLAN, "1.5"),

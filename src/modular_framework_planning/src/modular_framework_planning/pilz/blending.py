@@ -23,7 +23,7 @@ from modular_framework_planning.trajectory import Trajectory
 SEARCH_PERIOD_S = 0.005
 CROSSING_TOLERANCE_S = 1.0e-9
 SAME_POSTURE = 1.0e-3  # [rad or m]
-SHORTEST_PIECE_S = 1.0e-6
+SHORTEST_PIECE_S = 1.0e-4  # between two points where the pieces meet
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,12 +86,8 @@ def _crossing(outside: Callable[[float], bool], times: Array) -> float | None:
     return None
 
 
-def _search_times(trajectory: Trajectory) -> Array:
-    return trajectory.sample_times(SEARCH_PERIOD_S)
-
-
 def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFollower,
-          period_s: float) -> tuple[Trajectory, float, float]:
+          period_s: float) -> tuple[Trajectory, Trajectory]:
     """Joins two trajectories.
 
     Args:
@@ -101,7 +97,7 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
         period_s: between two points in the sphere.
 
     Returns:
-        The joined trajectory, and the times in it at which the link enters and leaves the sphere.
+        The joined trajectory, and its part within the sphere with times from 0.
 
     Raises:
         PlanningError: a motion stays within the sphere, or the joints cannot follow the transition.
@@ -112,8 +108,8 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
         return lambda time_s: float(np.linalg.norm(
             follower.pose(state_at(trajectory, time_s).positions).translation - centre)) >= radius
 
-    entry = _crossing(outside(first), _search_times(first)[::-1])
-    leave = _crossing(outside(second), _search_times(second))
+    entry = _crossing(outside(first), first.sample_times(SEARCH_PERIOD_S)[::-1])
+    leave = _crossing(outside(second), second.sample_times(SEARCH_PERIOD_S))
     if entry is None or leave is None:
         which = "before" if entry is None else "after"
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blend_radius {radius} m: the motion {which} the blended "
@@ -132,7 +128,7 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
     parts = [_part(first, first.times < entry - SHORTEST_PIECE_S, 0.0),
              _part(middle, np.ones(len(middle.times), dtype=bool), entry),
              _part(second, second.times > leave + SHORTEST_PIECE_S, entry + duration - leave)]
-    return concatenated(parts), entry, entry + duration
+    return concatenated(parts), middle
 
 
 def _part(trajectory: Trajectory, chosen: NDArray[np.bool_], shift_s: float) -> Trajectory:
@@ -141,6 +137,13 @@ def _part(trajectory: Trajectory, chosen: NDArray[np.bool_], shift_s: float) -> 
 
 
 def concatenated(parts: list[Trajectory]) -> Trajectory:
-    """Joins pieces whose times are already right."""
-    return Trajectory(parts[0].joint_names, *(np.concatenate([getattr(part, name) for part in parts]) for name in
-                                              ("times", "positions", "velocities", "accelerations")))
+    """Joins pieces whose times are already right, to whole nanoseconds."""
+    times = np.round(np.concatenate([part.times for part in parts]), 9)
+    return Trajectory(parts[0].joint_names, times, *(np.concatenate([getattr(part, name) for part in parts])
+                                                     for name in ("positions", "velocities", "accelerations")))
+
+
+def appended(first: Trajectory, second: Trajectory) -> Trajectory:
+    """Runs the second trajectory after the first has come to rest."""
+    chosen = np.arange(len(second.times)) > 0
+    return concatenated([first, _part(second, chosen, first.duration_s)])

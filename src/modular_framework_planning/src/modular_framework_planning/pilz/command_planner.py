@@ -72,6 +72,9 @@ class CommandPlanner:
         if len(problem.request.goals) != 1:
             raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {len(problem.request.goals)} "
                                 f"alternatives; {problem.planner_id} takes exactly one")
+        if not isinstance(problem.request.goals[0], JointGoal | PoseGoal):
+            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {problem.planner_id} takes "
+                                "joint constraints alone, or one position and one orientation constraint of one link")
         pace = self._pace(problem)
         match problem.planner_id:
             case "PTP" | "":
