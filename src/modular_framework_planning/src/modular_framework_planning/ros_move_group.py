@@ -20,6 +20,8 @@ from modular_framework_planning.capabilities.planning_scene_services import (
     GetPlanningSceneService,
 )
 from modular_framework_planning.capabilities.query_planners_service import QueryPlannersService
+from modular_framework_planning.capabilities.sequence_action import SequenceAction
+from modular_framework_planning.capabilities.sequence_service import SequenceService
 from modular_framework_planning.capabilities.state_validation_service import StateValidationService
 from modular_framework_planning.capabilities.tf_publisher import TfPublisher
 from modular_framework_planning.errors import PlanningError
@@ -49,6 +51,8 @@ CAPABILITIES = (
     Capability("move_group/MoveGroupExecuteTrajectoryAction", ExecuteTrajectory),
     Capability("move_group/MoveGroupPickPlaceAction", PickupAction),
     Capability("move_group/MoveGroupPickPlaceAction", PlaceAction),
+    Capability("pilz_industrial_motion_planner/MoveGroupSequenceAction", SequenceAction, default=False),
+    Capability("pilz_industrial_motion_planner/MoveGroupSequenceService", SequenceService, default=False),
     Capability("move_group/TfPublisher", TfPublisher, default=False),
 )
 
