@@ -23,10 +23,7 @@ class AllowedCollisionMatrix:
     def allows(self, first: str, second: str) -> bool:
         """Whether the two bodies may touch; when both have a default, both must allow it."""
         entry = self.entries.get(frozenset((first, second)))
-        if entry is not None:
-            return entry
-        verdicts = [self.defaults[name] for name in (first, second) if name in self.defaults]
-        return bool(verdicts) and all(verdicts)
+        return _default(self.defaults, first, second) if entry is None else entry
 
     def with_entry(self, first: str, second: str, allowed: bool) -> AllowedCollisionMatrix:
         """Returns a matrix in which one pair has the given verdict."""
@@ -36,8 +33,13 @@ class AllowedCollisionMatrix:
         return replace(self, entries=entries, names=names)
 
     def as_rows(self) -> list[list[bool]]:
-        """Returns the square matrix over `names`, as the message wants it."""
-        return [[self.entries.get(frozenset((row, column)), False) for column in self.names] for row in self.names]
+        """Returns the square matrix of verdicts over `names`, defaults applied, as the message wants it."""
+        return [[self.allows(row, column) for column in self.names] for row in self.names]
+
+
+def _default(defaults: Mapping[str, bool], first: str, second: str) -> bool:
+    verdicts = [defaults[name] for name in (first, second) if name in defaults]
+    return bool(verdicts) and all(verdicts)
 
 
 def matrix_from_pairs(pairs: Iterable[frozenset[str]], links: Sequence[str]) -> AllowedCollisionMatrix:
@@ -47,7 +49,10 @@ def matrix_from_pairs(pairs: Iterable[frozenset[str]], links: Sequence[str]) -> 
 
 def matrix_from_rows(names: Sequence[str], rows: Sequence[Sequence[bool]],
                      defaults: Mapping[str, bool]) -> AllowedCollisionMatrix:
-    """Builds a matrix from its square form.
+    """Builds a matrix from its square form, of which the upper triangle counts.
+
+    A verdict that is that of the defaults is no entry: it changes with them, and a matrix that was read, and sent back
+    unchanged, means the same. Bodies with a default are named too.
 
     Raises:
         ValueError: the matrix is not square, or a name stands twice.
@@ -57,8 +62,11 @@ def matrix_from_rows(names: Sequence[str], rows: Sequence[Sequence[bool]],
                          "one row per name and one value per name in each row are needed")
     if len(set(names)) != len(names):
         raise ValueError("allowed_collision_matrix: a name stands twice in entry_names; list each body once")
+    place = {name: number for number, name in enumerate(names)}
     entries: dict[frozenset[str], bool] = {}
     for index, name in enumerate(names):
-        for other in range(index, len(names)):
-            entries[frozenset((name, names[other]))] = bool(rows[index][other])
-    return AllowedCollisionMatrix(entries=entries, defaults=dict(defaults), names=tuple(names))
+        for other in names[index:]:
+            verdict = bool(rows[index][place[other]])
+            if verdict != _default(defaults, name, other):
+                entries[frozenset((name, other))] = verdict
+    return AllowedCollisionMatrix(entries, dict(defaults), tuple(dict.fromkeys((*names, *defaults))))

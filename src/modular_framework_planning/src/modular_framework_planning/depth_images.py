@@ -35,11 +35,13 @@ class SeenPoints:
 
     Attributes:
         ends: where rays ended within range (n, 3) [m].
+        pixels: of a depth image, the number of the pixel of each end in the flat image (n,).
         beyond: points at the end of the range on rays that went on (m, 3) [m].
     """
 
     ends: Array
     beyond: Array
+    pixels: Any = None
 
 
 def depth_array(data: bytes, encoding: str, shape: tuple[int, int], row_bytes: int, big_endian: bool) -> Array:
@@ -77,8 +79,9 @@ def points_of_depth(depth: Array, camera: Pinhole, near: float, far: float, skip
     ends = (inner >= near) & (inner <= far)
     beyond = inner > far
     z = inner[ends]
+    places = (rows[:, None] * depth.shape[1] + columns)[ends]
     return SeenPoints(np.column_stack([x[ends] * z, y[ends] * z, z]),
-                      np.column_stack([x[beyond], y[beyond], np.ones(int(beyond.sum()))]) * far)
+                      np.column_stack([x[beyond], y[beyond], np.ones(int(beyond.sum()))]) * far, places)
 
 
 def cloud_array(message: Any) -> Array:

@@ -23,6 +23,7 @@ TREE_TYPE = "OcTree"
 BINARY_HEADER, FULL_HEADER = b"# Octomap OcTree binary file", b"# Octomap OcTree file"
 FULL_NODE = np.dtype([("value", "<f4"), ("children", "u1")])
 MAX_HEADER_BYTES = 4096
+MAX_FILE_BYTES = 500_000_000
 FREE, OCCUPIED, INNER = 1, 2, 3
 
 
@@ -159,10 +160,12 @@ def read_file(path: Path) -> VoxelMap:
         GeometryError: it cannot be read, or is no map of type OcTree.
     """
     try:
+        if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
+            raise OSError(f"no regular file of at most {MAX_FILE_BYTES} bytes")
         content = path.read_bytes()
     except OSError as error:
-        raise GeometryError(f"octomap file {path}: cannot be read ({error.strerror}); give the path of a .bt or .ot "
-                            "file that this node may read") from error
+        raise GeometryError(f"octomap file {path}: cannot be read ({error}); give the path of a .bt or .ot file that "
+                            "this node may read") from error
     head, separator, data = content.partition(b"\ndata\n")
     first = head.split(b"\n", 1)[0].rstrip()
     if first not in (BINARY_HEADER, FULL_HEADER) or not separator or len(head) > MAX_HEADER_BYTES:

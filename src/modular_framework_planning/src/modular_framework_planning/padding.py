@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -40,17 +41,17 @@ class Padding:
             if not np.isfinite(value) or value <= 0.0:
                 raise GeometryError(f"scale of link '{link}': got {value}; allowed are finite numbers above 0")
 
-    def margin(self, link: str, reach: float) -> float:
-        """Returns the distance [m] a shape of a link keeps from the world.
+    def margin(self, link: str, geometry: Any) -> float:
+        """Returns the distance [m] a Coal geometry of a link keeps from the world.
 
-        Args:
-            link: name of the link.
-            reach: largest distance of the shape's points from its centre [m]. A scale above 1 moves no point of the
-                surface further than (scale - 1) * reach, so that much is kept everywhere; a scale below 1 keeps the
-                shape as it is: neither makes the robot smaller than was asked for.
+        A scale s above 1 moves no point of the surface further than (s - 1) times the largest distance of a point from
+        the centre, so that much is kept everywhere; a scale below 1 keeps the shape as it is: neither makes the robot
+        smaller than was asked for.
         """
-        grown = max(0.0, self.scales.get(link, 1.0) - 1.0) * reach
-        return self.links.get(link, 0.0) + grown + self.objects
+        grown = self.scales.get(link, 1.0) - 1.0
+        if grown > 0.0:
+            geometry.computeLocalAABB()
+        return self.links.get(link, 0.0) + self.objects + (grown * float(geometry.aabb_radius) if grown > 0.0 else 0.0)
 
     def with_links(self, links: Mapping[str, float], scales: Mapping[str, float]) -> Padding:
         """Returns a padding in which the named links have other values."""

@@ -12,11 +12,12 @@ from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix
 from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
 from modular_framework_planning.padding import Padding
 from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Octree, Shape
+from modular_framework_planning.shapes import Mesh, Octree, Plane, Shape
 from modular_framework_planning.spatial import Array, Transform
 
 _versions = count(1)
 OCTOMAP_ID = "<octomap>"
+DEFAULT_NAME = "(noname)"
 Color = tuple[float, float, float, float]
 
 
@@ -67,7 +68,7 @@ class PlanningScene:
     fixed_frames: Mapping[str, Transform] = field(default_factory=dict)
     padding: Padding = field(default_factory=Padding)
     octomap: CollisionObject | None = None
-    name: str = ""
+    name: str = DEFAULT_NAME
     version: int = 0
     geometry_version: int = 0
 
@@ -123,8 +124,7 @@ class PlanningScene:
 
     def link_margins(self) -> Array:
         """Returns the distance [m] each of the model's link geometries keeps from the world; (n,), in their order."""
-        return np.array([self.padding.margin(item.link, float(item.geometry.aabb_radius))
-                         for item in self.model.link_geometries])
+        return np.array([self.padding.margin(item.link, item.geometry) for item in self.model.link_geometries])
 
     def held_margin(self) -> float:
         """Returns the distance [m] held objects keep from the world."""
@@ -151,7 +151,8 @@ class PlanningScene:
         if old is None:
             return self.with_object(body)
         into_old = old.pose.inverse() * body.pose
-        shapes = old.shapes + tuple((shape, into_old * pose) for shape, pose in body.shapes)
+        added = [(shape, into_old * pose) for shape, pose in body.shapes]
+        shapes = tuple(sorted((*old.shapes, *added), key=lambda item: _place_in_message(item[0])))
         subframes = {**old.subframes, **{name: into_old * pose for name, pose in body.subframes.items()}}
         return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes, subframes=subframes)})
 
@@ -270,6 +271,11 @@ class PlanningScene:
             at = self.positions if positions is None else positions
             return self.model.link_transforms(at)[item.link] * item.body.pose
         return None
+
+
+def _place_in_message(shape: Shape) -> int:
+    """Messages list primitives, then meshes, then planes; poses of shapes are given in that order."""
+    return 2 if isinstance(shape, Plane) else 1 if isinstance(shape, Mesh) else 0
 
 
 def empty_scene(model: RobotModel, positions: Array | None = None) -> PlanningScene:

@@ -16,29 +16,35 @@ from sensor_msgs.msg import JointState
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.conversions import state_message
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.joint_history import JointHistory
+from modular_framework_planning.padding import Padding
 from modular_framework_planning.planning_scene import PlanningScene, empty_scene
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.scene_conversions import apply_attached_object, apply_collision_object
+from modular_framework_planning.scene_difference import difference_message
 from modular_framework_planning.scene_messages import apply_scene, apply_world, scene_message
 
 STATE_UPDATE_PERIOD_S = 0.1
-STATE_UPDATE_RAD = 1.0e-4  # [rad or m]
 
 
 class SceneMonitor:
     """The one place that changes the scene; readers get immutable snapshots.
 
+    A thread of its own tells subscribers and listeners what changed, so that nobody waits for large messages; changes
+    that follow each other closely are told as one.
+
     Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object.
     Publishes: ~monitored_planning_scene: to each new subscriber the whole scene, to all the changes, among them the
-    joint positions while they change.
-    Parameters: ~planning_scene_monitor/publish_planning_scene and publish_state_updates (both true).
+    joint positions while they change, ten times a second at most.
+    Parameters: ~planning_scene_monitor/publish_planning_scene, publish_geometry_updates, publish_state_updates (true).
     """
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, model: RobotModel, padding: Padding | None = None) -> None:
         self.model = model
-        self._scene = empty_scene(model)
+        self._scene = empty_scene(model).with_padding(padding or Padding())
         self._lock = threading.RLock()
         self._positions = model.default_positions()
+        self._history = JointHistory()
         self._stamps: dict[int, rospy.Time] = {}
         self._arrivals = 0
         self._arrived = threading.Condition()
@@ -46,14 +52,14 @@ class SceneMonitor:
         self._needed = [number for number, name in enumerate(model.joint_names) if name not in followers]
         self.listeners: list[Callable[[PlanningScene], None]] = []
         self._publisher: Any = None
-        self._publishes_state = False
-        self._told_positions = self._positions
-        self._next_state_s = 0.0
+        self._told = self._scene
+        self._telling = threading.Lock()
+        self._news = threading.Event()
 
     def connect(self) -> None:
         """Starts to listen and to publish."""
+        self._told = self.snapshot()
         if rospy.get_param("~planning_scene_monitor/publish_planning_scene", True):
-            self._publishes_state = bool(rospy.get_param("~planning_scene_monitor/publish_state_updates", True))
             self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _Greeter(self),
                                               queue_size=100)
         rospy.Subscriber(names.JOINT_STATES_TOPIC, JointState, self._on_joint_state, queue_size=5, tcp_nodelay=True)
@@ -63,46 +69,57 @@ class SceneMonitor:
                 (names.OBJECT_TOPIC, CollisionObject, apply_collision_object),
                 (names.ATTACHED_OBJECT_TOPIC, AttachedCollisionObject, apply_attached_object)):
             rospy.Subscriber(topic, kind, self._on_change, callback_args=(topic, change), queue_size=100)
+        threading.Thread(target=self._tell, name="planning scene", daemon=True).start()
 
     def greet(self, publish: Callable[[Any], None]) -> None:
-        """Hands the whole scene to a new subscriber; the lock keeps changes from coming in between."""
-        with self._lock:
-            publish(scene_message(self.snapshot(), 0))
+        """Hands the scene that the others know to a new subscriber; the lock keeps changes from coming in between."""
+        with self._telling:
+            publish(scene_message(self._told, 0))
+
+    def _tell(self) -> None:
+        """Tells changes of the scene as they come, and of the joints every STATE_UPDATE_PERIOD_S."""
+        geometry, state = (bool(rospy.get_param(f"~planning_scene_monitor/publish_{part}_updates", True))
+                           for part in ("geometry", "state"))
+        while not rospy.is_shutdown():
+            changed = self._news.wait(STATE_UPDATE_PERIOD_S)
+            self._news.clear()
+            if not (changed or state):
+                continue
+            scene = self.snapshot()
+            try:
+                self._publish(scene if geometry else self._told.with_positions(scene.positions))
+                for listener in self.listeners if changed else ():
+                    listener(scene)
+            except rospy.ROSException as error:  # the node is going down
+                rospy.logdebug("the change of the planning scene was not told: %s", error)
+
+    def _publish(self, scene: PlanningScene) -> None:
+        if self._publisher is None:
+            return
+        with self._telling:
+            message = difference_message(self._told, scene) if self._publisher.get_num_connections() else None
+            if message is not None:
+                self._publisher.publish(message)
+                self._told = scene
+            elif not self._publisher.get_num_connections():
+                self._told = scene
 
     def _on_change(self, message: Any, context: tuple[str, Callable[[PlanningScene, Any], PlanningScene]]) -> None:
         topic, change = context
         try:
-            self.apply(lambda scene: change(scene, message), message)
+            self.apply(lambda scene: change(scene, message))
         except PlanningError as error:
             rospy.logerr("%s: message ignored: %s", rospy.resolve_name(topic), error.reason)
         except (ValueError, TypeError, IndexError) as error:
             rospy.logerr("%s: message ignored, it is malformed: %s", rospy.resolve_name(topic), error)
 
-    def apply(self, change: Callable[[PlanningScene], PlanningScene], message: Any = None) -> PlanningScene:
+    def apply(self, change: Callable[[PlanningScene], PlanningScene]) -> PlanningScene:
         """Changes the scene, all or nothing; the next snapshot has the change. Raises PlanningError."""
         with self._lock:
-            before = self._scene.with_positions(self._positions.copy())
-            scene = change(before)
-            self._scene = scene
-            self._publish(before, scene, message)
-        for listener in self.listeners:
-            listener(scene)
+            self._scene = change(self._scene.with_positions(self._positions.copy()))
+            scene = self._scene
+        self._news.set()
         return scene
-
-    def _publish(self, before: PlanningScene, after: PlanningScene, message: Any) -> None:
-        """Publishes the difference; messages that are diffs are passed on as they came."""
-        if self._publisher is None:
-            return
-        if isinstance(message, SceneMessage) and message.is_diff:
-            self._publisher.publish(message)
-            return
-        diff = scene_message(after, 0)
-        diff.is_diff = True
-        gone = [name for name in before.objects if name not in after.objects]
-        diff.world.collision_objects = [item for item in diff.world.collision_objects
-                                        if before.objects.get(item.id) is not after.objects[item.id]]
-        diff.world.collision_objects += [CollisionObject(id=name, operation=CollisionObject.REMOVE) for name in gone]
-        self._publisher.publish(diff)
 
     def _on_joint_state(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
@@ -117,24 +134,21 @@ class SceneMonitor:
                 self._stamps[number] = message.header.stamp
         with self._lock:
             self._positions = self.model.merge(self._positions, changed)
-            self._publish_state(message.header.stamp)
+            self._history.add(message.header.stamp.to_sec(), self._positions)
         with self._arrived:
             self._arrivals += 1
             self._arrived.notify_all()
 
-    def _publish_state(self, stamp: rospy.Time) -> None:
-        """Publishes the joint positions when they changed, every STATE_UPDATE_PERIOD_S of real time at most."""
-        now = time.monotonic()
-        if not self._publishes_state or now < self._next_state_s or not self._publisher.get_num_connections():
-            return
-        if np.abs(self._positions - self._told_positions).max() < STATE_UPDATE_RAD:
-            return
-        self._told_positions, self._next_state_s = self._positions, now + STATE_UPDATE_PERIOD_S
-        update = SceneMessage(is_diff=True, robot_model_name=self.model.name, name=self._scene.name)
-        update.robot_state = state_message(self._scene, self._positions, with_attached=False)
-        update.robot_state.is_diff = True
-        update.robot_state.joint_state.header.stamp = stamp
-        self._publisher.publish(update)
+    def positions_at(self, stamp_s: float, timeout_s: float) -> Any:
+        """Returns the joint positions [rad or m] at a time, waiting for them if they are still to come.
+
+        Raises:
+            PlanningError: they were not heard of in time, or the time is too long ago.
+        """
+        with self._arrived:
+            self._arrived.wait_for(lambda: self._history.covers(stamp_s), timeout_s)
+        with self._lock:
+            return self._history.at(stamp_s)
 
     def missing_joints(self) -> list[str]:
         """Returns joints never heard of on joint_states (mimic and passive ones are not needed)."""

@@ -15,12 +15,10 @@ from shape_msgs.msg import Plane as PlaneMessage
 
 from modular_framework_planning import planning_scene as core
 from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
-from modular_framework_planning.errors import ErrorCode, GeometryError
-from modular_framework_planning.planning_scene import PlanningScene
+from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
+from modular_framework_planning.planning_scene import OCTOMAP_ID, PlanningScene
 from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
 from modular_framework_planning.spatial import Transform, make_transform
-
-OCTOMAP_ID = "<octomap>"
 
 
 def _transform(pose: Any, where: str) -> Transform:
@@ -106,35 +104,53 @@ def apply_collision_object(scene: PlanningScene, message: CollisionObject) -> Pl
             return scene.without_objects()
         return scene.without_object(message.id) if message.id in scene.objects else scene  # already gone: fine
     if message.operation == CollisionObject.MOVE:
-        scene.find_object(message.id)
-        return scene.with_object_moved(message.id, _object_pose(scene, message, f"collision object '{message.id}'"))
+        return _moved(scene, message)
     raise GeometryError(f"collision object '{message.id}': operation {message.operation}; allowed are 0 ADD, 1 REMOVE, "
                         "2 APPEND, 3 MOVE")
+
+
+def _moved(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
+    """Moves an object, and its shapes where the message has poses for them; its geometry, if any, does not count."""
+    where = f"collision object '{message.id}'"
+    scene.find_object(message.id)
+    pose = _object_pose(scene, message, where)
+    places = [_transform(item, f"{where} shape {number}") for number, item in enumerate(
+        (*message.primitive_poses, *message.mesh_poses, *message.plane_poses))]
+    if len(places) == 1 and _is_unset(message.pose):  # as in ADD: the only shape says where the object is
+        pose, places = pose * places[0], [pin.SE3.Identity()]
+    return scene.with_object_moved(message.id, pose, places)
 
 
 def apply_attached_object(scene: PlanningScene, message: AttachedCollisionObject) -> PlanningScene:
     """Returns the scene after attaching or detaching; raises PlanningError."""
     name, operation = message.object.id, message.object.operation
     if operation == CollisionObject.REMOVE:
-        names = [name] if name else [key for key, item in scene.attached.items()
-                                     if message.link_name in ("", item.link)]
-        for item in names:
-            scene = scene.with_detached(item)
-        return scene
+        return _detached(scene, name, message.link_name)
     if operation not in (CollisionObject.ADD, CollisionObject.APPEND):
         raise GeometryError(f"attached object '{name}': operation {operation}; allowed are 0 ADD, 1 REMOVE, 2 APPEND")
+    if message.link_name not in scene.model.frame_ids:
+        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"attaching '{name}': link", message.link_name,
+                               scene.model.frame_ids)
     body = _body(scene, message.object)
-    if not body.shapes and name in scene.objects:
+    if name in scene.attached and (operation == CollisionObject.APPEND or not body.shapes):
+        released = scene.with_detached(name)
+        body = (released.with_shapes_appended(body) if body.shapes else released).objects[name]
+    elif not body.shapes and name in scene.objects:
         body = scene.objects[name]
-    elif operation == CollisionObject.APPEND and name in scene.attached:
-        body = scene.with_detached(name).with_shapes_appended(body).objects[name]
-    links = scene.model.link_transforms(scene.positions)
-    if message.link_name not in links:
-        from modular_framework_planning.errors import UnknownNameError
-
-        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"attaching '{name}': link", message.link_name, links)
-    in_link = core.CollisionObject(body.name, links[message.link_name].actInv(body.pose), body.shapes, body.subframes)
+    link = scene.model.link_transforms(scene.positions)[message.link_name]
+    in_link = core.CollisionObject(body.name, link.actInv(body.pose), body.shapes, body.subframes)
     return scene.with_attached(core.AttachedObject(in_link, message.link_name, frozenset(message.touch_links)))
+
+
+def _detached(scene: PlanningScene, name: str, link: str) -> PlanningScene:
+    """Puts one attached object, or all of a link (of the robot where no link is named), back into the world."""
+    if name in scene.attached and link not in ("", scene.attached[name].link):
+        raise GeometryError(f"detaching '{name}': it is attached to '{scene.attached[name].link}', not to '{link}'; "
+                            "name that link or leave link_name empty")
+    names = [name] if name else [key for key, item in scene.attached.items() if link in ("", item.link)]
+    for item in names:
+        scene = scene.with_detached(item)
+    return scene
 
 
 def matrix_from_message(message: Any) -> AllowedCollisionMatrix:

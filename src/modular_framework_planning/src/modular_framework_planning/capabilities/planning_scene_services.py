@@ -44,7 +44,7 @@ class ApplyPlanningSceneService:
 
     def _serve(self, request: Any) -> ApplyPlanningSceneResponse:
         try:
-            self._context.monitor.apply(lambda scene: apply_scene(scene, request.scene), request.scene)
+            self._context.monitor.apply(lambda scene: apply_scene(scene, request.scene))
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             self._context.reporter.failure("scene", error)
             return ApplyPlanningSceneResponse(success=False)
@@ -52,7 +52,7 @@ class ApplyPlanningSceneService:
 
 
 class ClearOctomapService:
-    """Offers clear_octomap (std_srvs/Empty)."""
+    """Offers clear_octomap (std_srvs/Empty): nothing is known of space afterwards, until a sensor looks again."""
 
     def __init__(self, context: MoveGroupContext) -> None:
         self._context = context
@@ -62,4 +62,5 @@ class ClearOctomapService:
         rospy.Service(names.CLEAR_OCTOMAP_SERVICE, Empty, self._serve)
 
     def _serve(self, _: Any) -> EmptyResponse:
-        return EmptyResponse()  # there is no octomap to clear
+        self._context.monitor.apply(lambda scene: scene.with_octomap(None))
+        return EmptyResponse()

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps the scene's octomap up to date with what depth sensors see, and saves and loads it."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import rospy
+from moveit_msgs.srv import LoadMap, LoadMapResponse, SaveMap, SaveMapResponse
+
+from modular_framework_planning import capability_names as names
+from modular_framework_planning.depth_images import SeenPoints
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.octomap_conversions import voxels_of
+from modular_framework_planning.octomap_encoding import read_file, write_file
+from modular_framework_planning.octomap_settings import read_sensors
+from modular_framework_planning.planning_scene import PlanningScene
+from modular_framework_planning.ros_scene_monitor import SceneMonitor
+from modular_framework_planning.shapes import Octree
+from modular_framework_planning.sight_mask import RegionCache, SightMask, bodies_in_scene, mask_of
+from modular_framework_planning.spatial import Array, Transform, make_transform
+from modular_framework_planning.voxel_map import VoxelMap, empty_map
+
+DEFAULT_RESOLUTION = 0.1  # [m]
+WAIT_S = 1.0  # for transforms and joint positions of the moment a sensor looked
+MaskMaker = Callable[[RegionCache, Sequence[Any], Array], SightMask]
+
+
+class OctomapMonitor:
+    """Puts what sensors see into the scene as object <octomap>. The scene holds the map: what clears it clears all.
+
+    Parameters: ~octomap_resolution (0.1 m), ~octomap_frame (planning frame), ~max_range (of clouds that name none),
+    ~sensors (list, see octomap_settings).
+    Services: ~save_map (SaveMap), ~load_map (LoadMap): .bt files.
+    """
+
+    def __init__(self, monitor: SceneMonitor) -> None:
+        self._monitor = monitor
+        self._regions = RegionCache()
+        self._resolution = DEFAULT_RESOLUTION
+        self._frame = ""
+        self._transforms: Any = None
+        self._known: dict[str, Any] = {}
+
+    def connect(self) -> None:
+        """Reads the parameters, subscribes to the sensors and advertises the services."""
+        self._resolution = empty_map(float(rospy.get_param("~octomap_resolution", DEFAULT_RESOLUTION))).resolution
+        self._frame = str(rospy.get_param("~octomap_frame", ""))
+        max_range = rospy.get_param("~max_range", None)
+        sensors, faults = read_sensors(rospy.get_param("~sensors", []), None if max_range is None else float(max_range))
+        for fault in faults:
+            rospy.logerr("%s: this sensor is left out of the octomap", fault)
+        rospy.Service(names.SAVE_MAP_SERVICE, SaveMap, self._save)
+        rospy.Service(names.LOAD_MAP_SERVICE, LoadMap, self._load)
+        if not sensors:
+            return
+        import tf2_ros
+
+        from modular_framework_planning.ros_octomap_updaters import updater_of
+
+        self._transforms = tf2_ros.Buffer()
+        self._listener = tf2_ros.TransformListener(self._transforms)
+        self._monitor.listeners.append(self.free_new_objects)
+        for settings in sensors:
+            updater_of(settings, self).connect()
+
+    def look(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_mask: MaskMaker, shadow: float = 0.0) -> Array:
+        """Puts one look of a sensor into the map.
+
+        Args:
+            frame: of the points.
+            stamp: when they were seen; robot and sensor are taken where they were then.
+            seen: the points.
+            make_mask: makes the mask of what the scene knows, from bodies and the sensor's place.
+            shadow: how far behind a known body a point still belongs to it [m].
+
+        Returns:
+            Which of the points that ended within range lie on the robot or on known objects (n,).
+
+        Raises:
+            PlanningError: where the sensor or the robot was is not known.
+        """
+        scene = self._monitor.snapshot()
+        positions = self._monitor.positions_at(stamp.to_sec(), WAIT_S)
+        sensor = self._pose_in_planning_frame(scene, frame, stamp, positions)
+        into_map = self._pose_in_planning_frame(scene, self._frame, stamp, positions)
+        mask = make_mask(self._regions, bodies_in_scene(scene, positions), sensor.translation)
+        ends, beyond = (points @ sensor.rotation.T + sensor.translation for points in (seen.ends, seen.beyond))
+        hidden = mask.hides(ends, sensor.translation, shadow)
+        hits, masked, clipped = (_into(into_map, points) for points in (ends[~hidden], ends[hidden], beyond))
+        origin = _into(into_map, sensor.translation[None])[0]
+        self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map)
+        return np.asarray(hidden)
+
+    def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
+        """The scene's map to go on with; an empty one where it has none, or one of other voxels from elsewhere."""
+        voxels = voxels_of(scene)
+        if voxels is None or voxels.resolution != self._resolution or scene.octomap is None or not np.allclose(
+                scene.octomap.pose.homogeneous, pose.homogeneous, atol=1.0e-9):
+            return empty_map(self._resolution)
+        return voxels
+
+    def _replace(self, base: PlanningScene, voxels: VoxelMap, pose: Transform) -> None:
+        """Puts a map into the scene, unless that has another map or other bodies by now than the map was made for."""
+        octree = Octree(voxels)
+        if len(octree.centers):
+            octree.geometry  # noqa: B018 - built here, where nobody waits for it
+
+        def change(scene: PlanningScene) -> PlanningScene:
+            same = (scene.octomap is base.octomap and scene.objects is base.objects
+                    and scene.attached is base.attached)
+            return scene.with_octomap(octree, pose) if same else scene
+
+        self._monitor.apply(change)
+
+    def free_new_objects(self, scene: PlanningScene) -> None:
+        """Takes what is now known as an object out of the map."""
+        bodies = {**scene.objects, **scene.attached}
+        fresh = [name for name, body in bodies.items() if self._known.get(name) is not body]
+        self._known = bodies
+        voxels = voxels_of(scene)
+        if not fresh or voxels is None or scene.octomap is None:
+            return
+        things = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries):]
+        mask = mask_of(self._regions, things, 1.0, voxels.resolution * np.sqrt(0.75))
+        centers = scene.octomap.shapes[0][0].centers  # type: ignore[attr-defined]
+        points = centers @ scene.octomap.pose.rotation.T + scene.octomap.pose.translation
+        inside = mask.hides(points, np.zeros(3))
+        if inside.any():
+            self._replace(scene, voxels.freed(voxels.occupied_keys[inside]), scene.octomap.pose)
+
+    def _pose_in_planning_frame(self, scene: PlanningScene, frame: str, stamp: rospy.Time,
+                                positions: Array) -> Transform:
+        frame = frame.removeprefix("/")
+        model = scene.model
+        if frame in ("", model.planning_frame, model.document.root_link):
+            return pin.SE3.Identity()
+        if model.has_link(frame):
+            return model.link_transforms(positions)[frame]
+        import tf2_ros
+
+        try:
+            found = self._transforms.lookup_transform(model.planning_frame, frame, stamp, rospy.Duration(WAIT_S))
+        except tf2_ros.TransformException as error:
+            raise PlanningError(ErrorCode.FRAME_TRANSFORM_FAILURE, f"sensor data in frame '{frame}': waited {WAIT_S} s "
+                                f"for its transform to '{model.planning_frame}' at {stamp.to_sec():.3f} s ({error}); "
+                                "is it published on tf?") from error
+        t, q = found.transform.translation, found.transform.rotation
+        return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{frame}'")
+
+    def _save(self, request: Any) -> SaveMapResponse:
+        voxels = voxels_of(self._monitor.snapshot()) or empty_map(self._resolution)
+        try:
+            write_file(Path(request.filename), voxels)
+        except OSError as error:
+            rospy.logerr("%s: '%s' cannot be written: %s", rospy.resolve_name(names.SAVE_MAP_SERVICE), request.filename,
+                         error)
+            return SaveMapResponse(success=False)
+        return SaveMapResponse(success=True)
+
+    def _load(self, request: Any) -> LoadMapResponse:
+        try:
+            octree = Octree(read_file(Path(request.filename)))
+            scene = self._monitor.snapshot()
+            pose = self._pose_in_planning_frame(scene, self._frame, rospy.Time(0), scene.positions)
+            self._monitor.apply(lambda scene: scene.with_octomap(octree, pose))
+        except PlanningError as error:
+            rospy.logerr("%s: %s", rospy.resolve_name(names.LOAD_MAP_SERVICE), error.reason)
+            return LoadMapResponse(success=False)
+        return LoadMapResponse(success=True)
+
+
+def _into(pose: Transform, points: Array) -> Array:
+    """Points (n, 3) of the outer frame in the frame whose pose is given."""
+    return np.asarray((points - pose.translation) @ pose.rotation)
