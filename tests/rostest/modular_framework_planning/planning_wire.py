@@ -64,6 +64,8 @@ class FakeArm:
         self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
 
     def _publish(self, _: Any) -> None:
+        if rospy.is_shutdown():
+            return
         self._publisher.publish(JointState(Header(stamp=rospy.Time.now()), list(self.positions),
                                            list(self.positions.values()), [], []))
 

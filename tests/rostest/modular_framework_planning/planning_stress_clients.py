@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Clients that ask many questions with known answers at once, and what becomes of the answers; see stress()."""
+from __future__ import annotations
+
+import itertools
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xmlrpc.client import ServerProxy
+
+import actionlib
+import coal
+import numpy as np
+import rosgraph
+import rospy
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    MoveGroupAction,
+    MoveGroupGoal,
+    MoveItErrorCodes,
+    RobotState,
+)
+from planning_wire import ARM, LAUNCH, OK, START, FakeArm, add, box, joint_goal, plan, request
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit/modular_framework_planning"))
+from independent_checker import IndependentChecker, pose_matrix  # noqa: E402
+
+CHANGE_PERIOD_S = 0.1
+ANSWER_TIMEOUT_S = 40.0
+PAN = ARM[0]
+WAY = -1.2  # [rad] how far the questions with an own wall turn the shoulder
+SIZE = (0.08, 0.08, 0.3)
+IN_COLLISION = MoveItErrorCodes.GOAL_IN_COLLISION
+TIMED_OUT = (MoveItErrorCodes.TIMED_OUT, MoveItErrorCodes.PLANNING_FAILED)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a client was told: in which worlds it may have been planned, its own walls, the code it had to be."""
+
+    begun: float
+    ended: float
+    code: int
+    wanted: int
+    points: np.ndarray
+    walls: tuple[CollisionObject, ...]
+    kind: str
+
+
+def wall_at(turn: float, name: str) -> CollisionObject:
+    """A box the forearm runs into when the shoulder is turned this far from the start."""
+    x, y = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ [-0.11, 0.46]
+    return box(name, float(x), float(y), 1.3, SIZE)
+
+
+@dataclass
+class World:
+    """The scene as the clients make it, and when it was what; one change at a time."""
+
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    objects: dict[str, CollisionObject] = field(default_factory=dict)
+    history: list[tuple[float, float, tuple[CollisionObject, ...]]] = field(default_factory=list)
+    changes: int = 0
+
+    def change(self, *messages: CollisionObject) -> None:
+        """Applies objects (ADD or REMOVE) and notes when the old world ended and the new one began."""
+        with self.lock:
+            begun = time.monotonic()
+            assert add(*messages), "the scene was refused"
+            for item in messages:
+                if item.operation == CollisionObject.REMOVE:
+                    self.objects.pop(item.id, None)
+                else:
+                    self.objects[item.id] = item
+            self.history.append((begun, time.monotonic(), tuple(self.objects.values())))
+            self.changes += 1
+
+    def between(self, begun: float, ended: float) -> list[tuple[CollisionObject, ...]]:
+        """Worlds that were in force at some time of a span: each from the begin of its change to the next one's end."""
+        ends = [item[1] for item in self.history[1:]] + [np.inf]
+        return [objects for (start, _, objects), end in zip(self.history, ends, strict=True)
+                if start <= ended and end >= begun]
+
+
+def gone(name: str) -> CollisionObject:
+    return CollisionObject(id=name, operation=CollisionObject.REMOVE)
+
+
+class Clients:
+    """The threads that ask."""
+
+    def __init__(self, world: World, seconds: float) -> None:
+        self._world, self._end = world, time.monotonic() + seconds
+        self.answers: list[Answer] = []
+        self.errors: list[str] = []
+        self._numbers = itertools.count()
+
+    def run(self, clients: int) -> int:
+        """Lets all of them ask until the time is over; returns how many never came back."""
+        kinds = [self._ask_action, self._prove, self._prove]
+        works = [self._change, *(kinds[:max(0, clients - 1)]), *[self._ask_service] * max(1, clients - len(kinds))]
+        threads = [threading.Thread(target=self._guard, args=(work, number), daemon=True)
+                   for number, work in enumerate(works)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(max(0.0, self._end - time.monotonic()) + ANSWER_TIMEOUT_S)
+        return sum(thread.is_alive() for thread in threads)
+
+    def _guard(self, work: Callable[[int], None], number: int) -> None:
+        try:
+            while time.monotonic() < self._end:
+                work(number)
+        except Exception as error:  # noqa: BLE001 - whatever ends a client is a finding
+            self.errors.append(f"{work.__name__}: {type(error).__name__}: {error}")
+
+    def _change(self, _: int) -> None:
+        """A box stands now here and now there."""
+        number = self._world.changes
+        here, there = (("flip", "flop") if number % 2 else ("flop", "flip"))
+        self._world.change(wall_at(0.7 if here == "flip" else 1.0, here), gone(there))
+        time.sleep(CHANGE_PERIOD_S)
+
+    def _note(self, begun: float, response: Any, wanted: int, walls: tuple[CollisionObject, ...], kind: str,
+              trajectory: Any) -> None:
+        points = np.array([point.positions for point in trajectory.joint_trajectory.points], dtype=float)
+        self.answers.append(Answer(begun, time.monotonic(), response.error_code.val, wanted, points, walls, kind))
+
+    def _question(self) -> tuple[tuple[CollisionObject, ...], int, str]:
+        """Walls of a question of one's own, and the code of the answer."""
+        number = next(self._numbers)
+        kind = ("no wall", "wall on the way", "wall at the goal")[number % 3]
+        turn = {"wall on the way": WAY / 2, "wall at the goal": WAY}.get(kind)
+        walls = () if turn is None else (wall_at(turn, f"own{number}"),)
+        return walls, IN_COLLISION if kind == "wall at the goal" else OK, kind
+
+    def _ask_service(self, _: int) -> None:
+        """The wall comes with the start state, attached to the robot's base: it counts for this question alone."""
+        walls, wanted, kind = self._question()
+        state = RobotState(is_diff=True, attached_collision_objects=[
+            AttachedCollisionObject(link_name="base_link", object=wall, touch_links=["base_link"]) for wall in walls])
+        begun = time.monotonic()
+        response = plan(request(joint_goal(PAN, START[0] + WAY), start_state=state, allowed_planning_time=20.0))
+        self._note(begun, response, wanted, walls, f"service, {kind}", response.trajectory)
+
+    def _ask_action(self, _: int) -> None:
+        """The wall comes as planning_scene_diff."""
+        client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+        assert client.wait_for_server(rospy.Duration(10.0))
+        while time.monotonic() < self._end:
+            walls, wanted, kind = self._question()
+            goal = MoveGroupGoal(request=request(joint_goal(PAN, START[0] + WAY), allowed_planning_time=20.0))
+            goal.planning_options.plan_only = True
+            goal.planning_options.planning_scene_diff.is_diff = True
+            goal.planning_options.planning_scene_diff.robot_state.is_diff = True
+            goal.planning_options.planning_scene_diff.world.collision_objects = list(walls)
+            begun = time.monotonic()
+            client.send_goal(goal)
+            assert client.wait_for_result(rospy.Duration(ANSWER_TIMEOUT_S)), "no result of the action"
+            result = client.get_result()
+            self._note(begun, result, wanted, walls, f"action, {kind}", result.planned_trajectory)
+
+    def _prove(self, number: int) -> None:
+        """A wall at the goal is in force when the scene service has answered, and so is its absence."""
+        name, turn = f"proof{number}", 1.8 + 0.6 * (number % 2)
+        for wanted, message in ((IN_COLLISION, wall_at(turn, name)), (OK, gone(name))):
+            self._world.change(message)
+            begun = time.monotonic()
+            response = plan(request(joint_goal(PAN, START[0] + turn), allowed_planning_time=20.0))
+            self._note(begun, response, wanted, (), "scene changed just before", response.trajectory)
+
+
+def obstacle(message: CollisionObject) -> tuple[str, Any, float, np.ndarray]:
+    """A box for the independent checker."""
+    size, place = message.primitives[0].dimensions, message.primitive_poses[0].position
+    return (message.id, coal.Box(*size), float(np.linalg.norm(size)) / 2.0,
+            pose_matrix([place.x, place.y, place.z], np.eye(3)))
+
+
+def is_free(checker: IndependentChecker, answer: Answer, worlds: list[tuple[CollisionObject, ...]],
+            rest: dict[str, float], step: float) -> bool:
+    """Whether the whole motion is free in one of the worlds."""
+    for world in {tuple(sorted(item.id for item in objects)): objects for objects in worlds}.values():
+        checker.set_world([obstacle(item) for item in (*world, *answer.walls)])
+        if not checker.colliding_states(ARM, answer.points, rest, step):
+            return True
+    return False
+
+
+def verdict(answer: Answer, world: World, checker: IndependentChecker, rest: dict[str, float], step: float) -> str:
+    """What is wrong with an answer; empty where nothing is."""
+    if answer.code in TIMED_OUT and answer.wanted == OK:
+        return ""  # counted as timeouts: slow, but not wrong
+    if answer.code != answer.wanted:
+        return f"{answer.kind}: code {answer.code} instead of {answer.wanted}"
+    if answer.code != OK:
+        return ""
+    if not np.allclose(answer.points[0], START, atol=1e-6):
+        return f"{answer.kind}: does not begin where the robot is"
+    if not is_free(checker, answer, world.between(answer.begun, answer.ended), rest, step):
+        return f"{answer.kind}: the motion touches something in every world it may have been planned in"
+    return ""
+
+
+def require_a_judge(checker: IndependentChecker, rest: dict[str, float], step: float) -> None:
+    """The straight motion must be free without a wall and collide with one, or the verdicts mean nothing."""
+    end = [START[0] + WAY, *START[1:]]
+    for walls, wanted in (((), False), ((wall_at(WAY / 2, "wall"),), True)):
+        checker.set_world([obstacle(item) for item in walls])
+        assert bool(checker.colliding_states(ARM, np.array([START, end]), rest, step)) is wanted, walls
+
+
+class MemoryWatch:
+    """Samples the resident memory of move_group once a second."""
+
+    def __init__(self) -> None:
+        uri = rosgraph.Master("/stress").lookupNode("/move_group")
+        self._status = Path(f"/proc/{ServerProxy(uri).getPid('/stress')[2]}/status")
+        self.samples: list[tuple[float, float]] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._over.wait(1.0):
+            line = next(item for item in self._status.read_text().splitlines() if item.startswith("VmRSS"))
+            self.samples.append((time.monotonic(), float(line.split()[1]) / 1024.0))
+
+    def stop(self) -> tuple[float, float, float]:
+        """Returns memory at a quarter of the time and at the end [MB], and the slope between [MB/min]."""
+        self._over.set()
+        self._thread.join(5.0)
+        late = np.array(self.samples[len(self.samples) // 4:])
+        slope = float(np.polyfit(late[:, 0], late[:, 1], 1)[0]) * 60.0 if len(late) > 2 else 0.0
+        return float(late[0, 1]), float(late[-1, 1]), slope
+
+
+def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -> dict[str, Any]:
+    """Starts move_group, lets the clients ask, and judges every answer afterwards.
+
+    Args:
+        session: a running master.
+        seconds: how long they ask.
+        clients: that plan; one more changes the scene.
+        step: between states the motions are looked at [rad].
+
+    Returns:
+        Figures: plans, wrong, timeouts, unanswered, scene_changes, rss_*_mb, wrong_answers (sentences), ...
+    """
+    session.launch(LAUNCH)
+    session.wait_for_service("plan_kinematic_path", 120.0)
+    arm = FakeArm()
+    time.sleep(0.5)
+    world = World()
+    world.change(box("crate", 0.0, -0.6, 1.0, (0.3, 0.3, 0.3)))
+    plan(request(joint_goal(PAN, START[0] + 0.1)))  # what is made on first use is made now
+    memory, asking = MemoryWatch(), Clients(world, seconds)
+    unanswered = asking.run(clients)
+    rss_start, rss_end, slope = memory.stop()
+    checker = robot_checker()
+    rest = {name: value for name, value in arm.positions.items() if name not in ARM}
+    require_a_judge(checker, rest, step)
+    wrong = [text for answer in asking.answers if (text := verdict(answer, world, checker, rest, step))]
+    took = sorted(item.ended - item.begun for item in asking.answers)
+    return {"seconds": seconds, "clients": clients, "plans": len(asking.answers),
+            "motions_checked": sum(item.code == OK for item in asking.answers),
+            "kinds": dict(Counter(item.kind for item in asking.answers)), "wrong": len(wrong) + len(asking.errors),
+            "timeouts": sum(item.code in TIMED_OUT for item in asking.answers), "unanswered": unanswered,
+            "scene_changes": world.changes, "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
+            "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2),
+            "wrong_answers": wrong[:10] + asking.errors[:10]}
+
+
+def robot_checker() -> IndependentChecker:
+    """The shipped robot, as the parameter server has it."""
+    from modular_framework_planning.urdf_document import package_resolver
+
+    return IndependentChecker(str(rospy.get_param("robot_description")),
+                              str(rospy.get_param("robot_description_semantic")), package_resolver)
