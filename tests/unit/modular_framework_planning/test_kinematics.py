@@ -6,8 +6,26 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from independent_arms import (
+    SEVEN_JOINT_SRDF,
+    SEVEN_JOINT_URDF,
+    SEVEN_JOINTS,
+    pose_gap,
+    seven_joint_flange,
+    ur5_tool,
+)
+
+from modular_framework_planning.chain_model import tree_of
+from modular_framework_planning.compiled_kinematics import joint_placements, rotation_vector
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.kinematics import NUMERIC, InverseKinematics, KinematicsSettings
+from modular_framework_planning.kinematics import (
+    NUMERIC,
+    InverseKinematics,
+    KinematicsPool,
+    KinematicsSettings,
+    clearest,
+    settings_from,
+)
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.spatial import pose_difference
 
@@ -91,3 +109,118 @@ def test_a_tip_that_moves_relative_to_the_chain_is_refused(model: RobotModel, so
 def test_a_group_that_is_no_chain_is_refused(model: RobotModel) -> None:
     with pytest.raises(PlanningError, match="known: .*arm_and_manipulator"):
         model.group("nobody")
+
+
+def test_solutions_agree_with_the_published_lengths_of_the_ur5(model: RobotModel, solver: InverseKinematics) -> None:
+    rng = np.random.default_rng(6)
+    base = model.link_transforms(model.default_positions())["base_link"]
+    for _ in range(50):
+        wanted = ur5_tool(rng.uniform(-np.pi, np.pi, 6))
+        found = solver.solutions("tool0", base * pin.SE3(wanted), model.default_positions())
+        assert found
+        assert all(max(pose_gap(ur5_tool(item[solver.group.indices]), wanted)) < 1e-6 for item in found)
+
+
+@pytest.mark.parametrize("values", [(0.3, -1.2, 0.0, -1.4, -1.5, 0.2), (0.3, -1.2, 1.1, -1.4, 0.0, 0.2),
+                                    (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)])
+def test_stretched_and_aligned_postures_are_solved_too(model: RobotModel, solver: InverseKinematics,
+                                                       values: tuple[float, ...]) -> None:
+    positions = model.default_positions()
+    positions[solver.group.indices] = values
+    target = model.link_transforms(positions)[TIP]
+    found = solver.solutions(TIP, target, positions)
+    assert found and max(pose_difference(model.link_transforms(found[0])[TIP], target)) < 1e-6
+
+
+def test_compiled_forward_kinematics_equals_the_library(model: RobotModel) -> None:
+    rng = np.random.default_rng(7)
+    tree, out = tree_of(model), np.empty((len(model.joint_names), 3, 4))
+    data = model.pin_model.createData()
+    for _ in range(50):
+        positions = rng.uniform(-3.0, 3.0, len(model.joint_names))
+        joint_placements(tree, positions, out)
+        pin.forwardKinematics(model.pin_model, data, positions)
+        expected = np.array([data.oMi[number].homogeneous[:3] for number in range(1, model.pin_model.njoints)])
+        assert np.abs(out - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 1.0, 3.1, np.pi - 1e-9, np.pi])
+def test_rotation_vectors_are_right_from_nothing_to_half_a_turn(angle: float) -> None:
+    for axis in (*np.eye(3), np.array([0.6, 0.0, 0.8]), np.array([-2.0, 1.0, 2.0]) / 3.0):
+        out = np.empty(3)
+        rotation_vector(np.eye(3, 4), np.ascontiguousarray(np.hstack([pin.exp3(angle * axis), np.zeros((3, 1))])), out)
+        assert np.abs(pin.exp3(out) - pin.exp3(angle * axis)).max() < 1e-7
+        assert np.linalg.norm(out) == pytest.approx(angle, abs=1e-7)
+
+
+@pytest.fixture(scope="module")
+def seven() -> RobotModel:
+    return RobotModel(SEVEN_JOINT_URDF, SEVEN_JOINT_SRDF)
+
+
+@pytest.mark.parametrize("method", ["", NUMERIC])
+def test_seven_joints_are_solved_by_holding_one_and_numerically(seven: RobotModel, method: str) -> None:
+    solver = InverseKinematics(seven, seven.group("arm"), KinematicsSettings(method, timeout_s=0.2))
+    assert solver.locked_joint == ("" if method else "joint7")
+    rng = np.random.default_rng(8)
+    low, high = np.array([bounds for _, _, bounds in SEVEN_JOINTS]).T
+    for _ in range(100):
+        wanted = seven_joint_flange(rng.uniform(low, high))
+        found = solver.solutions("flange", pin.SE3(wanted), seven.default_positions())
+        assert found
+        for item in found:
+            assert max(pose_gap(seven_joint_flange(item), wanted)) < 1e-6
+            assert not seven.bound_violations(item, range(7))
+
+
+@pytest.mark.parametrize("method", ["", NUMERIC])
+def test_redundancy_is_resolved_toward_the_seed(seven: RobotModel, method: str) -> None:
+    solver = InverseKinematics(seven, seven.group("arm"), KinematicsSettings(method, timeout_s=0.2))
+    rng = np.random.default_rng(9)
+    low, high = np.array([bounds for _, _, bounds in SEVEN_JOINTS]).T
+    for _ in range(30):
+        seed = rng.uniform(low + 0.3, high - 0.3)
+        same = solver.solutions("flange", pin.SE3(seven_joint_flange(seed)), seed)
+        assert np.linalg.norm(same[0] - seed) < 1e-4, "a seed that is a solution is the nearest one"
+        moved = solver.solutions("flange", pin.SE3(seven_joint_flange(seed + 0.02 * rng.uniform(-1.0, 1.0, 7))), seed)
+        assert np.linalg.norm(moved[0] - seed) < 0.02 * np.sqrt(7.0) + 1e-3, "none further than the one it came from"
+
+
+def test_a_joint_without_ends_is_given_the_turn_nearest_to_the_seed() -> None:
+    urdf = SEVEN_JOINT_URDF.replace('name="joint1" type="revolute"', 'name="joint1" type="continuous"')
+    turning = RobotModel(urdf, SEVEN_JOINT_SRDF)
+    solver = InverseKinematics(turning, turning.group("arm"))
+    seed = np.array([20.0, 0.3, 0.1, -1.5, 0.2, 1.6, 0.3])
+    found = solver.solutions("flange", pin.SE3(seven_joint_flange(seed)), seed)
+    assert np.linalg.norm(found[0] - seed) < 1e-4
+
+
+def test_a_joint_outside_the_group_stays_where_the_seed_has_it(seven: RobotModel) -> None:
+    srdf = SEVEN_JOINT_SRDF.replace('base_link="base"', 'base_link="link1"')
+    part = RobotModel(SEVEN_JOINT_URDF, srdf)
+    solver = InverseKinematics(part, part.group("arm"))
+    assert len(solver.group.joints) == 6
+    seed = np.array([1.1, 0.3, 0.1, -1.5, 0.2, 1.6, 0.3])
+    found = solver.solutions("flange", pin.SE3(seven_joint_flange(seed)), seed)
+    assert found and all(item[0] == 1.1 for item in found)
+    assert max(pose_gap(seven_joint_flange(found[0]), seven_joint_flange(seed))) < 1e-6
+
+
+def test_kinematics_yaml_is_read_and_its_faults_are_told(model: RobotModel) -> None:
+    read = settings_from({"arm": {"kinematics_solver": "kdl_kinematics_plugin/KDLKinematicsPlugin",
+                                  "kinematics_solver_search_resolution": 0.005, "kinematics_solver_timeout": 0.01,
+                                  "kinematics_solver_attempts": 3}})
+    assert read["arm"] == KinematicsSettings("kdl_kinematics_plugin/KDLKinematicsPlugin", 0.005, 0.01, 3)
+    assert KinematicsPool(model, read).solver("arm").settings.attempts == 3
+    for bad in ({"arm": 3}, {"arm": {"kinematics_solver_timeout": "soon"}}, {"arm": {"kinematics_solver_timeout": 0}},
+                {"arm": {"kinematics_solver_search_resolution": -0.1}}):
+        with pytest.raises(PlanningError, match="kinematics.yaml"):
+            settings_from(bad)
+
+
+def test_of_about_equally_near_solutions_the_one_with_most_clearance_is_taken() -> None:
+    seed = np.zeros(2)
+    free = [np.array([0.30, 0.0]), np.array([0.35, 0.0]), np.array([0.9, 0.0])]
+    clearances = {0.30: 0.01, 0.35: 0.05, 0.9: 0.5}
+    assert clearest(free, seed, lambda values: clearances[float(values[0])]) is free[1]
+    assert clearest([seed, *free], seed, lambda values: 0.0) is seed

@@ -49,13 +49,16 @@ class Chain(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _multiply(first: Array, second: Array, out: Array) -> None:
+def _place(frames: Array, parent: int, a: float, b: float, c: float, column: int, out: Array, number: int) -> None:
+    """Writes the vector (a, b, c), given in a parent's frame, as a column of out[number]; column 3 is a point."""
     for row in range(3):
-        for column in range(4):
-            value = first[row, 3] if column == 3 else 0.0
-            for inner in range(3):
-                value += first[row, inner] * second[inner, column]
-            out[row, column] = value
+        if parent < 0:
+            value = a if row == 0 else (b if row == 1 else c)
+        else:
+            value = frames[parent, row, 0] * a + frames[parent, row, 1] * b + frames[parent, row, 2] * c
+            if column == 3:
+                value += frames[parent, row, 3]
+        out[number, row, column] = value
 
 
 @njit(cache=True, nogil=True)
@@ -67,44 +70,46 @@ def joint_placements(tree: Tree, positions: Array, out: Array) -> None:
         positions: one value a joint [rad or m], mimic joints included.
         out: filled; shape (n, 3, 4), rotation beside translation.
     """
-    moved = np.empty((3, 4))
+    at, axes = tree.placements, tree.axes
     for number in range(len(tree.parents)):
-        placement, axis, value = tree.placements[number], tree.axes[number], positions[number]
-        x, y, z = axis[0], axis[1], axis[2]
-        if tree.prismatic[number]:
-            for row in range(3):
-                slide = placement[row, 0] * x + placement[row, 1] * y + placement[row, 2] * z
-                moved[row, 0], moved[row, 1], moved[row, 2] = placement[row, 0], placement[row, 1], placement[row, 2]
-                moved[row, 3] = placement[row, 3] + value * slide
-        else:
-            sine, cosine = np.sin(value), np.cos(value)
-            rest = 1.0 - cosine
-            for row in range(3):
-                a, b, c = placement[row, 0], placement[row, 1], placement[row, 2]
-                moved[row, 0] = (a * (cosine + x * x * rest) + b * (y * x * rest + z * sine)
-                                 + c * (z * x * rest - y * sine))
-                moved[row, 1] = (a * (x * y * rest - z * sine) + b * (cosine + y * y * rest)
-                                 + c * (z * y * rest + x * sine))
-                moved[row, 2] = (a * (x * z * rest + y * sine) + b * (y * z * rest - x * sine)
-                                 + c * (cosine + z * z * rest))
-                moved[row, 3] = placement[row, 3]
-        if tree.parents[number] < 0:
-            out[number] = moved
-        else:
-            _multiply(out[tree.parents[number]], moved, out[number])
+        parent, value = tree.parents[number], positions[number]
+        x, y, z = axes[number, 0], axes[number, 1], axes[number, 2]
+        slide, sine, cosine = value, 0.0, 1.0
+        if not tree.prismatic[number]:
+            slide, sine, cosine = 0.0, np.sin(value), np.cos(value)
+        rest = 1.0 - cosine
+        for column in range(4):  # columns of the joint's own turn (Rodrigues) or slide, carried into its parent's frame
+            if column == 0:
+                a, b, c = cosine + x * x * rest, y * x * rest + z * sine, z * x * rest - y * sine
+            elif column == 1:
+                a, b, c = x * y * rest - z * sine, cosine + y * y * rest, z * y * rest + x * sine
+            elif column == 2:
+                a, b, c = x * z * rest + y * sine, y * z * rest - x * sine, cosine + z * z * rest
+            else:
+                a, b, c = slide * x, slide * y, slide * z
+            d = at[number, 0, 0] * a + at[number, 0, 1] * b + at[number, 0, 2] * c
+            e = at[number, 1, 0] * a + at[number, 1, 1] * b + at[number, 1, 2] * c
+            f = at[number, 2, 0] * a + at[number, 2, 1] * b + at[number, 2, 2] * c
+            if column == 3:
+                d, e, f = d + at[number, 0, 3], e + at[number, 1, 3], f + at[number, 2, 3]
+            _place(out, parent, d, e, f, column, out, number)
 
 
 @njit(cache=True, nogil=True)
 def rotation_vector(first: Array, second: Array, out: Array) -> None:
     """Writes the rotation from `first` to `second` (leading 3 x 3 blocks) as a vector in the common frame [rad]."""
-    turn = np.empty((3, 3))
-    for row in range(3):
-        for column in range(3):
-            turn[row, column] = (second[row, 0] * first[column, 0] + second[row, 1] * first[column, 1]
-                                 + second[row, 2] * first[column, 2])
-    x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+    xx = second[0, 0] * first[0, 0] + second[0, 1] * first[0, 1] + second[0, 2] * first[0, 2]
+    xy = second[0, 0] * first[1, 0] + second[0, 1] * first[1, 1] + second[0, 2] * first[1, 2]
+    xz = second[0, 0] * first[2, 0] + second[0, 1] * first[2, 1] + second[0, 2] * first[2, 2]
+    yx = second[1, 0] * first[0, 0] + second[1, 1] * first[0, 1] + second[1, 2] * first[0, 2]
+    yy = second[1, 0] * first[1, 0] + second[1, 1] * first[1, 1] + second[1, 2] * first[1, 2]
+    yz = second[1, 0] * first[2, 0] + second[1, 1] * first[2, 1] + second[1, 2] * first[2, 2]
+    zx = second[2, 0] * first[0, 0] + second[2, 1] * first[0, 1] + second[2, 2] * first[0, 2]
+    zy = second[2, 0] * first[1, 0] + second[2, 1] * first[1, 1] + second[2, 2] * first[1, 2]
+    zz = second[2, 0] * first[2, 0] + second[2, 1] * first[2, 1] + second[2, 2] * first[2, 2]
+    x, y, z = zy - yz, xz - zx, yx - xy
     sine = 0.5 * np.sqrt(x * x + y * y + z * z)
-    cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+    cosine = 0.5 * (xx + yy + zz - 1.0)
     angle = np.arctan2(sine, cosine)
     if sine > SMALL_ANGLE:
         scale = 0.5 * angle / sine
@@ -112,19 +117,20 @@ def rotation_vector(first: Array, second: Array, out: Array) -> None:
     elif cosine > 0.0:
         out[0], out[1], out[2] = 0.5 * x, 0.5 * y, 0.5 * z
     else:  # half a turn: the axis is the longest column of turn + identity
-        longest = 0
-        for column in range(1, 3):
-            if turn[column, column] > turn[longest, longest]:
-                longest = column
-        for row in range(3):
-            out[row] = turn[row, longest] + (1.0 if row == longest else 0.0)
+        if xx >= yy and xx >= zz:
+            out[0], out[1], out[2] = xx + 1.0, yx, zx
+        elif yy >= zz:
+            out[0], out[1], out[2] = xy, yy + 1.0, zy
+        else:
+            out[0], out[1], out[2] = xz, yz, zz + 1.0
         size = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
         for row in range(3):
             out[row] *= angle / size
 
 
 @njit(cache=True, nogil=True)
-def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, places: Array) -> float:
+def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, positions: Array,
+               places: Array) -> float:
     """Compares the tip with a target.
 
     Args:
@@ -132,38 +138,43 @@ def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, erro
         target: pose of the tip in the planning frame, shape (3, 4).
         jacobian: filled; how the values move the tip, linear above angular, shape (6, group).
         error: filled; what is missing to the target, linear [m] above angular [rad], shape (6,).
+        positions: working memory, shape (joints,).
         places: working memory, shape (joints + 1, 3, 4); the last one is the tip's pose.
 
     Returns:
         The length of the error.
     """
     count = len(chain.drivers)
-    positions = np.empty(count)
     for number in range(count):
         driver = chain.drivers[number]
         positions[number] = chain.offsets[number]
         if driver >= 0:
             positions[number] += chain.gains[number] * values[driver]
     joint_placements(chain.tree, positions, places)
+    end = chain.tip
+    for column in range(4):
+        _place(places, count - 1, end[0, column], end[1, column], end[2, column], column, places, count)
     tip = places[count]
-    _multiply(places[count - 1], chain.tip, tip)
     for row in range(3):
         error[row] = target[row, 3] - tip[row, 3]
     rotation_vector(tip, target, error[3:])
     jacobian[:] = 0.0
     for number in range(count):
-        driver, gain, place, axis = chain.drivers[number], chain.gains[number], places[number], chain.tree.axes[number]
+        driver, gain = chain.drivers[number], chain.gains[number]
         if driver < 0:
             continue
-        x = place[0, 0] * axis[0] + place[0, 1] * axis[1] + place[0, 2] * axis[2]
-        y = place[1, 0] * axis[0] + place[1, 1] * axis[1] + place[1, 2] * axis[2]
-        z = place[2, 0] * axis[0] + place[2, 1] * axis[1] + place[2, 2] * axis[2]
+        u, v, w = chain.tree.axes[number, 0], chain.tree.axes[number, 1], chain.tree.axes[number, 2]
+        x = places[number, 0, 0] * u + places[number, 0, 1] * v + places[number, 0, 2] * w
+        y = places[number, 1, 0] * u + places[number, 1, 1] * v + places[number, 1, 2] * w
+        z = places[number, 2, 0] * u + places[number, 2, 1] * v + places[number, 2, 2] * w
         if chain.tree.prismatic[number]:
             jacobian[0, driver] += gain * x
             jacobian[1, driver] += gain * y
             jacobian[2, driver] += gain * z
         else:
-            a, b, c = tip[0, 3] - place[0, 3], tip[1, 3] - place[1, 3], tip[2, 3] - place[2, 3]
+            a = places[count, 0, 3] - places[number, 0, 3]
+            b = places[count, 1, 3] - places[number, 1, 3]
+            c = places[count, 2, 3] - places[number, 2, 3]
             jacobian[0, driver] += gain * (y * c - z * b)
             jacobian[1, driver] += gain * (z * a - x * c)
             jacobian[2, driver] += gain * (x * b - y * a)
@@ -178,7 +189,7 @@ def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, erro
 
 @njit(cache=True, nogil=True)
 def _damped_step(jacobian: Array, error: Array, damping: float, free: NDArray[np.bool_], step: Array,
-                 square: Array) -> None:
+                 square: Array, solved: Array) -> None:
     """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping."""
     width = jacobian.shape[1]
     for row in range(POSE_SIZE):
@@ -190,7 +201,6 @@ def _damped_step(jacobian: Array, error: Array, damping: float, free: NDArray[np
             for inner in range(column):
                 value -= square[row, inner] * square[column, inner]
             square[row, column] = np.sqrt(max(value, 1e-30)) if row == column else value / square[column, column]
-    solved = np.empty(POSE_SIZE)
     for row in range(POSE_SIZE):
         value = error[row]
         for inner in range(row):
@@ -220,15 +230,16 @@ def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Ar
     """
     width = len(values)
     jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
-    places, step, free = np.empty((len(chain.drivers) + 1, 3, 4)), np.empty(width), np.empty(width, dtype=np.bool_)
+    positions, places = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
+    step, solved, free = np.empty(width), np.empty(POSE_SIZE), np.empty(width, dtype=np.bool_)
     for _ in range(steps):
-        size = pose_error(chain, values, target, jacobian, error, places)
+        size = pose_error(chain, values, target, jacobian, error, positions, places)
         if size < tolerance:
             return True
         damping = min(1.0e-3, 0.1 * size * size) + 1.0e-14
         free[:] = True
         for _attempt in range(2):
-            _damped_step(jacobian, error, damping, free, step, square)
+            _damped_step(jacobian, error, damping, free, step, square, solved)
             blocked = False
             for joint in range(width):
                 if free[joint] and ((values[joint] <= lower[joint] and step[joint] < 0.0)
@@ -245,7 +256,7 @@ def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Ar
         for joint in range(width):
             if free[joint]:
                 values[joint] = min(max(values[joint] + share * step[joint], lower[joint]), upper[joint])
-    return bool(pose_error(chain, values, target, jacobian, error, places) < tolerance)
+    return bool(pose_error(chain, values, target, jacobian, error, positions, places) < tolerance)
 
 
 @njit(cache=True, nogil=True)
@@ -260,9 +271,9 @@ def polish(chain: Chain, candidates: Array, target: Array, lower: Array, upper: 
     count, width = candidates.shape
     arrived = np.zeros(count, dtype=np.bool_)
     jacobian, error = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE)
-    places = np.empty((len(chain.drivers) + 1, 3, 4))
+    positions, places = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
     for number in range(count):
-        size = pose_error(chain, candidates[number], target, jacobian, error, places)
+        size = pose_error(chain, candidates[number], target, jacobian, error, positions, places)
         if size < furthest:
             arrived[number] = size < tolerance or converge(chain, candidates[number], target, lower, upper, tolerance,
                                                            steps)
@@ -289,16 +300,16 @@ def approach_seed(chain: Chain, values: Array, seed: Array, target: Array, lower
     """Moves a solution of a redundant chain nearer to the seed while the tip stays; changes `values` in place."""
     width = len(values)
     jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
-    places, back = np.empty((len(chain.drivers) + 1, 3, 4)), np.empty(width)
-    free = np.ones(width, dtype=np.bool_)
+    positions, places = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
+    back, solved, free = np.empty(width), np.empty(POSE_SIZE), np.ones(width, dtype=np.bool_)
     for _ in range(steps):
-        pose_error(chain, values, target, jacobian, error, places)
+        pose_error(chain, values, target, jacobian, error, positions, places)
         wish = seed - values
         for row in range(POSE_SIZE):
             error[row] = 0.0
             for joint in range(width):
                 error[row] += jacobian[row, joint] * wish[joint]
-        _damped_step(jacobian, error, 1.0e-9, free, back, square)
+        _damped_step(jacobian, error, 1.0e-9, free, back, square, solved)
         trial = values.copy()
         widest = 0.0
         for joint in range(width):

@@ -29,7 +29,7 @@ BOUND_SLACK = 0.05  # [rad]; how far out of bounds a candidate may be before it 
 COARSEST_SWEEP = 0.4  # [rad]; first step of the held joint of a seven-joint chain, halved while nothing is found
 FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it is no solution
 MAX_TURNS = 4096
-POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 60, 20
+POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 25, 20
 STARTS_A_BATCH = 4
 FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
 ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
@@ -160,14 +160,24 @@ class InverseKinematics:
             timeout_s: time the search may take where there is no closed form; the group's by default.
             rng: source of restarts of the numeric search.
         """
-        allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
-        problem = _Problem(self._chain.at(seed), target * self.tip_offset(tip_link), np.asarray(seed, dtype=float),
-                           np.array(seed[self.group.indices], dtype=float), *self._bounds(seed),
-                           time.monotonic() + allowed)
+        problem = self._problem(target * self.tip_offset(tip_link), seed, timeout_s)
         found = self._from_closed_form(problem)
         if not len(found):
             found = self._from_search(problem, rng or np.random.default_rng(0))
         return self._ranked(problem, found)
+
+    def _problem(self, target: Transform, seed: Array, timeout_s: float | None = None) -> _Problem:
+        allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
+        return _Problem(self._chain.at(seed), target, np.asarray(seed, dtype=float),
+                        np.array(seed[self.group.indices], dtype=float), *self._bounds(seed),
+                        time.monotonic() + allowed)
+
+    def warm_up(self) -> None:
+        """Compiles, or loads from the cache, the loops of both ways to solve, so that the first answer is not late."""
+        seed = self.model.default_positions()
+        problem = self._problem(self.model.link_transforms(seed)[self._last_link], seed)
+        self._ranked(problem, self._from_closed_form(problem))
+        self._ranked(problem, self._from_search(problem, np.random.default_rng(0)))
 
     def _bounds(self, seed: Array) -> tuple[Array, Array]:
         """Returns the bounds of the group's joints; those without ends get three turns around the seed."""

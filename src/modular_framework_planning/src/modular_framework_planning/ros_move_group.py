@@ -32,7 +32,7 @@ from modular_framework_planning.ros_execution import load_execution
 from modular_framework_planning.ros_markers import MarkerPublisher
 from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
 from modular_framework_planning.ros_padding import load_padding
-from modular_framework_planning.ros_parameters import load_robot_model
+from modular_framework_planning.ros_parameters import load_kinematics_settings, load_robot_model
 from modular_framework_planning.ros_pipelines import load_pipelines
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
@@ -60,7 +60,7 @@ CAPABILITIES = (
 def build_context() -> MoveGroupContext:
     """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
     model = load_robot_model()
-    kinematics = KinematicsPool(model)
+    kinematics = KinematicsPool(model, load_kinematics_settings())
     monitor = SceneMonitor(model, load_padding(model))
     execution = load_execution(monitor)
     return MoveGroupContext(model, monitor, kinematics, load_pipelines(model, kinematics), execution,
@@ -90,7 +90,7 @@ def main() -> int:
         return 1
     for group in context.model.groups.values():
         if group.is_chain:
-            context.kinematics.solver(group.name)
+            context.kinematics.solver(group.name).warm_up()
     advertise(context)
     rospy.loginfo("move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
                   context.model.name, ", ".join(context.model.groups), ", ".join(context.pipelines),

@@ -7,6 +7,7 @@ import time
 import rospy
 
 from modular_framework_planning.errors import ModelError
+from modular_framework_planning.kinematics import KinematicsSettings, settings_from
 from modular_framework_planning.robot_model import RobotModel
 
 DESCRIPTION = "robot_description"
@@ -29,3 +30,8 @@ def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
     planning = rospy.get_param(f"{DESCRIPTION}_planning", {})
     return RobotModel(str(rospy.get_param(names[0])), str(rospy.get_param(names[1])),
                       planning.get("joint_limits") or {})
+
+
+def load_kinematics_settings() -> dict[str, KinematicsSettings]:
+    """Returns the settings of groups in robot_description_kinematics (kinematics.yaml); raises PlanningError."""
+    return settings_from(rospy.get_param(f"{DESCRIPTION}_kinematics", {}) or {})

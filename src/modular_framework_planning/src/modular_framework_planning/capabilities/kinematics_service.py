@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import rospy
 from geometry_msgs.msg import PoseStamped
 from moveit_msgs.srv import (
@@ -15,22 +16,23 @@ from moveit_msgs.srv import (
 
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.conversions import (
     pose_message,
-    refuse_constraints,
     scene_with_state,
     stamped_in_scene,
     state_message,
 )
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
-from modular_framework_planning.kinematics import first_free
-from modular_framework_planning.pipeline import describe_contacts
+from modular_framework_planning.kinematics import clearest, first_free
 from modular_framework_planning.planning_scene import PlanningScene
+from modular_framework_planning.robot_model import JointGroup
 from modular_framework_planning.ros_context import MoveGroupContext
-from modular_framework_planning.spatial import Array
+from modular_framework_planning.spatial import Array, Transform
 
-DEFAULT_TIMEOUT_S = 0.05
 LONGEST_TIMEOUT_S = 10.0
+MOST_COMPARED = 4  # free solutions whose clearance decides between them
 
 
 class KinematicsService:
@@ -47,7 +49,10 @@ class KinematicsService:
     def _scene(self, state: Any) -> PlanningScene:
         if not state.joint_state.name or state.is_diff:
             self._context.monitor.wait_for_state()
-        return scene_with_state(self._context.monitor.snapshot(), state)
+        scene = scene_with_state(self._context.monitor.snapshot(), state)
+        if not np.isfinite(scene.positions).all():
+            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
+        return scene
 
     def _serve_ik(self, service: Any) -> GetPositionIKResponse:
         request = service.ik_request
@@ -67,30 +72,62 @@ class KinematicsService:
     def _solve(self, scene: PlanningScene, request: Any) -> Array:
         """Returns the solution nearest to the seed; raises PlanningError with the cause."""
         group = self._context.model.group(request.group_name)
-        if request.ik_link_names or request.pose_stamped_vector:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, "several tips at once are not supported; ask for one link "
-                                "with ik_link_name and pose_stamped")
-        refuse_constraints("ik_request.constraints", request.constraints, ErrorCode.NO_IK_SOLUTION)
         solver = self._context.kinematics.solver(group.name)
-        link = request.ik_link_name or group.tip_link
-        target = stamped_in_scene(scene, request.pose_stamped, "pose_stamped")
-        timeout = request.timeout.to_sec() if request.timeout.to_sec() > 0.0 else DEFAULT_TIMEOUT_S
-        found = solver.solutions(link, target, scene.positions, min(timeout, LONGEST_TIMEOUT_S))
+        link, target = self._target(scene, group, request)
+        found = solver.solutions(link, target, scene.positions, self._timeout(request))
         if not found:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(link, target, scene.positions))
+        kept = self._constrained(scene, request, found, link)
         if not request.avoid_collisions:
-            return found[0]
+            return kept[0]
         checker = CollisionChecker(scene, group.indices)
-        free = first_free(found, checker.is_free)
+        free = first_free(kept, checker.is_free, MOST_COMPARED)
         if free:
-            return free[0]
-        contacts = describe_contacts(checker.contacts(found[0], include_fixed=False))
-        raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(found)} inverse kinematics solutions for '{link}' "
+            return clearest(free, scene.positions, checker.distance)
+        contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
+        raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(kept)} inverse kinematics solutions for '{link}' "
                             f"collide; the nearest: {contacts}")
+
+    @staticmethod
+    def _timeout(request: Any) -> float | None:
+        """Returns the time asked for; None for the group's own."""
+        asked = request.timeout.to_sec()
+        return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
+
+    @staticmethod
+    def _target(scene: PlanningScene, group: JointGroup, request: Any) -> tuple[str, Transform]:
+        """Returns the link to place and its pose in the planning frame; raises PlanningError."""
+        links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
+        if len(links) > 1 or len(poses) > 1:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"{len(links)} ik_link_names and {len(poses)} poses in "
+                                "pose_stamped_vector; several tips at once are not supported: ask for one link with "
+                                "ik_link_name and pose_stamped")
+        name = ((links[0] if links else request.ik_link_name) or group.tip_link).removeprefix("/")
+        target = stamped_in_scene(scene, poses[0] if poses else request.pose_stamped, "pose_stamped")
+        link = holding_link(scene, name)
+        if not link:
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name,
+                                   [*scene.model.frame_ids, *scene.attached])
+        if link != name:  # an attached object or one of its subframes is to be placed
+            target = target * scene.frame_transform(name).actInv(scene.frame_transform(link))
+        return link, target
+
+    @staticmethod
+    def _constrained(scene: PlanningScene, request: Any, found: list[Array], link: str) -> list[Array]:
+        """Returns the solutions that satisfy the request's constraints; raises PlanningError where none does."""
+        constraints = constraints_from_message(scene, request.constraints, "ik_request.constraints",
+                                               ErrorCode.NO_IK_SOLUTION, link)
+        kept = [positions for positions in found if constraints.satisfied(positions)]
+        if not kept:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"none of {len(found)} inverse kinematics solutions for "
+                                f"'{link}' satisfies the constraints; the nearest: {constraints.describe(found[0])}")
+        return kept
 
     def _serve_fk(self, request: Any) -> GetPositionFKResponse:
         response = GetPositionFKResponse()
         try:
+            if not request.fk_link_names:
+                raise PlanningError(ErrorCode.INVALID_LINK_NAME, "fk_link_names is empty; name at least one link")
             scene = self._scene(request.robot_state)
             base = scene.frame_transform(request.header.frame_id)
             transforms = scene.model.link_transforms(scene.positions)
@@ -102,8 +139,6 @@ class KinematicsService:
                 stamped.header.stamp = rospy.Time.now()
                 response.pose_stamped.append(stamped)
                 response.fk_link_names.append(link)
-            if not request.fk_link_names:
-                raise PlanningError(ErrorCode.INVALID_LINK_NAME, "fk_link_names is empty; name at least one link")
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             code = self._context.reporter.failure("fk", error)
             response = GetPositionFKResponse()

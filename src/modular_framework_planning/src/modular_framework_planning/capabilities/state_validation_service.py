@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Service check_state_validity: says whether a state is free and within bounds, and what touches what."""
+"""Service check_state_validity: says whether a state is free, within bounds and keeps constraints, and what is off."""
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import rospy
 from moveit_msgs.msg import ContactInformation
 from moveit_msgs.srv import GetStateValidity, GetStateValidityResponse
 
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.collision import CollisionChecker, Contact
-from modular_framework_planning.conversions import BODY_TYPES, refuse_constraints, scene_with_state
+from modular_framework_planning.constraint_conversions import constraints_from_message, result_messages
+from modular_framework_planning.conversions import BODY_TYPES, scene_with_state
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.ros_context import MoveGroupContext
 
@@ -26,28 +28,37 @@ class StateValidationService:
         rospy.Service(names.STATE_VALIDITY_SERVICE, GetStateValidity, self._serve)
 
     def _serve(self, request: Any) -> GetStateValidityResponse:
-        response = GetStateValidityResponse(valid=False)
         try:
-            refuse_constraints("constraints", request.constraints, ErrorCode.INVALID_GOAL_CONSTRAINTS)
-            if not request.robot_state.joint_state.name or request.robot_state.is_diff:
-                self._context.monitor.wait_for_state()
-            scene = scene_with_state(self._context.monitor.snapshot(), request.robot_state)
-            model = self._context.model
-            group = model.group(request.group_name) if request.group_name else None
-            moving = group.indices if group else range(len(model.joint_names))
-            checker = CollisionChecker(scene, [int(number) for number in moving])
-            contacts = checker.contacts(scene.positions, include_fixed=group is None)
-            problems = model.bound_violations(scene.positions, [int(number) for number in moving], 1e-6)
+            return self._answer(request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             self._context.reporter.failure("validity", error, group=request.group_name)
-            if not isinstance(error, PlanningError):
-                rospy.logdebug("check_state_validity answered 'not valid' after an unexpected error")
-            return response
-        response.contacts = [self._contact(item, model.planning_frame) for item in contacts]
-        response.valid = not contacts and not problems
+            return GetStateValidityResponse(valid=False)
+
+    def _answer(self, request: Any) -> GetStateValidityResponse:
+        """Looks at the state; raises PlanningError for a request without meaning.
+
+        The response lists every contact and one result a constraint (joints, then positions, then orientations). Cost
+        sources stay empty: the scene has no costs, a place is either free or not.
+        """
+        if not request.robot_state.joint_state.name or request.robot_state.is_diff:
+            self._context.monitor.wait_for_state()
+        scene = scene_with_state(self._context.monitor.snapshot(), request.robot_state)
+        model = self._context.model
+        if not np.isfinite(scene.positions).all():
+            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
+        group = model.group(request.group_name) if request.group_name else None
+        moving = [int(number) for number in (group.indices if group else range(len(model.joint_names)))]
+        constraints = constraints_from_message(scene, request.constraints, "constraints",
+                                               tip=group.tip_link if group else "")
+        contacts = CollisionChecker(scene, moving).contacts(scene.positions, include_fixed=group is None)
+        problems = model.bound_violations(scene.positions, moving, 1e-6)
+        results = constraints.evaluate(scene.positions)
+        problems += [item.text for item in results if not item.satisfied]
         if problems:
             rospy.logdebug("state not valid: %s", "; ".join(problems))
-        return response
+        return GetStateValidityResponse(valid=not contacts and not problems,
+                                        contacts=[self._contact(item, model.planning_frame) for item in contacts],
+                                        constraint_result=result_messages(results))
 
     @staticmethod
     def _contact(contact: Contact, frame: str) -> ContactInformation:
