@@ -225,6 +225,7 @@ def test_refusals_have_a_code_and_a_reason(model: RobotModel, pipeline: Planning
     flat = AuxiliaryPoint("interim", home.translation + np.array([0.05, 0, 0]))
     cases = [
         (dataclasses.replace(line, start_velocities={"elbow_joint": 0.2}), ErrorCode.INVALID_ROBOT_STATE, "elbow"),
+        (dataclasses.replace(line, cancelled=lambda: True), ErrorCode.PREEMPTED, "cancelled"),
         (dataclasses.replace(line, goals=line.goals * 2), ErrorCode.INVALID_GOAL_CONSTRAINTS, "2 alternatives"),
         (dataclasses.replace(line, planner_id="RRT"), ErrorCode.PLANNING_FAILED, "PTP, LIN, CIRC"),
         (dataclasses.replace(line, velocity_scaling=1.5), ErrorCode.INVALID_MOTION_PLAN, "1.5"),

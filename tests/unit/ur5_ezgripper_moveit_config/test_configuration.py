@@ -110,9 +110,18 @@ def test_move_group_finds_its_parameters_in_the_noetic_layout(parameters: dict) 
     assert parameters["/move_group/sensors"] == []
 
 
+def test_the_pipeline_of_industrial_motions_is_loaded_beside_the_default_one(parameters: dict) -> None:
+    pilz = "/move_group/planning_pipelines/pilz_industrial_motion_planner/"
+    assert parameters[pilz + "planning_plugin"] == "pilz_industrial_motion_planner::CommandPlanner"
+    assert parameters[pilz + "default_planner_config"] == "PTP" and parameters[pilz + "request_adapters"] == ""
+    assert "pilz_industrial_motion_planner/MoveGroupSequenceAction" in parameters[pilz + "capabilities"].split()
+    limits = "/robot_description_planning/cartesian_limits/"
+    assert parameters[limits + "max_trans_vel"] == 1.0 and parameters[limits + "max_trans_dec"] < 0.0
+
+
 def test_every_argument_of_every_launch_file_is_explained(package: Path) -> None:
     files = sorted((package / "launch").glob("*.launch*"))
-    assert len(files) == 8
+    assert len(files) >= 9
     for path in files:
         for argument in ElementTree.parse(path).getroot().findall("arg"):
             assert argument.get("doc"), f"{path.name}: argument {argument.get('name')} has no doc"

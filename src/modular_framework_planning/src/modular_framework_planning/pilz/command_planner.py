@@ -68,6 +68,8 @@ class CommandPlanner:
 
     def plan(self, problem: PlanningProblem) -> Trajectory:
         """Plans one motion; raises PlanningError with the reason."""
+        if problem.cancelled():
+            raise PlanningError(ErrorCode.PREEMPTED, f"{problem.planner_id} was cancelled before it began")
         _require_standing(problem)
         if len(problem.request.goals) != 1:
             raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {len(problem.request.goals)} "
