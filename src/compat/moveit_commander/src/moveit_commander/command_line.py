@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The terminal: reads commands, completes them, shows the answers in colours."""
+from __future__ import annotations
+
+import argparse
+import readline
+import sys
+from collections.abc import Callable, Mapping, Sequence
+
+import rospy
+
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.group_commands import MoveGroupInfoLevel
+from moveit_commander.interpreter import MoveGroupCommandInterpreter
+from moveit_commander.roscpp_initializer import roscpp_initialize, roscpp_shutdown
+
+COLOURS = {MoveGroupInfoLevel.FAIL: "\033[91m", MoveGroupInfoLevel.WARN: "\033[93m",
+           MoveGroupInfoLevel.SUCCESS: "\033[92m", MoveGroupInfoLevel.DEBUG: "\033[94m", MoveGroupInfoLevel.INFO: ""}
+PLAIN = "\033[0m"
+LEAVE = ("q", "quit", "exit")
+
+
+def completions(keywords: Mapping[str, Sequence[str]], line: str, text: str) -> list[str]:
+    """Returns the words that may stand where `text`, the last word of `line`, stands."""
+    before = line[:len(line) - len(text)].split()
+    words = keywords if not before else keywords.get(before[0].lower(), ())
+    return sorted(word + " " for word in words if word.startswith(text))
+
+
+def _completer(interpreter: MoveGroupCommandInterpreter) -> Callable[[str, int], str | None]:
+    def complete(text: str, place: int) -> str | None:
+        found = completions(interpreter.get_keywords() | {"quit": []}, readline.get_line_buffer(), text)
+        return found[place] if place < len(found) else None
+
+    return complete
+
+
+def _show(level: int, text: str, colours: bool) -> None:
+    print(f"{COLOURS[level]}{text}{PLAIN}" if colours and COLOURS[level] else text, flush=True)
+
+
+def _converse(interpreter: MoveGroupCommandInterpreter) -> int:
+    """Executes lines until the end; returns how many failed."""
+    colours, failures = sys.stdout.isatty(), 0
+    readline.set_completer(_completer(interpreter))
+    readline.parse_and_bind("tab: complete")
+    while not rospy.is_shutdown():
+        group = interpreter.get_active_group()
+        try:
+            line = input(f"{group.get_name() if group else ''}> " if sys.stdin.isatty() else "").strip()
+        except (EOFError, KeyboardInterrupt):
+            break
+        if line.lower() in LEAVE:
+            break
+        if line:
+            level, text = interpreter.execute(line)
+            failures += level in (MoveGroupInfoLevel.FAIL, MoveGroupInfoLevel.WARN)
+            _show(level, text, colours)
+    return failures
+
+
+def main() -> int:
+    """Runs the command line; returns 0 when every command worked, 1 when one did not, 2 when it could not begin."""
+    roscpp_initialize(sys.argv)
+    rospy.init_node("move_group_interface_cmdline", anonymous=True, disable_signals=True)
+    parser = argparse.ArgumentParser(description="Commands move_group from a terminal.")
+    parser.add_argument("-i", "--interactive", action="store_true", help="read commands from the terminal (always so)")
+    parser.add_argument("group_name", nargs="?", default="", help="planning group to command first")
+    arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
+    try:
+        interpreter = MoveGroupCommandInterpreter()
+        if arguments.group_name:
+            level, text = interpreter.execute(f"use {arguments.group_name}")
+            if level == MoveGroupInfoLevel.WARN:
+                raise MoveItCommanderException(text)
+    except MoveItCommanderException as error:
+        print(error, file=sys.stderr)
+        return 2
+    if sys.stdin.isatty():
+        print("Type help to see all commands, quit to leave.")
+    failures = _converse(interpreter)
+    roscpp_shutdown()
+    return 1 if failures else 0

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Commands as text, for people at a terminal and files of commands: MoveGroupCommandInterpreter."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from moveit_commander.exception import MoveItCommanderException
+from moveit_commander.group_commands import (
+    ASSIGNMENTS,
+    COMMANDS,
+    DIRECTIONS,
+    OK,
+    Answer,
+    GroupCommands,
+    MoveGroupInfoLevel,
+    Words,
+    info,
+)
+from moveit_commander.move_group import MoveGroupCommander
+from moveit_commander.planning_scene_interface import PlanningSceneInterface
+from moveit_commander.robot import RobotCommander
+
+GENERAL = {"use": ("use [<group>|previous]", "command another group, or list those in use"),
+           "id": ("id", "name of the group that is commanded"),
+           "vars": ("vars", "names of remembered joint values"),
+           "trace": ("trace [on|off]", "show the lines of a file as they are executed"),
+           "load": ("load [<file>]", "execute the commands of a file"),
+           "save": ("save [<file>]", "write groups and remembered joint values as commands"),
+           "help": ("help", "this list")}
+ALIASES = {"which": "id", "groups": "use"}
+
+
+class MoveGroupCommandInterpreter:
+    """Executes lines of text for one group at a time."""
+
+    DEFAULT_FILENAME = "move_group.cfg"
+    GO_DIRS = DIRECTIONS
+
+    def __init__(self) -> None:
+        self._robot = RobotCommander()
+        self._scene = PlanningSceneInterface()
+        self._groups: dict[str, GroupCommands] = {}
+        self._name = ""
+        self._previous = ""
+        self._traces = False
+
+    def get_active_group(self) -> MoveGroupCommander | None:
+        """Answers the group that is commanded, if any."""
+        return self._groups[self._name].group if self._name else None
+
+    def get_loaded_groups(self) -> list[str]:
+        """Answers the groups that were used so far."""
+        return list(self._groups)
+
+    def execute(self, cmd: str) -> Answer:
+        """Executes a line; answers a level of MoveGroupInfoLevel and what to show. It never raises for a bad line."""
+        try:
+            return self._execute(cmd.strip())
+        except MoveItCommanderException as error:
+            return MoveGroupInfoLevel.WARN, str(error)
+
+    def _execute(self, line: str) -> Answer:
+        words = line.split()
+        if not words:
+            return OK
+        first = ALIASES.get(words[0].lower(), words[0].lower())
+        general: dict[str, Callable[[Words], Answer]] = {
+            "use": self._use, "id": self._id, "vars": self._vars, "trace": self._trace, "load": self._load,
+            "save": self._save, "help": lambda _: info(self.get_help())}
+        if first in general and len(words) <= (1 if first in ("id", "vars", "help") else 2):
+            return general[first](words[1:])
+        if first in general and "=" not in line:
+            return MoveGroupInfoLevel.WARN, f"'{line}': this command is used as: {GENERAL[first][0]}"
+        return self._active().execute(line)
+
+    def _active(self) -> GroupCommands:
+        if not self._name:
+            raise MoveItCommanderException("No group is commanded yet; say: use <group>, with one of "
+                                           f"{', '.join(self._robot.get_group_names())}")
+        return self._groups[self._name]
+
+    def _use(self, words: Words) -> Answer:
+        if not words:
+            return info("\n".join(self._groups))
+        name = self._previous if words[0] == "previous" else words[0]
+        if name and name not in self._groups:
+            self._groups[name] = GroupCommands(MoveGroupCommander(name), self._scene, self._robot.get_root_link())
+        if name:
+            self._previous, self._name = self._name, name
+        return OK
+
+    def _id(self, _: Words) -> Answer:
+        return info(self._active().group.get_name())
+
+    def _vars(self, _: Words) -> Answer:
+        return info(" ".join(self._active().group.get_remembered_joint_values()))
+
+    def _trace(self, words: Words) -> Answer:
+        if not words:
+            return info(f"trace is {'on' if self._traces else 'off'}")
+        if words[0].lower() not in ("on", "off"):
+            raise MoveItCommanderException(f"trace {words[0]}: on or off is allowed")
+        self._traces = words[0].lower() == "on"
+        return OK
+
+    def _load(self, words: Words) -> Answer:
+        """Executes a file; it ends at the first line that is not understood or not done."""
+        path = Path(words[0] if words else self.DEFAULT_FILENAME)
+        try:
+            lines = path.read_text().splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise MoveItCommanderException(f"Unable to load {path}: {error}") from error
+        for number, line in enumerate(lines, 1):
+            command = line.partition("#")[0].strip()
+            if self._traces:
+                print(f"{path}:{number}:  {line}")
+            level, text = self.execute(command)
+            if level in (MoveGroupInfoLevel.FAIL, MoveGroupInfoLevel.WARN):
+                return level, f"Error at {path}:{number}:  {line}\n{text}"
+        return OK
+
+    def _save(self, words: Words) -> Answer:
+        path = Path(words[0] if words else self.DEFAULT_FILENAME)
+        lines = []
+        for name, commands in self._groups.items():
+            lines.append(f"use {name}")
+            for key, values in commands.group.get_remembered_joint_values().items():
+                lines.append(f"{key} = [{' '.join(repr(value) for value in values)}]")
+        try:
+            path.write_text("".join(f"{line}\n" for line in lines))
+        except OSError as error:
+            raise MoveItCommanderException(f"Unable to save {path}: {error}") from error
+        return OK
+
+    def get_help(self) -> str:
+        """Answers all commands, a line each."""
+        rows = [*GENERAL.values(), *((item.usage, item.text) for item in dict.fromkeys(COMMANDS.values())),
+                *ASSIGNMENTS]
+        return "\n".join(["Known commands:", *(f"  {usage:<32} {text}" for usage, text in rows)])
+
+    def get_keywords(self) -> dict[str, list[str]]:
+        """Answers what may follow each command, for completion."""
+        group = self.get_active_group()
+        known = list(group.get_remembered_joint_values()) if group else []
+        states = list(group.get_named_targets()) if group else []
+        more = {"go": [*DIRECTIONS, "random", *states], "plan": ["random", *states],
+                "use": self._robot.get_group_names(), "record": known, "show": known, "delete": known,
+                "allow": ["replanning", "looking"], "trace": ["on", "off"]}
+        return {name: more.get(name, []) for name in (*GENERAL, *COMMANDS)}

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Motions of a robot that is not there."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import rospy
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_planning.controllers import FAKE_KINDS, ControllerSpec
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.execution_messages import MotionPart
+from modular_framework_planning.ros_fake_controllers import FakeMotion, initial_positions
+
+SPEC = SimpleNamespace(group_states={"arm": {"ready": {"a": 1.0, "b": 2.0, "gone": 3.0}}, "hand": {}})
+MODEL = SimpleNamespace(index={"a": 0, "b": 1}, semantics=SPEC)
+
+
+class Echo:
+    """Publisher and scene monitor in one: what is published is where the robot is, if somebody passes it on."""
+
+    model = MODEL
+
+    def __init__(self, passes_on: bool = True) -> None:
+        self.states: list[JointState] = []
+        self._passes_on = passes_on
+
+    def publish(self, message: JointState) -> None:
+        self.states.append(message)
+
+    def positions(self) -> Any:
+        known = self._passes_on and self.states
+        return np.array([dict(zip(self.states[-1].name, self.states[-1].position, strict=True)).get(name, 0.0)
+                         if known else 0.0 for name in MODEL.index])
+
+
+@pytest.fixture(autouse=True)
+def clock() -> Iterator[None]:
+    rospy.rostime.set_rostime_initialized(True)
+    yield
+    rospy.rostime.set_rostime_initialized(False)
+
+
+def begin(kind: str, echo: Echo, times: tuple[float, ...] = (0.0, 0.1, 0.2)) -> FakeMotion:
+    points = [JointTrajectoryPoint(positions=[10 * at, -at], time_from_start=rospy.Duration.from_sec(at))
+              for at in times]
+    part = MotionPart(ControllerSpec("fake", "", kind, ("a", "b")), JointTrajectory(joint_names=["a", "b"],
+                                                                                   points=points))
+    return FakeMotion(part, echo, echo, rate=50.0)  # type: ignore[arg-type]
+
+
+def wait(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize(("kind", "fewest", "most"), [("last point", 1, 1), ("via points", 3, 4),
+                                                      ("interpolate", 5, 12)])
+def test_every_kind_ends_at_the_last_point_in_its_time(kind: str, fewest: int, most: int) -> None:
+    echo, begun = Echo(), time.monotonic()
+    motion = begin(kind, echo)
+    wait(motion.is_done)
+    assert echo.states[-1].position == [2.0, -0.2]
+    assert fewest <= len(echo.states) <= most
+    assert (time.monotonic() - begun >= 0.2) == (kind != "last point")
+
+
+def test_interpolation_passes_through_straight_lines() -> None:
+    echo = Echo()
+    wait(begin("interpolate", echo).is_done)
+    rows = np.array([state.position for state in echo.states])
+    assert np.allclose(rows[:, 0], -10 * rows[:, 1])
+    assert (np.diff(rows[:, 0]) >= 0.0).all()
+
+
+@pytest.mark.parametrize("kind", FAKE_KINDS[:2])
+def test_a_stopped_motion_stays_on_its_way(kind: str) -> None:
+    echo = Echo()
+    motion = begin(kind, echo, (0.0, 0.1, 30.0))
+    wait(lambda: len(echo.states) >= 2)
+    motion.cancel()
+    count = len(echo.states)
+    with pytest.raises(PlanningError) as failure:
+        motion.is_done()
+    assert failure.value.code is ErrorCode.PREEMPTED
+    time.sleep(0.1)
+    assert len(echo.states) == count and echo.states[-1].position[0] < 100.0
+
+
+def test_a_motion_nobody_shows_on_joint_states_is_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("modular_framework_planning.ros_fake_controllers.SEEN_TIMEOUT_S", 0.1)
+    motion = begin("last point", Echo(passes_on=False))
+    time.sleep(0.2)
+    with pytest.raises(PlanningError, match="does not show where fake controller 'fake' put a, b .*source_list"):
+        motion.is_done()
+
+
+def test_the_robot_starts_in_named_poses_of_its_groups() -> None:
+    positions, faults = initial_positions(MODEL, [  # type: ignore[arg-type]
+        {"group": "arm", "pose": "ready"}, {"group": "hand", "pose": "open"}, "text"])
+    assert positions == {"a": 1.0, "b": 2.0}
+    assert len(faults) == 2 and "group 'hand' has no pose 'open' in the SRDF; it has none" in faults[0]
