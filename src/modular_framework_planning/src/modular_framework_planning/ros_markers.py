@@ -81,9 +81,12 @@ def _shape_marker(shape: Shape, pose: Transform, frame: str, namespace: str, num
             marker, scale = _marker(Marker.CUBE, frame, namespace, number), (shape.x, shape.y, shape.z)
         case Sphere():
             marker, scale = _marker(Marker.SPHERE, frame, namespace, number), (2.0 * shape.radius,) * 3
-        case Cylinder() | Cone():
+        case Cylinder():
             marker = _marker(Marker.CYLINDER, frame, namespace, number)
             scale = (2.0 * shape.radius, 2.0 * shape.radius, shape.height)
+        case Cone():
+            marker, scale = _marker(Marker.TRIANGLE_LIST, frame, namespace, number), (1.0, 1.0, 1.0)
+            marker.points = _cone_points(shape)
         case Plane():
             return _plane_marker(shape, pose, frame, namespace, number)
         case Mesh():
@@ -94,6 +97,16 @@ def _shape_marker(shape: Shape, pose: Transform, frame: str, namespace: str, num
     marker.pose = pose_message(pose)
     marker.scale.x, marker.scale.y, marker.scale.z = scale
     return marker
+
+
+def _cone_points(cone: Cone, sides: int = 24) -> list[Point]:
+    """Triangles of a cone's side and base."""
+    angles = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    rim = [Point(cone.radius * x, cone.radius * y, -cone.height / 2)
+           for x, y in zip(np.cos(angles), np.sin(angles), strict=True)]
+    tip, middle = Point(0.0, 0.0, cone.height / 2), Point(0.0, 0.0, -cone.height / 2)
+    return [point for first, second in zip(rim[:-1], rim[1:], strict=True)
+            for point in (first, second, tip, second, first, middle)]
 
 
 def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, number: int) -> Marker:

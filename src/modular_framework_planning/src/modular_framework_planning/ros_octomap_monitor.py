@@ -18,6 +18,7 @@ from modular_framework_planning.octomap_conversions import voxels_of
 from modular_framework_planning.octomap_encoding import read_file, write_file
 from modular_framework_planning.octomap_settings import read_sensors
 from modular_framework_planning.planning_scene import PlanningScene
+from modular_framework_planning.ros_octomap_markers import OctomapMarkers
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
 from modular_framework_planning.shapes import Octree
 from modular_framework_planning.sight_mask import RegionCache, SightMask, bodies_in_scene, mask_of
@@ -34,6 +35,7 @@ class OctomapMonitor:
 
     Parameters: ~octomap_resolution (0.1 m), ~octomap_frame (planning frame), ~max_range (of clouds that name none),
     ~sensors (list, see octomap_settings).
+    Publishes: ~octomap_markers (MarkerArray).
     Services: ~save_map (SaveMap), ~load_map (LoadMap): .bt files.
     """
 
@@ -53,6 +55,7 @@ class OctomapMonitor:
         sensors, faults = read_sensors(rospy.get_param("~sensors", []), None if max_range is None else float(max_range))
         for fault in faults:
             rospy.logerr("%s: this sensor is left out of the octomap", fault)
+        self._monitor.listeners.append(OctomapMarkers().show)
         rospy.Service(names.SAVE_MAP_SERVICE, SaveMap, self._save)
         rospy.Service(names.LOAD_MAP_SERVICE, LoadMap, self._load)
         if not sensors:
@@ -64,6 +67,7 @@ class OctomapMonitor:
         self._transforms = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._transforms)
         self._monitor.listeners.append(self.free_new_objects)
+        _compile_loops()
         for settings in sensors:
             updater_of(settings, self).connect()
 
@@ -171,6 +175,13 @@ class OctomapMonitor:
             rospy.logerr("%s: %s", rospy.resolve_name(names.LOAD_MAP_SERVICE), error.reason)
             return LoadMapResponse(success=False)
         return LoadMapResponse(success=True)
+
+
+def _compile_loops() -> None:
+    """Looks once at nothing, so that the first look of a sensor need not wait for the compiler."""
+    here, point = np.zeros(3), np.ones((1, 3))
+    empty_map(DEFAULT_RESOLUTION).with_look(here, point, point, point)
+    SightMask(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, here)
 
 
 def _into(pose: Transform, points: Array) -> Array:
