@@ -21,7 +21,8 @@ SEVEN_JOINTS = (  # position [m] and turn about x [rad] of each joint in the fra
     ((0.088, 0.0, 0.0), _UP, (-2.8973, 2.8973)))
 FLANGE = 0.107  # [m] along z of the last joint
 
-_JOINT = """<link name="link{n}"/><joint name="joint{n}" type="revolute"><parent link="{parent}"/><child link="link{n}"/>
+_JOINT = """<link name="link{n}"/>
+<joint name="joint{n}" type="revolute"><parent link="{parent}"/><child link="link{n}"/>
 <origin xyz="{x} {y} {z}" rpy="{turn} 0 0"/><axis xyz="0 0 1"/>
 <limit lower="{low}" upper="{high}" velocity="2" effort="10"/></joint>"""
 SEVEN_JOINT_URDF = '<robot name="seven"><link name="base"/>' + "".join(
@@ -29,7 +30,8 @@ SEVEN_JOINT_URDF = '<robot name="seven"><link name="base"/>' + "".join(
                   high=high) for n, (at, turn, (low, high)) in enumerate(SEVEN_JOINTS, 1)) + (
     '<link name="flange"/><joint name="fixed" type="fixed"><parent link="link7"/><child link="flange"/>'
     f'<origin xyz="0 0 {FLANGE}"/></joint></robot>')
-SEVEN_JOINT_SRDF = """<robot name="seven"><group name="arm"><chain base_link="base" tip_link="flange"/></group></robot>"""
+SEVEN_JOINT_SRDF = """<robot name="seven">
+<group name="arm"><chain base_link="base" tip_link="flange"/></group></robot>"""
 
 
 def _turn_z(angle: float) -> np.ndarray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-
 from independent_arms import (
     SEVEN_JOINT_SRDF,
     SEVEN_JOINT_URDF,
@@ -15,6 +14,7 @@ from independent_arms import (
     ur5_tool,
 )
 
+from modular_framework_planning import compiled_kinematics
 from modular_framework_planning.chain_model import tree_of
 from modular_framework_planning.compiled_kinematics import joint_placements, rotation_vector
 from modular_framework_planning.errors import PlanningError
@@ -224,3 +224,13 @@ def test_of_about_equally_near_solutions_the_one_with_most_clearance_is_taken() 
     clearances = {0.30: 0.01, 0.35: 0.05, 0.9: 0.5}
     assert clearest(free, seed, lambda values: clearances[float(values[0])]) is free[1]
     assert clearest([seed, *free], seed, lambda values: 0.0) is seed
+
+
+def test_warming_up_compiles_every_loop_for_the_types_it_is_used_with(model: RobotModel, seven: RobotModel) -> None:
+    compiled_kinematics.warm_up()
+    loops = [getattr(compiled_kinematics, name) for name in ("polish", "search", "approach_seed", "unique_rows",
+                                                             "whole_turns", "joint_placements")]
+    before = [len(loop.signatures) for loop in loops]
+    for robot, group in ((model, "arm"), (seven, "arm")):
+        InverseKinematics(robot, robot.group(group)).warm_up()
+    assert [len(loop.signatures) for loop in loops] == before

@@ -380,3 +380,23 @@ def whole_turns(rows: Array, turning: NDArray[np.bool_], lower: Array, upper: Ar
                 break
             at[joint] += 2.0 * np.pi
     return result[:count]
+
+
+def warm_up() -> None:
+    """Compiles every loop that is called from outside, or loads it from the cache."""
+    width = 7
+    at = np.tile(np.eye(3, 4), (width, 1, 1))
+    at[:, 2, 3] = 0.1
+    axes = np.eye(3)[np.arange(width) % 3]
+    tree = Tree(np.arange(-1, width - 1), at, axes, np.zeros(width, dtype=bool))
+    chain = Chain(tree, np.eye(3, 4), np.arange(width), np.ones(width), np.zeros(width))
+    values, bound, out = np.full(width, 0.2), np.full(width, 3.0), np.empty((width, 3, 4))
+    turning = np.ones(width, dtype=bool)
+    joint_placements(tree, values, out)
+    target = out[-1].copy()
+    rows = np.full((2, width), 0.21)
+    polish(chain, rows, target, -bound, bound, 1.0e-8, 0.5, 2)
+    search(chain, rows, target, -bound, bound, 1.0e-8, 2, 1)
+    approach_seed(chain, values, rows[0], target, -bound, bound, 1.0e-8, 1)
+    unique_rows(rows, turning, 1.0e-5)
+    whole_turns(rows, turning, -bound, bound, 4)

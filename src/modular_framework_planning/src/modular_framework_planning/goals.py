@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the goals of a request into free joint vectors, or says why there is none."""
+"""Turns the goals of a request into free joint vectors, or says why there is none.
+
+How long it looks is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
+"""
 from __future__ import annotations
 
-import time
+import math
 
 import numpy as np
 
@@ -17,9 +20,8 @@ from modular_framework_planning.robot_model import JointGroup
 from modular_framework_planning.spatial import Array
 
 MAX_GOAL_STATES = 8
-IK_TIMEOUT_S = 0.2
-SAMPLING_TIME_S = 0.5  # spent at most on looking around in the tolerances of one goal
-MOST_SAMPLES = 64
+MOST_SAMPLES = 64  # states looked at within the tolerances of one goal
+MOST_POSES = 16  # poses looked at within the tolerances of one goal
 
 
 class GoalResolver:
@@ -119,7 +121,7 @@ class GoalResolver:
         seed, allowed = self._request.scene.positions, goal.allowed
         try:
             solver = self._kinematics.solver(self._group.name)
-            found = solver.solutions(goal.link, goal.target, seed, IK_TIMEOUT_S, self._rng)
+            found = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng)
         except PlanningError:
             if allowed is None:
                 raise
@@ -146,20 +148,16 @@ class GoalResolver:
         """Returns solutions at random poses within the tolerances."""
         seed, indices = self._request.scene.positions, self._group.indices
         to_link = allowed.pose_target(seed).inverse() * goal.target
-        deadline = time.monotonic() + SAMPLING_TIME_S
         found: list[Array] = []
-        for _ in range(MOST_SAMPLES):
+        for _ in range(MOST_POSES):
             target = allowed.pose_target(seed, self._rng) * to_link
-            found += [positions[indices] for positions in solver.solutions(goal.link, target, seed, IK_TIMEOUT_S,
-                                                                           self._rng) if allowed.satisfied(positions)]
-            if time.monotonic() > deadline:
-                break
+            solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng)
+            found += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
         return found
 
     def _region(self, constraints: KinematicConstraints) -> list[Array]:
         """Returns free states that satisfy: the nearest to the start, then random ones."""
         seed, indices = self._request.scene.positions, self._group.indices
-        deadline = time.monotonic() + SAMPLING_TIME_S
         free: list[Array] = []
         rejected: list[Array] = []
         for number in range(MOST_SAMPLES):
@@ -167,7 +165,7 @@ class GoalResolver:
                 constraints.sample(self._rng, seed, indices, 1))
             if found is not None:
                 (free if self._is_good(found[indices]) else rejected).append(found[indices])
-            if len(free) >= MAX_GOAL_STATES or time.monotonic() > deadline:
+            if len(free) >= MAX_GOAL_STATES:
                 break
         if free:
             return free

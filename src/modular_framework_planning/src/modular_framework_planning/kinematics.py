@@ -157,7 +157,8 @@ class InverseKinematics:
             tip_link: link to bring to the target; rigidly fixed to the end of the group's chain.
             target: pose of the link in the planning frame.
             seed: positions of the whole robot [rad or m]; joints outside the group stay there.
-            timeout_s: time the search may take where there is no closed form; the group's by default.
+            timeout_s: time the search may take where there is no closed form; the group's by default. With
+                math.inf the clock is not looked at, and the numbers of tries alone bound the search.
             rng: source of restarts of the numeric search.
         """
         problem = self._problem(target * self.tip_offset(tip_link), seed, timeout_s)
