@@ -232,6 +232,10 @@ class MemoryWatch:
             line = next(item for item in self._status.read_text().splitlines() if item.startswith("VmRSS"))
             self.samples.append((time.monotonic(), float(line.split()[1]) / 1024.0))
 
+    def tenths(self) -> list[float]:
+        """Returns memory after each tenth of the time [MB]."""
+        return [round(self.samples[int(place)][1], 1) for place in np.linspace(0, len(self.samples) - 1, 11)]
+
     def stop(self) -> tuple[float, float, float]:
         """Returns memory at a quarter of the time and at the end [MB], and the slope between [MB/min]."""
         self._over.set()
@@ -273,7 +277,7 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
             "kinds": dict(Counter(item.kind for item in asking.answers)), "wrong": len(wrong) + len(asking.errors),
             "timeouts": sum(item.code in TIMED_OUT for item in asking.answers), "unanswered": unanswered,
             "scene_changes": world.changes, "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
-            "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2),
+            "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2), "rss_mb_every_tenth": memory.tenths(),
             "wrong_answers": wrong[:10] + asking.errors[:10]}
 
 

@@ -21,6 +21,7 @@ from modular_framework_planning.ros_planning import plan
 from modular_framework_planning.scene_messages import apply_scene
 
 DEFAULT_REPLAN_ATTEMPTS = 5
+SHORTEST_DELAY_S = 0.05  # between two attempts: a plan that fails at once must not fill the log
 WORTH_ANOTHER_TRY = (ErrorCode.PLANNING_FAILED, ErrorCode.INVALID_MOTION_PLAN, ErrorCode.TIMED_OUT,
                      ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE)
 
@@ -74,7 +75,7 @@ class MoveAction:
                 result, text = self._once(goal, cancelled, feedback)
                 if result.error_code.val not in WORTH_ANOTHER_TRY or number + 1 == attempts:
                     break
-                if cancelled.wait(options.replan_delay):
+                if cancelled.wait(max(options.replan_delay, SHORTEST_DELAY_S)):
                     raise PlanningError(ErrorCode.PREEMPTED, "cancelled before the next attempt")
         except PlanningError as error:
             result.error_code.val = self._context.reporter.failure("plan", error, group=goal.request.group_name)
