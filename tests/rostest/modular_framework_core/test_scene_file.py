@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A text scene ends up in the planning scene of move_group, and the exit code says whether it did."""
+"""A text scene ends up in the planning scene of move_group and comes back; exit codes say whether it did."""
 from __future__ import annotations
 
 import subprocess
@@ -16,8 +16,8 @@ LAUNCH = """<launch><include file="$(find ur5_ezgripper_moveit_config)/launch/mo
   <arg name="load_robot_description" value="true"/></include></launch>"""
 
 
-def publish(session, path: Path) -> tuple[int, str]:
-    done = subprocess.run(["rosrun", "modular_framework_core", "moveit_publish_scene_from_text", str(path)],
+def publish(session, *arguments: object, node: str = "moveit_publish_scene_from_text") -> tuple[int, str]:
+    done = subprocess.run(["rosrun", "modular_framework_core", node, *map(str, arguments)],
                           env=session.env, capture_output=True, text=True, timeout=90, check=False)
     return done.returncode, done.stdout + done.stderr
 
@@ -50,3 +50,21 @@ def test_a_file_that_is_no_scene_has_an_exit_code_of_its_own(session, tmp_path: 
     code, text = publish(session, wrong)
     assert code == 2
     assert "wrong.scene:4" in text
+
+
+def test_an_exported_scene_has_the_same_objects_colours_and_subframes(session, tmp_path: Path) -> None:
+    coloured = tmp_path / "coloured.scene"
+    coloured.write_text("room\n* cup\n1 2 3\n0 0 0 1\n1\ncylinder\n0.1 0.4\n0 0 0.5\n0 0 0 1\n0 1 0 0.5\n"
+                        "1\nhandle\n0 0 1\n0 0 0 1\n.\n")
+    code, text = publish(session, "--scene", coloured)
+    assert code == 0, text
+    exported = tmp_path / "exported.scene"
+    code, text = publish(session, exported, node="moveit_export_scene_to_text")
+    assert code == 0, text
+    assert exported.read_text() == coloured.read_text(), "the scene was replaced, so there is only the cup"
+    code, text = publish(session, "--old", exported, node="moveit_export_scene_to_text")
+    assert code == 2 and "subframes" in text
+    code, text = publish(session, tmp_path / "no" / "folder.scene", node="moveit_export_scene_to_text")
+    assert code == 2 and "folder.scene" in text
+    code, text = publish(session)
+    assert code == 2 and "arguments" in text

@@ -1,18 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the objects of a text scene into the planning scene: what stands around a robot that is not simulated."""
+"""Puts the objects of a text scene into the planning scene, and writes those it has to a file."""
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
+from typing import Any, NoReturn
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
-from moveit_msgs.msg import CollisionObject, PlanningScene
-from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
+from moveit_msgs.msg import CollisionObject, ObjectColor, PlanningScene, PlanningSceneComponents
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    ApplyPlanningSceneRequest,
+    GetPlanningScene,
+    GetPlanningSceneRequest,
+)
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
-from modular_framework_core.scene_file import SceneFileError, SceneObject, Vector, read_scene_file
+from modular_framework_core.scene_file import (
+    NO_COLOR,
+    Scene,
+    SceneFileError,
+    SceneObject,
+    SceneShape,
+    Vector,
+    read_scene_file,
+    scene_text,
+)
 
 START_TIMEOUT_S = 60.0
 SERVICE_TIMEOUT_S = 10.0
@@ -50,34 +66,116 @@ def _pose(position: Vector, quaternion_xyzw: Vector) -> Pose:
     return Pose(Point(*position), Quaternion(*quaternion_xyzw))
 
 
+def scene_of(message: PlanningScene) -> Scene:
+    """Converts the world of a planning scene; the octomap and attached objects have no place in a file."""
+    colors = {item.id: (item.color.r, item.color.g, item.color.b, item.color.a) for item in message.object_colors}
+    return Scene(message.name or "(noname)", tuple(
+        SceneObject(item.id, *_vectors(item.pose), _shapes(item, colors.get(item.id, NO_COLOR)),
+                    tuple((name, *_vectors(pose)) for name, pose in
+                          zip(item.subframe_names, item.subframe_poses, strict=True)))
+        for item in message.world.collision_objects))
+
+
+def _shapes(message: CollisionObject, color: Vector) -> tuple[SceneShape, ...]:
+    kinds = {number: kind for kind, number in PRIMITIVES.items()}
+    shapes = [SceneShape(kinds[solid.type], tuple(solid.dimensions[::-1] if kinds[solid.type] in ("cylinder", "cone")
+                                                  else solid.dimensions), *_vectors(pose), color=color)
+              for solid, pose in zip(message.primitives, message.primitive_poses, strict=True)]
+    shapes += [SceneShape("mesh", (), *_vectors(pose), tuple((p.x, p.y, p.z) for p in mesh.vertices),
+                          tuple(tuple(item.vertex_indices) for item in mesh.triangles), color)
+               for mesh, pose in zip(message.meshes, message.mesh_poses, strict=True)]
+    return (*shapes, *(SceneShape("plane", tuple(plane.coef), *_vectors(pose), color=color)
+                       for plane, pose in zip(message.planes, message.plane_poses, strict=True)))
+
+
+def _vectors(pose: Pose) -> tuple[Vector, Vector]:
+    p, q = pose.position, pose.orientation
+    return (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)
+
+
+class _Arguments(argparse.ArgumentParser):
+    """Command-line arguments whose faults are those of the file."""
+
+    def error(self, message: str) -> NoReturn:
+        raise SceneFileError(f"arguments: {message}")
+
+
+def _arguments(*options: tuple[str, str]) -> argparse.Namespace:
+    parser = _Arguments(allow_abbrev=False)
+    parser.add_argument("file", type=Path)
+    for name, text in options:
+        parser.add_argument(name, action="store_true", help=text)
+    return parser.parse_args(rospy.myargv(sys.argv)[1:])
+
+
+def _call(service: str, kind: Any, request: Any) -> Any:
+    proxy = rospy.ServiceProxy(service, kind)
+    wait_for_service(proxy, START_TIMEOUT_S)
+    return call_service(proxy, request, SERVICE_TIMEOUT_S)
+
+
+def planning_scene(scene: Scene, replace: bool) -> PlanningScene:
+    """Converts a scene: objects that are added to those there are, or that replace them."""
+    message = PlanningScene(is_diff=not replace, name=scene.name if replace else "")
+    message.robot_state.is_diff = True
+    message.world.collision_objects = [collision_object(thing) for thing in scene.objects]
+    for thing in scene.objects:
+        if thing.color != NO_COLOR:
+            color = ObjectColor(id=thing.name)
+            color.color.r, color.color.g, color.color.b, color.color.a = thing.color
+            message.object_colors.append(color)
+    return message
+
+
 def main() -> int:
-    """Runs once: node ``moveit_publish_scene_from_text``; argument: the scene file. Service: ``apply_planning_scene``.
+    """Runs once: node ``moveit_publish_scene_from_text [--scene] FILE``. Service: ``apply_planning_scene``.
+
+    The objects are added to the planning scene; with ``--scene`` they replace all that is in it.
 
     Returns:
         0 when the planning scene has the objects, 1 when move_group is missing or refuses, 2 when the file is wrong.
     """
     rospy.init_node("moveit_publish_scene_from_text")
-    arguments = rospy.myargv(sys.argv)[1:]
     try:
-        if len(arguments) != 1:
-            raise SceneFileError(f"got the arguments {arguments}, expected one: the path of a scene file")
-        objects = read_scene_file(Path(arguments[0]))
+        arguments = _arguments(("--scene", "replace the whole planning scene"))
+        scene = read_scene_file(arguments.file)
     except SceneFileError as error:
         rospy.logfatal("moveit_publish_scene_from_text: %s", error)
         return 2
-    scene = PlanningScene(is_diff=True)
-    scene.robot_state.is_diff = True
-    scene.world.collision_objects = [collision_object(thing) for thing in objects]
-    proxy = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
     try:
-        wait_for_service(proxy, START_TIMEOUT_S)
-        applied = call_service(proxy, ApplyPlanningSceneRequest(scene=scene), SERVICE_TIMEOUT_S).success
+        request = ApplyPlanningSceneRequest(scene=planning_scene(scene, arguments.scene))
+        applied = _call("apply_planning_scene", ApplyPlanningScene, request).success
     except CallError as error:
         rospy.logfatal("moveit_publish_scene_from_text: %s", error)
         return 1
     if not applied:
         rospy.logfatal("moveit_publish_scene_from_text: service '%s' refused the objects of %s; its node logged the "
-                       "reason", proxy.resolved_name, arguments[0])
+                       "reason", rospy.resolve_name("apply_planning_scene"), arguments.file)
         return 1
-    rospy.loginfo("The planning scene has the %d objects of %s.", len(objects), arguments[0])
+    rospy.loginfo("The planning scene has the %d objects of %s.", len(scene.objects), arguments.file)
+    return 0
+
+
+def export_main() -> int:
+    """Runs once: node ``moveit_export_scene_to_text [--old] FILE``. Service: ``get_planning_scene``.
+
+    ``--old`` writes the layout without poses of objects and subframes.
+
+    Returns:
+        0 when the file has the world's objects, 1 when move_group is missing, 2 when the file cannot be written.
+    """
+    rospy.init_node("moveit_export_scene_to_text", anonymous=True)
+    parts = PlanningSceneComponents
+    wanted = parts(parts.SCENE_SETTINGS | parts.WORLD_OBJECT_NAMES | parts.WORLD_OBJECT_GEOMETRY | parts.OBJECT_COLORS)
+    try:
+        arguments = _arguments(("--old", "the older layout"))
+        scene = scene_of(_call("get_planning_scene", GetPlanningScene, GetPlanningSceneRequest(wanted)).scene)
+        arguments.file.write_text(scene_text(scene, arguments.old), encoding="utf-8")
+    except CallError as error:
+        rospy.logfatal("moveit_export_scene_to_text: %s", error)
+        return 1
+    except (SceneFileError, OSError) as error:
+        rospy.logfatal("moveit_export_scene_to_text: %s", error)
+        return 2
+    rospy.loginfo("%s has the %d objects of the planning scene.", arguments.file, len(scene.objects))
     return 0

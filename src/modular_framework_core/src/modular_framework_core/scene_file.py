@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads MoveIt's text scenes, which tell a planner what stands around a real robot.
+"""Reads and writes MoveIt's text scenes, which tell a planner what stands around a real robot.
 
 A scene is a name, then objects, then a line with a single dot. Two layouts are in use: the older one begins an object
 with the number of its shapes, the newer one with the pose of the object, and ends it with named subframes.
@@ -14,6 +14,7 @@ SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "cone": 2, "plane": 4}
 """Numbers of each kind of shape: sides; radius; radius and length; radius and length; a, b, c and d. All [m] or 1."""
 
 Vector = tuple[float, ...]
+NO_COLOR: Vector = (0.0, 0.0, 0.0, 0.0)
 
 
 class SceneFileError(ValueError):
@@ -31,6 +32,7 @@ class SceneShape:
         quaternion_xyzw: orientation in the frame of the object.
         vertices: corners of a mesh, each x, y, z [m].
         triangles: each three indices into ``vertices``.
+        color: red, green, blue, alpha in 0..1; all 0 for none.
     """
 
     kind: str
@@ -39,6 +41,7 @@ class SceneShape:
     quaternion_xyzw: Vector
     vertices: tuple[Vector, ...] = ()
     triangles: tuple[tuple[int, ...], ...] = ()
+    color: Vector = NO_COLOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,19 @@ class SceneObject:
     quaternion_xyzw: Vector
     shapes: tuple[SceneShape, ...]
     subframes: tuple[tuple[str, Vector, Vector], ...] = ()
+
+    @property
+    def color(self) -> Vector:
+        """The colour of the first shape that has one."""
+        return next((shape.color for shape in self.shapes if shape.color != NO_COLOR), NO_COLOR)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What a scene file holds: its name and its objects in file order."""
+
+    name: str
+    objects: tuple[SceneObject, ...]
 
 
 class _Lines:
@@ -106,14 +122,14 @@ class _Lines:
         return tuple(value / length for value in values)
 
 
-def read_scene_file(path: Path) -> list[SceneObject]:
+def read_scene_file(path: Path) -> Scene:
     """Reads a scene file.
 
     Args:
         path: the file.
 
     Returns:
-        Its objects in file order.
+        Its name and its objects.
 
     Raises:
         SceneFileError: the file cannot be read or is no scene.
@@ -123,16 +139,16 @@ def read_scene_file(path: Path) -> list[SceneObject]:
     except (OSError, UnicodeDecodeError) as error:
         present = ", ".join(sorted(file.name for file in path.parent.glob("*.scene"))) or "none"
         raise SceneFileError(f"{path}: cannot be read ({error}); scenes in its folder: {present}") from error
-    lines.take("the name of the scene")
+    name = lines.take("the name of the scene")
     objects: list[SceneObject] = []
     while (line := lines.take("an object ('* name') or the end ('.')")) != ".":
         if not line.startswith("* "):
             raise lines.fault("an object ('* name') or the end ('.')")
-        name = line[2:].strip()
-        if name in {known.name for known in objects}:
+        body = line[2:].strip()
+        if body in {known.name for known in objects}:
             raise lines.fault("a name that no object above has")
-        objects.append(_read_object(name, lines))
-    return objects
+        objects.append(_read_object(body, lines))
+    return Scene(name, tuple(objects))
 
 
 def _read_object(name: str, lines: _Lines) -> SceneObject:
@@ -170,8 +186,10 @@ def _read_shape(lines: _Lines) -> SceneShape:
         raise lines.fault(f"a kind of shape: {', '.join((*SIZES, 'mesh'))}")
     position = lines.numbers(3, f"the position of a {kind}")
     quaternion = lines.quaternion(f"the orientation of a {kind}")
-    lines.numbers(4, f"the colour of a {kind}")
-    return SceneShape(kind, size, position, quaternion, vertices, triangles)
+    color = lines.numbers(4, f"the colour of a {kind}")
+    if not all(0.0 <= share <= 1.0 for share in color):
+        raise lines.fault(f"the colour of a {kind}, red, green, blue and alpha in 0..1")
+    return SceneShape(kind, size, position, quaternion, vertices, triangles, color)
 
 
 def _triangle(lines: _Lines, corners: int) -> tuple[int, ...]:
@@ -179,3 +197,75 @@ def _triangle(lines: _Lines, corners: int) -> tuple[int, ...]:
     if max(indices) >= corners:
         raise lines.fault(f"a triangle of indices below {corners}")
     return indices
+
+
+def scene_text(scene: Scene, old_layout: bool = False) -> str:
+    """Writes a scene.
+
+    Args:
+        scene: what to write.
+        old_layout: without poses of objects, which are put into the poses of the shapes, and without subframes.
+
+    Returns:
+        The text of a scene file.
+
+    Raises:
+        SceneFileError: a name does not fit on a line of its own, or the old layout has no place for a subframe.
+    """
+    lines = [_name(scene.name, "scene")]
+    for thing in scene.objects:
+        lines.append(f"* {_name(thing.name, 'object')}")
+        if old_layout and thing.subframes:
+            raise SceneFileError(f"object '{thing.name}': got {len(thing.subframes)} subframes, the older layout has "
+                                 "none; write the newer layout")
+        if not old_layout:
+            lines += _pose_lines(thing.position, thing.quaternion_xyzw)
+        lines.append(str(len(thing.shapes)))
+        for shape in thing.shapes:
+            lines += _shape_lines(shape, thing if old_layout else None)
+        if not old_layout:
+            lines.append(str(len(thing.subframes)))
+            for name, position, quaternion in thing.subframes:
+                lines += [_name(name, "subframe"), *_pose_lines(position, quaternion)]
+    return "\n".join([*lines, ".", ""])
+
+
+def _name(name: str, what: str) -> str:
+    if not name.strip() or len(name.splitlines()) != 1:
+        raise SceneFileError(f"name of the {what}: got '{name}', expected one line that is not empty; rename it")
+    return name
+
+
+def _shape_lines(shape: SceneShape, thing: SceneObject | None) -> list[str]:
+    """Lines of a shape; its pose is taken along with that of the object, if one is given."""
+    position, quaternion = shape.position, shape.quaternion_xyzw
+    if thing is not None:
+        turned = _rotated(thing.quaternion_xyzw, position)
+        position = tuple(a + b for a, b in zip(thing.position, turned, strict=True))
+        quaternion = _product(thing.quaternion_xyzw, quaternion)
+    sizes = [_numbers(shape.size)]
+    if shape.kind == "mesh":
+        sizes = [f"{len(shape.vertices)} {len(shape.triangles)}", *map(_numbers, shape.vertices),
+                 *(" ".join(map(str, indices)) for indices in shape.triangles)]
+    return [shape.kind, *sizes, *_pose_lines(position, quaternion), _numbers(shape.color)]
+
+
+def _pose_lines(position: Vector, quaternion_xyzw: Vector) -> list[str]:
+    return [_numbers(position), _numbers(quaternion_xyzw)]
+
+
+def _numbers(values: Vector) -> str:
+    return " ".join(f"{value:.12g}" for value in values)
+
+
+def _product(first: Vector, second: Vector) -> Vector:
+    """Product of two quaternions xyzw: the second rotation in the frame of the first."""
+    x, y, z, w = first
+    a, b, c, d = second
+    return (w * a + x * d + y * c - z * b, w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c)
+
+
+def _rotated(quaternion: Vector, vector: Vector) -> Vector:
+    x, y, z, w = quaternion
+    return _product(_product(quaternion, (*vector, 0.0)), (-x, -y, -z, w))[:3]
