@@ -49,16 +49,18 @@ class Transition:
         inside = times[(times > 0.0) & (times < self.duration_s)]
         return np.sort(np.concatenate([[0.0], inside, [self.duration_s]]))
 
-    def weight(self, time_s: float) -> float:
-        """Returns the second motion's share, with no velocity and acceleration at both ends."""
+    def weight(self, time_s: float) -> tuple[float, float, float]:
+        """Returns the second motion's share and its first and second derivative, which are 0 at both ends."""
         s = min(max(time_s / self.duration_s, 0.0), 1.0)
-        return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+        rest = 1.0 - s
+        return (s * s * s * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * rest * rest / self.duration_s,
+                60.0 * s * rest * (1.0 - 2.0 * s) / self.duration_s**2)
 
     def pose(self, time_s: float) -> Transform:
         """Returns the link's pose in the planning frame."""
         one = self.follower.pose(state_at(self.first, time_s + self.first_from).positions)
         other = self.follower.pose(state_at(self.second, time_s + self.second_from).positions)
-        weight = self.weight(time_s)
+        weight = self.weight(time_s)[0]
         turn = pin.log3(one.rotation.T @ other.rotation)
         return pin.SE3(one.rotation @ pin.exp3(weight * turn),
                        one.translation + weight * (other.translation - one.translation))
@@ -66,10 +68,11 @@ class Transition:
     def posture(self, time_s: float) -> JointState:
         """Returns the mean of the joints, for a redundant arm to keep near to."""
         one, other = state_at(self.first, time_s + self.first_from), state_at(self.second, time_s + self.second_from)
-        weight = self.weight(time_s)
-        return JointState(*(a + weight * (b - a) for a, b in (
-            (one.positions, other.positions), (one.velocities, other.velocities),
-            (one.accelerations, other.accelerations))))
+        weight, rate, change = self.weight(time_s)
+        way, speed = other.positions - one.positions, other.velocities - one.velocities
+        return JointState(one.positions + weight * way, one.velocities + weight * speed + rate * way,
+                          one.accelerations + weight * (other.accelerations - one.accelerations)
+                          + 2.0 * rate * speed + change * way)
 
 
 def _crossing(outside: Callable[[float], bool], times: Array) -> float | None:
