@@ -2,6 +2,9 @@
 """The managers answer on the wire as clients of the original expect, without its defects."""
 from __future__ import annotations
 
+import math
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,12 +16,15 @@ from moveit_msgs.msg import (
     AllowedCollisionMatrix,
     AttachedCollisionObject,
     CollisionObject,
+    RobotTrajectory,
 )
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneResponse
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_core import srv
-from modular_framework_core.msg import StandardisedGrasp
+from modular_framework_core.msg import ManagerChange, StandardisedGrasp
 from modular_framework_core.srv import GetModifiedACMRequest, UpdateACMEntryRequest
 
 JOINT_STATES = """
@@ -33,6 +39,17 @@ swing:
 lost:
   - {name: nowhere, interpolate_time: 0.4}
 """
+POSES = """
+table: {reference_frame: /world, position: {x: 1, y: 0, z: 0.75}, orientation: {r: 0, p: 0, y: 0.5}}
+skew:
+  reference_frame: world
+  position: {x: 1, y: 0}
+  orientation: {r: 0, p: 0, y: 0}
+both:
+  reference_frame: base
+  left: {position: {x: 0.1, y: 0, z: 0}, orientation: {x: 0, y: 0, z: 0, w: 1}}
+  right: {position: {x: 0.2, y: 0, z: 0}, orientation: {r: 0, p: 0, y: 0}}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +57,11 @@ def managers(ros_launch, tmp_path_factory: pytest.TempPathFactory):
     folder: Path = tmp_path_factory.mktemp("config")
     (folder / "states.yaml").write_text(JOINT_STATES)
     (folder / "trajectories.yaml").write_text(TRAJECTORIES)
+    (folder / "poses.yaml").write_text(POSES)
     session = ros_launch(f"""<launch>
       <rosparam param="manipulator_links_indices">[1, 2]</rosparam>
       <node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"
-            args="{folder}/states.yaml {folder}/trajectories.yaml"/></launch>""")
+            args="{folder}/states.yaml {folder}/trajectories.yaml {folder}/poses.yaml"/></launch>""")
     session.wait_for_service("/get_object_type", 20)
     session.wait_for_service("/set_init_acm", 20)
     return session
@@ -53,6 +71,13 @@ def call(name: str, service_type, *args, **fields):
     proxy = rospy.ServiceProxy(name, service_type)
     proxy.wait_for_service(10)
     return proxy(*args, **fields)
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"did not happen within {timeout_s} s"
+        time.sleep(0.02)
 
 
 def test_joint_states_of_the_file_keep_full_precision_and_survive_a_bad_neighbour(managers):
@@ -193,3 +218,96 @@ def test_loose_objects_of_the_simulation_are_known_without_being_added_and_stati
             service.shutdown()
     finally:
         rospy.set_param("simulation", False)
+
+
+def lists(plural: str) -> tuple[list[str], int]:
+    answer = call(f"list_{plural}", srv.ListMessages)
+    return answer.names, answer.anonymous
+
+
+def test_messages_are_listed_removed_and_cleared(managers):
+    call("clear_poses", Trigger)
+    for name in ("", "p", "q"):
+        assert call("add_pose", srv.AddPoseStamped, PoseStamped(), name).success
+    assert lists("poses") == (["p", "q"], 1)
+    assert call("remove_pose", srv.RemoveMessage, "p").success
+    refused = call("remove_pose", srv.RemoveMessage, "p")
+    assert not refused.success and "No pose named 'p' is stored. Stored names: q" in refused.message
+    assert lists("poses") == (["q"], 1)
+    assert call("clear_poses", Trigger).success
+    assert lists("poses") == ([], 0)
+
+
+def test_every_change_is_told_in_order(managers):
+    heard: list[tuple[int, str, int, int]] = []
+    subscriber = rospy.Subscriber("manager_changes", ManagerChange, lambda message: heard.append(
+        (message.action, message.name, message.named, message.anonymous)) if message.kind == "plan" else None)
+    wait_until(lambda: subscriber.get_num_connections() > 0)
+    for name in ("a", "a", ""):
+        call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), name)
+    call("get_plan", srv.GetMoveitPlan, "")
+    call("remove_plan", srv.RemoveMessage, "a")
+    call("clear_plans", Trigger)
+    wait_until(lambda: len(heard) == 6)
+    subscriber.unregister()
+    change = ManagerChange
+    assert heard == [(change.ADDED, "a", 1, 0), (change.REPLACED, "a", 1, 0), (change.ADDED, "", 1, 1),
+                     (change.HANDED_OUT, "", 1, 0), (change.REMOVED, "a", 0, 0), (change.CLEARED, "", 0, 0)]
+
+
+def test_messages_are_saved_and_loaded_to_the_last_bit(managers, tmp_path):
+    message = RobotTrajectory()
+    message.joint_trajectory.joint_names = ["a"]
+    point = JointTrajectoryPoint(positions=[0.1 + 0.2], time_from_start=rospy.Duration(1, 999999999))
+    message.joint_trajectory.points = [point]
+    grasp = StandardisedGrasp(hand_id="h", grasp_quality=1e-300)
+    for name in ("kept", ""):
+        call("add_plan", srv.AddMoveitPlan, message, name)
+    call("add_grasp", srv.AddStandardisedGrasp, grasp, "g")
+    saved = call("save_plans", srv.MessageFile, str(tmp_path / "plans.yaml"))
+    assert (saved.success, saved.count) == (True, 2), saved.message
+    assert call("save_grasps", srv.MessageFile, str(tmp_path / "grasps.yaml")).success
+    call("clear_plans", Trigger)
+    call("clear_grasps", Trigger)
+    assert call("load_plans", srv.MessageFile, str(tmp_path / "plans.yaml")).count == 2
+    assert call("load_grasps", srv.MessageFile, str(tmp_path / "grasps.yaml")).success
+    assert call("get_plan", srv.GetMoveitPlan, "kept").moveit_plan == message
+    assert call("get_plan", srv.GetMoveitPlan, "").moveit_plan == message
+    grasp.grasp_id = "g"
+    assert call("get_grasp", srv.GetStandardisedGrasp, "g").grasp_message == grasp
+
+
+@pytest.mark.parametrize(("path", "text", "reason"), [
+    ("", None, "a file that ends in .yaml"), ("x.txt", None, "a file that ends in .yaml"),
+    ("missing.yaml", None, "cannot be read"), ("bad.yaml", "kind: [", "cannot be read"),
+    ("kind.yaml", "kind: grasp\nnamed: {}\n", "holds messages of the kind 'grasp'"),
+    ("field.yaml", "kind: plan\nnamed:\n  p: {no_such_field: 1}\n", "'p' is no moveit_msgs/RobotTrajectory"),
+    ("type.yaml", "kind: plan\nanonymous:\n- {joint_trajectory: {joint_names: 5}}\n", "anonymous message 1 is no")])
+def test_a_wrong_file_is_refused_and_nothing_is_lost(managers, tmp_path, path, text, reason):
+    call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), "stays")
+    if text is not None:
+        (tmp_path / path).write_text(text)
+    answer = call("load_plans", srv.MessageFile, str(tmp_path / path) if path else "")
+    assert not answer.success and reason in answer.message
+    assert "stays" in lists("plans")[0]
+
+
+def test_reloading_forgets_what_was_added_and_reads_the_file_again(managers):
+    call("add_joint_state", srv.AddJointState, JointState(name=["a"], position=[9.0]), "added")
+    call("add_joint_state", srv.AddJointState, JointState(name=["a"], position=[9.0]), "up")
+    answer = call("reload_joint_states", srv.MessageFile, "")
+    assert not answer.success and answer.count == 2 and "states.yaml:3" in answer.message
+    assert lists("joint_states") == (["down", "up"], 0)
+    assert call("get_joint_state", srv.GetJointState, "up").joint_state.position == (1.5707963268, 0.1)
+
+
+def test_poses_of_the_file_are_poses_of_things_and_of_robots(managers):
+    assert not call("reload_poses", srv.MessageFile, "").success
+    pose = call("get_pose", srv.GetPoseStamped, "table").pose_stamped
+    assert pose.header.frame_id == "world" and pose.pose.position.z == 0.75
+    assert pose.pose.orientation.z == pytest.approx(math.sin(0.25))
+    robot = call("get_robot_pose", srv.GetRobotPose, "both").robot_pose
+    assert robot.end_effector_link_names == ["left", "right"]
+    assert [item.position.x for item in robot.pose_array.poses] == [0.1, 0.2]
+    assert robot.pose_array.header.frame_id == "base"
+    assert "poses.yaml:5" in managers.log()

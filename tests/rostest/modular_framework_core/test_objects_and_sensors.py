@@ -9,6 +9,9 @@ import pytest
 import rospy
 import tf2_ros
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
 
 from modular_framework_core import srv
 
@@ -127,6 +130,23 @@ def test_the_frames_of_the_sensors_are_on_tf_and_wrong_ones_are_named(simulation
     assert (transform.translation.x, transform.translation.z) == (-0.1645, 2.72)
     assert "'incomplete'" in simulation.session.log()
     assert "origin_frame_id" in simulation.session.log()
+
+
+def test_the_file_of_sensors_is_read_again_on_request(simulation: FakeSimulation) -> None:
+    added = rospy.ServiceProxy("add_pose", srv.AddPoseStamped)
+    pose = PoseStamped(header=Header(frame_id="world"), pose=Pose(Point(0.5, 0.0, 1.5), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    assert added(pose, "corner").success
+    simulation.sensors.write_text("camera: {frame_id: camera_frame, initial_pose: corner}\n"
+                                  "lost: {frame_id: lost_frame, initial_pose: nowhere}\n")
+    answer = rospy.ServiceProxy("reload_sensor_frames", Trigger)()
+    assert not answer.success
+    assert "sensors.yaml:2" in answer.message and "no pose named 'nowhere' is stored" in answer.message
+    assert "'simulated_kinect2' is not in the file any more" in answer.message
+    buffer = tf2_ros.Buffer()
+    listener = tf2_ros.TransformListener(buffer)
+    transform = buffer.lookup_transform("world", "camera_frame", rospy.Time(0), rospy.Duration(10)).transform
+    listener.unregister()
+    assert (transform.translation.x, transform.translation.z) == (0.5, 1.5)
 
 
 def test_the_sensors_node_needs_its_file(simulation: FakeSimulation) -> None:

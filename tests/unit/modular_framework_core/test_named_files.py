@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from modular_framework_core.managers.joint_bounds import bounds_from_urdf
 from modular_framework_core.managers.named_joint_states import load_joint_states
+from modular_framework_core.managers.named_poses import NamedPose, Placement
 from modular_framework_core.managers.named_trajectories import load_trajectories
 from modular_framework_core.sensor_frames import load_sensor_frames, quaternion_from_rpy
 
@@ -48,6 +50,33 @@ def test_a_bad_joint_state_is_named_and_the_others_stay(tmp_path: Path, text: st
     assert len(faults) == 1
     assert f"file.yaml:{line}:" in str(faults[0])
     assert hint in str(faults[0])
+
+
+BOUNDS = bounds_from_urdf("""<robot name="r"><joint name="elbow" type="revolute"><limit lower="-1" upper="2"/></joint>
+<joint name="wheel" type="continuous"/><joint name="mount" type="fixed"/></robot>""")
+
+
+def test_joints_of_the_robot_that_move_and_their_bounds_are_read_from_its_description() -> None:
+    assert {"elbow": (-1.0, 2.0), "wheel": (-math.inf, math.inf)} == BOUNDS
+
+
+@pytest.mark.parametrize(("entry", "hint"), [
+    ("{elbow: 2.1}", "got 2.1, the joint moves from -1.0000 to 2.0000"),
+    ("{elbw: 0}", "no joint 'elbw' that moves; it has elbow, wheel; did you mean 'elbow'?"), ("{mount: 0}", "'mount'")])
+def test_a_joint_state_the_robot_cannot_have_is_named(tmp_path: Path, entry: str, hint: str) -> None:
+    text = f"bad: {entry}\ngood: {{elbow: 2.0, wheel: 100}}\n"
+    states, faults = load_joint_states(write(tmp_path, text), BOUNDS)
+    assert [state.name for state in states] == ["good"]
+    assert "file.yaml:1:" in str(faults[0]) and hint in str(faults[0])
+
+
+def test_a_sensor_may_stand_at_a_pose_that_has_a_name(tmp_path: Path) -> None:
+    stored = NamedPose("corner", "world", {"": Placement((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))})
+    text = "cam: {frame_id: cam, initial_pose: corner}\nlost: {frame_id: x, initial_pose: cornr}\n"
+    frames, faults = load_sensor_frames(write(tmp_path, text), {"corner": stored}.get)
+    found = [(frame.frame, frame.parent_frame, frame.position_m) for frame in frames]
+    assert found == [("cam", "world", (1.0, 2.0, 3.0))]
+    assert "file.yaml:2:" in str(faults[0]) and "no pose named 'cornr' is stored" in str(faults[0])
 
 
 @pytest.mark.parametrize("text", ["a: [1\n", "- a\n", "a: !!python/object/apply:os.system ['true']\n"])

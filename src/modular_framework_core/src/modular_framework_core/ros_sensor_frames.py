@@ -8,8 +8,13 @@ from pathlib import Path
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from std_srvs.srv import Trigger, TriggerResponse
 
+from modular_framework_core.managers.named_poses import NamedPose, Placement
 from modular_framework_core.sensor_frames import SensorFrame, load_sensor_frames
+from modular_framework_core.srv import GetPoseStamped
+
+POSE_SERVICE_TIMEOUT_S = 30.0
 
 
 def transform_message(frame: SensorFrame) -> TransformStamped:
@@ -23,11 +28,64 @@ def transform_message(frame: SensorFrame) -> TransformStamped:
     return message
 
 
-def main() -> int:
-    """Runs the node ``sensors_tf2_broadcaster``; argument: the file of sensors.
+def stored_pose(name: str) -> NamedPose | None:
+    """Asks the pose manager for a pose; None when it has none of that name, or does not answer (which is logged)."""
+    get_pose = rospy.ServiceProxy("get_pose", GetPoseStamped)
+    try:
+        get_pose.wait_for_service(POSE_SERVICE_TIMEOUT_S)
+        answer = get_pose(name)
+    except (rospy.ROSException, rospy.ServiceException) as error:
+        rospy.logerr("Service '%s' did not give the pose '%s' within %.0f s: %s", get_pose.resolved_name, name,
+                     POSE_SERVICE_TIMEOUT_S, error)
+        return None
+    if not answer.success:
+        return None
+    position, rotation = answer.pose_stamped.pose.position, answer.pose_stamped.pose.orientation
+    placement = Placement((position.x, position.y, position.z), (rotation.x, rotation.y, rotation.z, rotation.w))
+    return NamedPose(name, answer.pose_stamped.header.frame_id, {"": placement})
+
+
+class SensorFrames:
+    """The frames of one file of sensors.
 
     Publishers:
         ``/tf_static`` (tf2_msgs/TFMessage): one transform a sensor.
+    Services:
+        ``reload_sensor_frames`` (std_srvs/Trigger): reads the file again.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Nothing is read or advertised before :meth:`connect`."""
+        self._path = path
+        self._broadcaster: tf2_ros.StaticTransformBroadcaster | None = None
+        self._told: set[str] = set()
+
+    def connect(self) -> None:
+        """Reads the file, publishes the frames and advertises the service."""
+        self._broadcaster = tf2_ros.StaticTransformBroadcaster()
+        self._load()
+        rospy.Service("reload_sensor_frames", Trigger, self._reload)
+
+    def _load(self) -> list[str]:
+        frames, faults = load_sensor_frames(self._path, stored_pose)
+        for fault in faults:
+            rospy.logwarn("%s. This sensor is skipped.", fault)
+        if frames and self._broadcaster is not None:
+            self._broadcaster.sendTransform([transform_message(frame) for frame in frames])
+            rospy.loginfo("Sensor frames: %s.", ", ".join(f"{frame.frame} in {frame.parent_frame}" for frame in frames))
+        gone = sorted(self._told - {frame.frame for frame in frames})
+        self._told |= {frame.frame for frame in frames}
+        stay = [f"frame '{name}' is not in the file any more; TF keeps it until this node is started again"
+                for name in gone]
+        return [*map(str, faults), *stay]
+
+    def _reload(self, request: object) -> TriggerResponse:
+        problems = self._load()
+        return TriggerResponse(success=not problems, message="\n".join(problems))
+
+
+def main() -> int:
+    """Runs the node ``sensors_tf2_broadcaster``; argument: the file of sensors.
 
     Returns:
         Exit code: 2 when the argument is missing.
@@ -38,12 +96,6 @@ def main() -> int:
         rospy.logfatal("sensors_tf2_broadcaster: got %d arguments, expected one: the path of the sensors' YAML file.",
                        len(arguments))
         return 2
-    frames, faults = load_sensor_frames(Path(arguments[0]))
-    for fault in faults:
-        rospy.logwarn("%s. This sensor is skipped.", fault)
-    broadcaster = tf2_ros.StaticTransformBroadcaster()
-    if frames:
-        broadcaster.sendTransform([transform_message(frame) for frame in frames])
-        rospy.loginfo("Sensor frames: %s.", ", ".join(f"{frame.frame} in {frame.parent_frame}" for frame in frames))
+    SensorFrames(Path(arguments[0])).connect()
     rospy.spin()
     return 0

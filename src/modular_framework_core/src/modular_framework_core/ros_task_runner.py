@@ -9,7 +9,8 @@ Parameters (used where there is no argument):
     ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
     ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list).
     ``/run_id``: written by roslaunch; tells when the launch began.
-    ``~record_directory``: where the record of the run is written (default: ``$ROS_HOME/modular_framework/task_records``).
+    ``~record_directory``: where the record of the run is written (default:
+        ``$ROS_HOME/modular_framework/task_records``).
 Services: ``~stop`` (std_srvs/Trigger) stops the task as SIGINT does, and answers when the request has been passed on.
 Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched: at every start
     and end of a state, and twice a second while states run), for viewers those of ``ros_task_introspection``.
@@ -178,7 +179,7 @@ def _keep_record(name: str, begun: float, result: TaskResult, recorder: TaskReco
     try:
         path = write_record(folder, name, begun, result.outcome, result.succeeded, result.error, recorder.records())
     except OSError as error:
-        rospy.logwarn(f"the record of the run is not kept: {error}; set ~record_directory to a folder that can be written")
+        rospy.logwarn(f"the record of the run is not kept: {error}; set ~record_directory to a folder to write to")
         return
     rospy.loginfo(f"record of the run: {path}")
 

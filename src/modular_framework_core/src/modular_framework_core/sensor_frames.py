@@ -2,18 +2,16 @@
 """Reads where the sensors stand, as fixed transforms between frames."""
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
+from modular_framework_core.managers.named_poses import NamedPose, frame_name, parse_pose, quaternion_from_rpy
 from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
 
 FRAME_KEYS = ("frame_id", "origin_frame_id", "frame_x", "frame_y", "frame_z", "frame_roll", "frame_pitch", "frame_yaw")
-POSITION_KEYS = ("x", "y", "z")
-RPY_KEYS = ("r", "p", "y")
-QUATERNION_KEYS = ("x", "y", "z", "w")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,24 +29,20 @@ class SensorFrame:
     sensor: str
     parent_frame: str
     frame: str
-    position_m: tuple[float, float, float]
-    quaternion_xyzw: tuple[float, float, float, float]
+    position_m: tuple[float, ...]
+    quaternion_xyzw: tuple[float, ...]
 
 
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Converts fixed-axis roll, pitch, yaw [rad] (REP 103) to a unit quaternion xyzw."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
+PoseLookup = Callable[[str], "NamedPose | None"]
 
 
-def parse_sensor(entry: Entry) -> SensorFrame:
+def parse_sensor(entry: Entry, lookup: PoseLookup) -> SensorFrame:
     """Turns one entry of the file into a frame.
 
     Args:
-        entry: Mapping with the eight ``FRAME_KEYS``, or with ``frame_id`` and an inline ``initial_pose``.
+        entry: Mapping with the eight ``FRAME_KEYS``, or with ``frame_id`` and ``initial_pose``: a pose written
+            there, or the name of one.
+        lookup: Gives the pose of a name, None when there is none.
 
     Returns:
         The frame.
@@ -58,57 +52,38 @@ def parse_sensor(entry: Entry) -> SensorFrame:
     """
     fields = {child.key: child for child in entry.children()}
     if "initial_pose" in fields:
-        return _from_initial_pose(entry, fields)
+        return _from_initial_pose(entry, fields, lookup)
     missing = [key for key in FRAME_KEYS if key not in fields]
     if missing:
         raise entry.fault(f"the keys {missing} are missing; a sensor needs {list(FRAME_KEYS)}")
     x, y, z, roll, pitch, yaw = (fields[key].number() for key in FRAME_KEYS[2:])
-    return SensorFrame(entry.key, _frame_name(fields["origin_frame_id"]), _frame_name(fields["frame_id"]), (x, y, z),
+    return SensorFrame(entry.key, frame_name(fields["origin_frame_id"]), frame_name(fields["frame_id"]), (x, y, z),
                        quaternion_from_rpy(roll, pitch, yaw))
 
 
-def _from_initial_pose(entry: Entry, fields: dict[str, Entry]) -> SensorFrame:
+def _from_initial_pose(entry: Entry, fields: dict[str, Entry], lookup: PoseLookup) -> SensorFrame:
     if "frame_id" not in fields:
         raise entry.fault("the key 'frame_id' is missing; name the frame of the sensor")
-    pose = {child.key: child for child in fields["initial_pose"].children()}
-    missing = [key for key in ("reference_frame", "position", "orientation") if key not in pose]
-    if missing:
-        raise fields["initial_pose"].fault(f"the keys {missing} are missing; "
+    given = fields["initial_pose"]
+    pose = lookup(given.text()) if isinstance(given.node, yaml.ScalarNode) else parse_pose(given)
+    if pose is None:
+        raise given.fault(f"no pose named '{given.text()}' is stored; add it to the named poses or correct the name")
+    if pose.is_robot_pose:
+        raise fields["initial_pose"].fault("the keys ['position', 'orientation'] are missing; "
                                            "a pose needs reference_frame, position, orientation")
-    position = _numbers(pose["position"], POSITION_KEYS)
-    names = {child.key for child in pose["orientation"].children()}
-    if names == set(QUATERNION_KEYS):
-        values = _numbers(pose["orientation"], QUATERNION_KEYS)
-        norm = math.sqrt(sum(value * value for value in values))
-        if norm < 1e-6:
-            raise pose["orientation"].fault("the quaternion has no length; give a rotation")
-        orientation = tuple(value / norm for value in values)
-    else:
-        orientation = quaternion_from_rpy(*_numbers(pose["orientation"], RPY_KEYS))
-    return SensorFrame(entry.key, _frame_name(pose["reference_frame"]), _frame_name(fields["frame_id"]),
-                       (position[0], position[1], position[2]),
-                       (orientation[0], orientation[1], orientation[2], orientation[3]))
+    placement = pose.placements[""]
+    return SensorFrame(entry.key, pose.reference_frame, frame_name(fields["frame_id"]), placement.position_m,
+                       placement.quaternion_xyzw)
 
 
-def _numbers(entry: Entry, keys: tuple[str, ...]) -> tuple[float, ...]:
-    fields = {child.key: child for child in entry.children()}
-    if set(fields) != set(keys):
-        raise entry.fault(f"got the keys {sorted(fields)}, expected {list(keys)}")
-    return tuple(fields[key].number() for key in keys)
-
-
-def _frame_name(entry: Entry) -> str:
-    name = entry.text().lstrip("/")
-    if not name:
-        raise entry.fault("got an empty text, expected the name of a frame")
-    return name
-
-
-def load_sensor_frames(path: Path) -> tuple[list[SensorFrame], list[EntryError]]:
+def load_sensor_frames(
+    path: Path, lookup: PoseLookup = lambda name: None
+) -> tuple[list[SensorFrame], list[EntryError]]:
     """Reads a file of sensors.
 
     Args:
         path: YAML file; top-level mappings are sensors, single values (topic names and the like) are left alone.
+        lookup: Gives the pose of a name, None when there is none.
 
     Returns:
         The usable frames in file order, and one error for each sensor (or for the file) that is not usable.
@@ -118,7 +93,7 @@ def load_sensor_frames(path: Path) -> tuple[list[SensorFrame], list[EntryError]]
     def take(entry: Entry) -> None:
         if isinstance(entry.node, yaml.ScalarNode):
             return
-        frame = parse_sensor(entry)
+        frame = parse_sensor(entry, lookup)
         if frame.frame in frames:
             raise entry.fault(f"frame '{frame.frame}' belongs to sensor '{frames[frame.frame].sensor}' already")
         if frame.frame == frame.parent_frame:

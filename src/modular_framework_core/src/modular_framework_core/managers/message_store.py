@@ -8,10 +8,40 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
 from typing import Generic, TypeVar
 
 MessageT = TypeVar("MessageT")
+
+
+class Action(Enum):
+    """What happened to a store."""
+
+    ADDED = 0
+    REPLACED = 1
+    HANDED_OUT = 2
+    REMOVED = 3
+    CLEARED = 4
+    LOADED = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One change of a store.
+
+    Attributes:
+        action: What happened.
+        name: Name of the message; empty for an anonymous one, and where several messages changed.
+        named: How many named messages there are after it.
+        anonymous: How many anonymous messages wait after it.
+    """
+
+    action: Action
+    name: str
+    named: int
+    anonymous: int
 
 
 class MessageNotFoundError(LookupError):
@@ -40,11 +70,14 @@ class MessageStore(Generic[MessageT]):
     Args:
         kind: Noun used in error texts, for example ``grasp``.
         on_named: Called with (message, name) before a named message is stored; may complete the message in place.
+        on_change: Called after each change, in the order of the changes; must not call the store.
     """
 
-    def __init__(self, kind: str, on_named: Callable[[MessageT, str], None] | None = None) -> None:
+    def __init__(self, kind: str, on_named: Callable[[MessageT, str], None] | None = None,
+                 on_change: Callable[[Change], None] | None = None) -> None:
         self.kind = kind
         self._on_named = on_named
+        self._on_change = on_change
         self._named: dict[str, MessageT] = {}
         self._anonymous: deque[MessageT] = deque()
         self._lock = threading.Lock()
@@ -62,12 +95,21 @@ class MessageStore(Generic[MessageT]):
         with self._lock:
             if not name:
                 self._anonymous.append(message)
+                self._changed(Action.ADDED)
                 return False
-            if self._on_named is not None:
-                self._on_named(message, name)
             replaced = name in self._named
-            self._named[name] = message
+            self._put(message, name)
+            self._changed(Action.REPLACED if replaced else Action.ADDED, name)
             return replaced
+
+    def _put(self, message: MessageT, name: str) -> None:
+        if self._on_named is not None:
+            self._on_named(message, name)
+        self._named[name] = message
+
+    def _changed(self, action: Action, name: str = "") -> None:
+        if self._on_change is not None:
+            self._on_change(Change(action, name, len(self._named), len(self._anonymous)))
 
     def get(self, name: str = "") -> MessageT:
         """Hands out a message: the named one, which stays, or the oldest anonymous one, which is removed.
@@ -85,8 +127,51 @@ class MessageStore(Generic[MessageT]):
             if name and name in self._named:
                 return self._named[name]
             if not name and self._anonymous:
-                return self._anonymous.popleft()
+                message = self._anonymous.popleft()
+                self._changed(Action.HANDED_OUT)
+                return message
             raise MessageNotFoundError(self.kind, name, tuple(sorted(self._named)))
+
+    def remove(self, name: str) -> None:
+        """Removes a named message.
+
+        Raises:
+            MessageNotFoundError: Nothing of that name is stored.
+        """
+        with self._lock:
+            if name not in self._named:
+                raise MessageNotFoundError(self.kind, name, tuple(sorted(self._named)))
+            del self._named[name]
+            self._changed(Action.REMOVED, name)
+
+    def clear(self) -> None:
+        """Removes every message, named and anonymous."""
+        with self._lock:
+            self._named.clear()
+            self._anonymous.clear()
+            self._changed(Action.CLEARED)
+
+    def contents(self) -> tuple[dict[str, MessageT], list[MessageT]]:
+        """Returns the named messages and the anonymous ones, oldest first, without removing any."""
+        with self._lock:
+            return dict(self._named), list(self._anonymous)
+
+    def load(self, named: Mapping[str, MessageT], anonymous: Iterable[MessageT] = (), *, clear: bool = False) -> None:
+        """Stores many messages in one step; readers see all of them or none.
+
+        Args:
+            named: Messages by name; those of a name that is taken replace the older one.
+            anonymous: Messages to append to the queue, oldest first.
+            clear: Whether everything stored before is removed.
+        """
+        with self._lock:
+            if clear:
+                self._named.clear()
+                self._anonymous.clear()
+            for name, message in named.items():
+                self._put(message, name)
+            self._anonymous.extend(anonymous)
+            self._changed(Action.LOADED)
 
     def names(self) -> tuple[str, ...]:
         """Returns the stored names in alphabetical order."""

@@ -1,19 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fills the managers from the files of named joint states and named trajectories."""
+"""Reads the messages of the files of named joint states, trajectories and poses."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import rospy
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_core.managers.joint_bounds import Bounds, bounds_from_urdf
 from modular_framework_core.managers.named_joint_states import NamedJointState, load_joint_states
+from modular_framework_core.managers.named_poses import NamedPose, Placement, load_poses
 from modular_framework_core.managers.named_trajectories import JointLookup, TimedTrajectory, load_trajectories
 from modular_framework_core.managers.ros_message_services import MessageServices
 from modular_framework_core.managers.yaml_entries import EntryError
+from modular_framework_core.msg import RobotPose
 from modular_framework_core.srv import GetJointState
+
+NamedMessages = tuple[dict[str, Any], list[EntryError]]
 
 
 def joint_state_message(state: NamedJointState) -> JointState:
@@ -28,22 +36,61 @@ def trajectory_message(trajectory: TimedTrajectory) -> JointTrajectory:
     return JointTrajectory(joint_names=list(trajectory.joint_names), points=points)
 
 
-def fill_joint_states(services: MessageServices, path: Path) -> None:
-    """Stores the joint states of a file and logs every entry that is not usable."""
-    states, faults = load_joint_states(path)
-    _report(faults)
-    for state in states:
-        services.store.add(joint_state_message(state), state.name)
-        rospy.loginfo("Loaded the joint state '%s'.", state.name)
+def pose_message(pose: NamedPose) -> PoseStamped:
+    """Converts a named pose of one thing, stamped now."""
+    header = Header(stamp=rospy.Time.now(), frame_id=pose.reference_frame)
+    return PoseStamped(header=header, pose=_pose(pose.placements[""]))
 
 
-def fill_trajectories(services: MessageServices, path: Path, lookup: JointLookup) -> None:
-    """Stores the trajectories of a file and logs every entry that is not usable."""
-    trajectories, faults = load_trajectories(path, lookup)
-    _report(faults)
-    for trajectory in trajectories:
-        services.store.add(trajectory_message(trajectory), trajectory.name)
-        rospy.loginfo("Loaded the trajectory '%s'.", trajectory.name)
+def robot_pose_message(pose: NamedPose) -> RobotPose:
+    """Converts a named pose of a robot's end effectors, stamped now."""
+    header = Header(stamp=rospy.Time.now(), frame_id=pose.reference_frame)
+    poses = [_pose(placement) for placement in pose.placements.values()]
+    return RobotPose(end_effector_link_names=list(pose.placements), pose_array=PoseArray(header=header, poses=poses))
+
+
+def _pose(placement: Placement) -> Pose:
+    return Pose(Point(*placement.position_m), Quaternion(*placement.quaternion_xyzw))
+
+
+def read_joint_states(path: Path) -> NamedMessages:
+    """Reads a file of joint states, checked against the joints of ``robot_description`` where that is set."""
+    states, faults = load_joint_states(path, robot_bounds())
+    return {state.name: joint_state_message(state) for state in states}, faults
+
+
+def trajectory_reader(lookup: JointLookup) -> Callable[[Path], NamedMessages]:
+    """Returns a reader of files of trajectories that takes joint states from a lookup."""
+
+    def read(path: Path) -> NamedMessages:
+        trajectories, faults = load_trajectories(path, lookup)
+        return {trajectory.name: trajectory_message(trajectory) for trajectory in trajectories}, faults
+
+    return read
+
+
+def read_poses(path: Path) -> NamedMessages:
+    """Reads the poses of one thing each from a file of poses."""
+    poses, faults = load_poses(path)
+    return {pose.name: pose_message(pose) for pose in poses if not pose.is_robot_pose}, faults
+
+
+def read_robot_poses(path: Path) -> NamedMessages:
+    """Reads the poses of a robot's end effectors from a file of poses; its faults are told by ``read_poses``."""
+    poses, _ = load_poses(path)
+    return {pose.name: robot_pose_message(pose) for pose in poses if pose.is_robot_pose}, []
+
+
+def robot_bounds() -> dict[str, Bounds]:
+    """Returns the bounds of the robot's joints; none when no robot is described, or not as XML (which is logged)."""
+    description = rospy.get_param("robot_description", "")
+    if not description:
+        return {}
+    try:
+        return bounds_from_urdf(str(description))
+    except ValueError as error:
+        rospy.logwarn("Named joint states are not checked against the robot: %s", error)
+        return {}
 
 
 def lookup_in(services: MessageServices) -> JointLookup:
@@ -86,8 +133,3 @@ def lookup_over_service(timeout_s: float) -> JointLookup:
         return dict(zip(response.joint_state.name, response.joint_state.position, strict=False))
 
     return lookup
-
-
-def _report(faults: list[EntryError]) -> None:
-    for fault in faults:
-        rospy.logerr("%s. This entry is skipped.", fault)

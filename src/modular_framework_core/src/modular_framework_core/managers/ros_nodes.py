@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import rospy
 
 from modular_framework_core.managers import ros_message_services as kinds
 from modular_framework_core.managers.ros_acm_services import AcmServices
-from modular_framework_core.managers.ros_message_services import MessageKind, MessageServices
+from modular_framework_core.managers.ros_message_services import MessageKind, MessageServices, NamedFile
 from modular_framework_core.managers.ros_named_files import (
-    fill_joint_states,
-    fill_trajectories,
+    NamedMessages,
     lookup_in,
     lookup_over_service,
+    read_joint_states,
+    read_poses,
+    read_robot_poses,
+    trajectory_reader,
 )
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
 
@@ -28,29 +32,13 @@ def start(node_name: str) -> list[str]:
 
 
 def run_message_manager(kind: MessageKind, node_name: str) -> None:
-    """Runs the manager of one kind of message that reads no file."""
-    start(node_name)
-    MessageServices(kind).connect()
-    rospy.spin()
-
-
-def run_joint_state_manager() -> None:
-    """Runs the joint state manager; argument: optional file of named joint states."""
-    arguments = start("joint_state_manager_server")
-    services = MessageServices(kinds.JOINT_STATE)
-    if arguments:
-        fill_joint_states(services, Path(arguments[0]))
-    services.connect()
-    rospy.spin()
-
-
-def run_trajectory_manager() -> None:
-    """Runs the trajectory manager; argument: optional file of named trajectories."""
-    arguments = start("joint_trajectory_manager_server")
-    services = MessageServices(kinds.TRAJECTORY)
-    if arguments:
-        fill_trajectories(services, Path(arguments[0]), lookup_over_service(JOINT_STATE_SERVICE_TIMEOUT_S))
-    services.connect()
+    """Runs the manager of one kind of message; argument: optional file of named messages, where the kind has such."""
+    arguments = start(node_name)
+    readers = {kinds.JOINT_STATE: read_joint_states, kinds.POSE: read_poses, kinds.ROBOT_POSE: read_robot_poses}
+    if kind is kinds.TRAJECTORY and arguments:
+        readers[kind] = trajectory_reader(lookup_over_service(JOINT_STATE_SERVICE_TIMEOUT_S))
+    named = NamedFile(Path(arguments[0]), readers[kind]) if arguments and kind in readers else None
+    MessageServices(kind, named).connect()
     rospy.spin()
 
 
@@ -71,18 +59,27 @@ def run_object_types() -> None:
 def run_all() -> None:
     """Runs every manager in one node.
 
-    Arguments (both optional): file of named joint states, file of named trajectories. The parameters
-    ``~named_joint_states_file`` and ``~named_trajectories_file`` do the same.
+    Arguments (all optional, empty for none): file of named joint states, of named trajectories, of named poses. The
+    parameters ``~named_joint_states_file``, ``~named_trajectories_file`` and ``~named_poses_file`` do the same. The
+    file of poses may be missing: older configurations have none.
     """
-    arguments = start("managers")
-    joint_states, trajectories = MessageServices(kinds.JOINT_STATE), MessageServices(kinds.TRAJECTORY)
-    states_file = str(rospy.get_param("~named_joint_states_file", arguments[0] if arguments else ""))
-    trajectories_file = str(rospy.get_param("~named_trajectories_file", arguments[1] if len(arguments) > 1 else ""))
-    if states_file:
-        fill_joint_states(joint_states, Path(states_file))
-    if trajectories_file:
-        fill_trajectories(trajectories, Path(trajectories_file), lookup_in(joint_states))
-    others = [MessageServices(kind) for kind in (kinds.POSE, kinds.ROBOT_POSE, kinds.PLAN, kinds.GRASP)]
-    for services in (joint_states, trajectories, *others, AcmServices(), ObjectTypeServices()):
-        services.connect()
+    rospy.init_node("managers")
+    arguments = [*rospy.myargv(sys.argv)[1:], "", "", ""]
+    files = [str(rospy.get_param(f"~named_{name}_file", argument)) for name, argument in
+             zip(("joint_states", "trajectories", "poses"), arguments, strict=False)]
+
+    def named(path: str, read: Callable[[Path], NamedMessages]) -> NamedFile | None:
+        return NamedFile(Path(path), read) if path else None
+
+    if files[2] and not Path(files[2]).exists():
+        rospy.loginfo("There is no file of named poses: %s", files[2])
+        files[2] = ""
+    joint_states = MessageServices(kinds.JOINT_STATE, named(files[0], read_joint_states))
+    services = [joint_states,
+                MessageServices(kinds.TRAJECTORY, named(files[1], trajectory_reader(lookup_in(joint_states)))),
+                MessageServices(kinds.POSE, named(files[2], read_poses)),
+                MessageServices(kinds.ROBOT_POSE, named(files[2], read_robot_poses)),
+                MessageServices(kinds.PLAN), MessageServices(kinds.GRASP)]
+    for service in (*services, AcmServices(), ObjectTypeServices()):
+        service.connect()
     rospy.spin()

@@ -26,7 +26,7 @@ _CORE: tuple[tuple[str, re.Pattern[str], Callable[[str], Any]], ...] = (
     ("int", re.compile(r"[-+]?[0-9]+"), int),
     ("int", re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+"), lambda text: int(text, 0)),
     ("float", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"), float),
-    ("float", re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"), lambda text: float(text.lower().replace(".", "", 1))),
+    ("float", re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"), lambda text: float(text.replace(".", "", 1))),
 )
 
 
@@ -154,8 +154,8 @@ class _Reader:
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
                 if root is not None:
-                    raise TaskFault([Fault(self._place(event), "the file has a second document; a task is one document, "
-                                                               "remove the '---'")])
+                    raise TaskFault([Fault(self._place(event), "the file has a second document; a task is one "
+                                                               "document, remove the '---'")])
                 root = self._node(next(self._events))
         self._faults.raise_if_any()
         if root is None:
@@ -174,7 +174,8 @@ class _Reader:
         self._counted(1, place)
         if event.anchor:
             self._open.add(event.anchor)
-        node: Node = self._scalar(event, place) if isinstance(event, yaml.ScalarEvent) else self._collection(event, place)
+        is_scalar = isinstance(event, yaml.ScalarEvent)
+        node: Node = self._scalar(event, place) if is_scalar else self._collection(event, place)
         if event.anchor:
             self._open.discard(event.anchor)
             self._anchors[event.anchor] = node, self._count - before
@@ -189,7 +190,8 @@ class _Reader:
         if name in self._open:
             raise TaskFault([Fault(place, "this value contains itself through an alias")])
         if name not in self._anchors:
-            raise TaskFault([Fault(place, f"this is not valid YAML: the alias '*{name}' refers to no anchor before it")])
+            reason = f"this is not valid YAML: the alias '*{name}' refers to no anchor before it"
+            raise TaskFault([Fault(place, reason)])
         node, count = self._anchors[name]
         self._counted(count, place)
         return node

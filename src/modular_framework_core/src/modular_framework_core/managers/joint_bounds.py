@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Knows the joints of the robot and where they can go, so that a named joint state is checked before it is used."""
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from xml.etree import ElementTree
+
+from modular_framework_core.task_constructor.faults import nearest
+
+Bounds = tuple[float, float]
+TOLERANCE = 1e-6  # [rad or m]; numbers rounded in a file may end just outside
+
+
+def bounds_from_urdf(text: str) -> dict[str, Bounds]:
+    """Returns (lower, upper) [rad or m] of every joint that moves; a continuous joint has no bounds.
+
+    Raises:
+        ValueError: The text is no XML.
+    """
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"the robot's description is no XML: {error}") from error
+    bounds: dict[str, Bounds] = {}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        match joint.get("type"):
+            case "revolute" | "prismatic" if limit is not None:
+                bounds[str(joint.get("name"))] = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
+            case "continuous":
+                bounds[str(joint.get("name"))] = -math.inf, math.inf
+    return bounds
+
+
+def fault_of(joint: str, position: float, bounds: Mapping[str, Bounds]) -> str:
+    """Says what is wrong with a joint's position; nothing when it is all right or no joint is known.
+
+    Args:
+        joint: Name of the joint.
+        position: Its position [rad or m].
+        bounds: (lower, upper) of each joint of the robot; empty switches the check off.
+    """
+    if not bounds:
+        return ""
+    if joint not in bounds:
+        return f"the robot has no joint '{joint}' that moves; it has {', '.join(bounds)}{nearest(joint, bounds)}"
+    lower, upper = bounds[joint]
+    if not lower - TOLERANCE <= position <= upper + TOLERANCE:
+        return f"got {position}, the joint moves from {lower:.4f} to {upper:.4f}"
+    return ""

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes the messages of a manager to a YAML file and reads them back, every number to the last bit."""
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import genpy
+import genpy.message
+import yaml
+
+SUFFIXES = (".yaml", ".yml")
+
+
+class MessageFileError(ValueError):
+    """A file cannot be written, or is no file of a manager's messages; the text says why."""
+
+
+def path_of(text: str, folder: Path) -> Path:
+    """Returns the path a request names.
+
+    Args:
+        text: What was asked for; a relative path starts at ``folder``.
+        folder: Where the managers keep files.
+
+    Raises:
+        MessageFileError: No path was given, or it does not end in .yaml.
+    """
+    path = folder / Path(text).expanduser()
+    if not text or path.suffix not in SUFFIXES:
+        raise MessageFileError(f"path '{text}': a file that ends in {' or '.join(SUFFIXES)} is needed")
+    return path
+
+
+def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[Any]) -> int:
+    """Writes messages in one step: the file is there as a whole or stays as it was.
+
+    Args:
+        path: File to write; its folder is made when it is not there.
+        kind: Kind of the messages, for whoever reads the file.
+        named: Messages by name.
+        anonymous: Messages without a name, oldest first.
+
+    Returns:
+        How many messages were written.
+
+    Raises:
+        MessageFileError: The file cannot be written.
+    """
+    content = {"kind": kind, "named": {name: to_plain(message) for name, message in named.items()},
+               "anonymous": [to_plain(message) for message in anonymous]}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".yaml")
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            yaml.safe_dump(content, stream, sort_keys=False, allow_unicode=True)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise MessageFileError(f"{path} cannot be written: {error}") from error
+    return len(content["named"]) + len(content["anonymous"])
+
+
+def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list[Any]]:
+    """Reads what ``save`` wrote.
+
+    Args:
+        path: File to read.
+        kind: Kind of messages that is expected.
+        message_type: Class of the messages.
+
+    Returns:
+        The messages by name, and those without one, oldest first.
+
+    Raises:
+        MessageFileError: The file cannot be read, has another kind of message, or a message does not fit its type;
+            every message that does not is named.
+    """
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        raise MessageFileError(f"{path} cannot be read: {error}") from error
+    if not isinstance(content, dict) or content.get("kind") != kind:
+        found = content.get("kind") if isinstance(content, dict) else None
+        raise MessageFileError(f"{path} holds messages of the kind '{found}'; a saved file of the kind '{kind}' is "
+                               "needed")
+    given, waiting = content.get("named") or {}, content.get("anonymous") or []
+    if not isinstance(given, dict) or not isinstance(waiting, list):
+        raise MessageFileError(f"{path}: 'named' must be a mapping of names to messages and 'anonymous' a list")
+    faults: list[str] = []
+    named = {str(name): _filled(message_type, value, f"{path}: '{name}'", faults) for name, value in given.items()}
+    anonymous = [_filled(message_type, value, f"{path}: anonymous message {number}", faults)
+                 for number, value in enumerate(waiting, start=1)]
+    if faults:
+        raise MessageFileError("\n".join(faults))
+    return named, anonymous
+
+
+def to_plain(value: Any) -> Any:
+    """Turns a message into mappings, lists and plain values."""
+    if isinstance(value, genpy.Message):
+        return {name: to_plain(getattr(value, name)) for name in value.__slots__}
+    if isinstance(value, genpy.TVal):
+        return {"secs": int(value.secs), "nsecs": int(value.nsecs)}
+    if isinstance(value, bytes):
+        return list(value)
+    if isinstance(value, list | tuple):
+        return [to_plain(item) for item in value]
+    return value.item() if hasattr(value, "item") else value
+
+
+def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any:
+    message = message_type()
+    try:
+        genpy.message.fill_message_args(message, [value])
+        genpy.message.check_type("", message_type._type, message)
+    except (genpy.MessageException, ValueError, TypeError, AttributeError) as error:
+        faults.append(f"{where} is no {message_type._type}: {error}")
+    return message
