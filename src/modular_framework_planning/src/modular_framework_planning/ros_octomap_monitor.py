@@ -26,6 +26,7 @@ from modular_framework_planning.spatial import Array, Transform, make_transform
 from modular_framework_planning.voxel_map import VoxelMap, empty_map
 
 DEFAULT_RESOLUTION = 0.1  # [m]
+ATTEMPTS = 3
 WAIT_S = 1.0  # for transforms and joint positions of the moment a sensor looked
 MaskMaker = Callable[[RegionCache, Sequence[Any], Array], SightMask]
 
@@ -85,19 +86,22 @@ class OctomapMonitor:
             Which of the points that ended within range lie on the robot or on known objects (n,).
 
         Raises:
-            PlanningError: where the sensor or the robot was is not known.
+            PlanningError: where the sensor or the robot was is not known, or the map changes all the time.
         """
-        scene = self._monitor.snapshot()
         positions = self._monitor.positions_at(stamp.to_sec(), WAIT_S)
-        sensor = self._pose_in_planning_frame(scene, frame, stamp, positions)
-        into_map = self._pose_in_planning_frame(scene, self._frame, stamp, positions)
-        mask = make_mask(self._regions, bodies_in_scene(scene, positions), sensor.translation)
+        sensor = self._pose_in_planning_frame(frame, stamp, positions)
+        into_map = self._pose_in_planning_frame(self._frame, stamp, positions)
         ends, beyond = (points @ sensor.rotation.T + sensor.translation for points in (seen.ends, seen.beyond))
-        hidden = mask.hides(ends, sensor.translation, shadow)
-        hits, masked, clipped = (_into(into_map, points) for points in (ends[~hidden], ends[hidden], beyond))
-        origin = _into(into_map, sensor.translation[None])[0]
-        self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map)
-        return np.asarray(hidden)
+        origin, clipped = _into(into_map, sensor.translation[None])[0], _into(into_map, beyond)
+        for _ in range(ATTEMPTS):
+            scene = self._monitor.snapshot()
+            mask = make_mask(self._regions, bodies_in_scene(scene, positions), sensor.translation)
+            hidden = np.asarray(mask.hides(ends, sensor.translation, shadow))
+            hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
+            if self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map):
+                return hidden
+        raise PlanningError(ErrorCode.FAILURE, f"octomap: it changed during each of {ATTEMPTS} attempts to put one look "
+                            "into it; change it less often, or use larger voxels (octomap_resolution)")
 
     def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
         """The scene's map to go on with; an empty one where it has none, or one of other voxels from elsewhere."""
@@ -107,18 +111,28 @@ class OctomapMonitor:
             return empty_map(self._resolution)
         return voxels
 
-    def _replace(self, base: PlanningScene, voxels: VoxelMap, pose: Transform) -> None:
-        """Puts a map into the scene, unless that has another map or other bodies by now than the map was made for."""
+    def _replace(self, base: PlanningScene, voxels: VoxelMap, pose: Transform) -> bool:
+        """Puts a map that was made from one scene into the scene of now.
+
+        Returns:
+            False when the map has changed meanwhile. A map that was cleared meanwhile stays cleared: what was seen before
+            that is of no interest. Bodies that are new meanwhile are taken out of the map afterwards.
+        """
         octree = Octree(voxels)
         if len(octree.centers):
             octree.geometry  # noqa: B018 - built here, where nobody waits for it
+        done = []
 
         def change(scene: PlanningScene) -> PlanningScene:
-            same = (scene.octomap is base.octomap and scene.objects is base.objects
-                    and scene.attached is base.attached)
+            cleared = scene.octomap is None and base.octomap is not None
+            same = scene.octomap is base.octomap
+            if scene.objects is not base.objects or scene.attached is not base.attached:
+                self._known = {}
+            done.append(cleared or same)
             return scene.with_octomap(octree, pose) if same else scene
 
         self._monitor.apply(change)
+        return done[0]
 
     def free_new_objects(self, scene: PlanningScene) -> None:
         """Takes what is now known as an object out of the map."""
@@ -133,13 +147,20 @@ class OctomapMonitor:
         centers = scene.octomap.shapes[0][0].centers  # type: ignore[attr-defined]
         points = centers @ scene.octomap.pose.rotation.T + scene.octomap.pose.translation
         inside = mask.hides(points, np.zeros(3))
-        if inside.any():
-            self._replace(scene, voxels.freed(voxels.occupied_keys[inside]), scene.octomap.pose)
+        if not inside.any():
+            return
+        keys, resolution = voxels.occupied_keys[inside], voxels.resolution
 
-    def _pose_in_planning_frame(self, scene: PlanningScene, frame: str, stamp: rospy.Time,
-                                positions: Array) -> Transform:
-        frame = frame.removeprefix("/")
-        model = scene.model
+        def change(now: PlanningScene) -> PlanningScene:
+            newest = voxels_of(now)
+            if newest is None or newest.resolution != resolution or now.octomap is None:
+                return now
+            return now.with_octomap(Octree(newest.freed(keys)), now.octomap.pose)
+
+        self._monitor.apply(change)
+
+    def _pose_in_planning_frame(self, frame: str, stamp: rospy.Time, positions: Array) -> Transform:
+        frame, model = frame.removeprefix("/"), self._monitor.model
         if frame in ("", model.planning_frame, model.document.root_link):
             return pin.SE3.Identity()
         if model.has_link(frame):
@@ -168,8 +189,7 @@ class OctomapMonitor:
     def _load(self, request: Any) -> LoadMapResponse:
         try:
             octree = Octree(read_file(Path(request.filename)))
-            scene = self._monitor.snapshot()
-            pose = self._pose_in_planning_frame(scene, self._frame, rospy.Time(0), scene.positions)
+            pose = self._pose_in_planning_frame(self._frame, rospy.Time(0), self._monitor.positions())
             self._monitor.apply(lambda scene: scene.with_octomap(octree, pose))
         except PlanningError as error:
             rospy.logerr("%s: %s", rospy.resolve_name(names.LOAD_MAP_SERVICE), error.reason)
