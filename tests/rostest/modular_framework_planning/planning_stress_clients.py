@@ -277,7 +277,8 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
             "kinds": dict(Counter(item.kind for item in asking.answers)), "wrong": len(wrong) + len(asking.errors),
             "timeouts": sum(item.code in TIMED_OUT for item in asking.answers), "unanswered": unanswered,
             "scene_changes": world.changes, "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
-            "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2), "rss_mb_every_tenth": memory.tenths(),
+            "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2),
+            "rss_mb_every_tenth": memory.tenths(),
             "wrong_answers": wrong[:10] + asking.errors[:10]}
 
 

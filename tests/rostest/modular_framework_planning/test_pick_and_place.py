@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import actionlib
+import moveit_commander
 import numpy as np
 import pytest
 import rospy
@@ -274,6 +275,18 @@ def test_a_wall_that_appears_while_the_arm_goes_there_ends_the_pick(pickup: Any,
     assert result.error_code.val == CODES.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
     assert "executing 'plan'" in pickup.get_goal_status_text() and "'lid'" in pickup.get_goal_status_text()
     assert not held() and CLOSED not in arm.grips
+
+
+def test_moveit_commander_picks_and_places(arm: FakeArm) -> None:
+    group = moveit_commander.MoveGroupCommander(GROUP, wait_for_servers=30.0)
+    group.set_support_surface_name("table")
+    group.set_planning_time(10.0)
+    assert group.pick("block", [grasp("far", 0.9, (0.1, 2.0, 0.9)), grasp()], plan_only=True) == OK
+    assert group.pick("block", grasp("far", 0.9, (0.1, 2.0, 0.9)), plan_only=True) == CODES.NO_IK_SOLUTION
+    assert not held()
+    assert group.pick("block", grasp()) == OK and held() == ["block"]
+    assert group.place("block", place_goal().place_locations, plan_only=True) is True
+    assert group.place("block", place_goal().place_locations) is True and not held()
 
 
 NAN = float("nan")
