@@ -100,7 +100,7 @@ class OctomapMonitor:
             hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
             if self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map):
                 return hidden
-        raise PlanningError(ErrorCode.FAILURE, f"octomap: it changed during each of {ATTEMPTS} attempts to put one look "
+        raise PlanningError(ErrorCode.FAILURE, f"octomap: it changed during each of {ATTEMPTS} attempts to put a look "
                             "into it; change it less often, or use larger voxels (octomap_resolution)")
 
     def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
@@ -115,8 +115,8 @@ class OctomapMonitor:
         """Puts a map that was made from one scene into the scene of now.
 
         Returns:
-            False when the map has changed meanwhile. A map that was cleared meanwhile stays cleared: what was seen before
-            that is of no interest. Bodies that are new meanwhile are taken out of the map afterwards.
+            False when the map has changed meanwhile. A map that was cleared meanwhile stays cleared: what was seen
+            before that is of no interest. Bodies that are new meanwhile are taken out of the map afterwards.
         """
         octree = Octree(voxels)
         if len(octree.centers):
