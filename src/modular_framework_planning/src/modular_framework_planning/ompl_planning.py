@@ -1,165 +1,204 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs OMPL's geometric planners on a joint-space problem, by MoveIt's planner names."""
+"""Searches the joint space of a group with OMPL's geometric planners."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import ompl.base as ob
-import ompl.geometric as og
 import ompl.util as ou
 
+from modular_framework_planning.constrained_search import ConstrainedSearch, constraints_are_tight
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.ompl_planners import ANYTIME, PLANNERS, THREADED, make_planner, parameter_faults
+from modular_framework_planning.ompl_projection import projection_evaluator
 from modular_framework_planning.path_shortening import path_length
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.spatial import Array
 
-# PRM and PRMstar are left out: they wait for a thread of their own that needs the interpreter lock they hold.
-PLANNERS: dict[str, type] = {
-    "AORRTC": og.AORRTC, "BFMT": og.BFMT, "BITstar": og.BITstar, "BKPIECE": og.BKPIECE1, "FMT": og.FMT,
-    "InformedRRTstar": og.InformedRRTstar, "KPIECE": og.KPIECE1, "LBKPIECE": og.LBKPIECE1, "RRT": og.RRT,
-    "RRTConnect": og.RRTConnect, "RRTstar": og.RRTstar, "SORRTstar": og.SORRTstar,
-}
-DEFAULT_PLANNER = "RRTConnect"
-DEFAULT_RANGE = 0.5  # [rad or m]; a fifth of the space, OMPL's own choice, makes edges so long that few are free
-_SETTERS = {"range": "setRange", "goal_bias": "setGoalBias", "border_fraction": "setBorderFraction",
-            "num_samples": "setNumSamples", "radius_multiplier": "setRadiusMultiplier"}
-
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
-@dataclass(frozen=True, slots=True)
-class JointProblem:
-    """A start, goals and tests in the joint space of one group.
-
-    Attributes:
-        lower, upper: bounds of the search, shape (joints,).
-        start: joint vector; goals: alternatives, shape (n, joints).
-        state_is_free, edge_is_free: the tests.
-        cancelled: true when somebody asked to stop.
-    """
-
-    lower: Array
-    upper: Array
-    start: Array
-    goals: Array
-    state_is_free: Callable[[Array], bool]
-    edge_is_free: Callable[[Array, Array], bool]
-    cancelled: Callable[[], bool] = field(default=lambda: False)
-
-
-class _EdgeValidator(ob.MotionValidator):
-    """Hands whole edges to the problem's test; `release` breaks the tie to the collision world afterwards."""
-
-    def __init__(self, information: Any, problem: JointProblem) -> None:
-        super().__init__(information)
-        self._test: Callable[[Array, Array], bool] | None = problem.edge_is_free
-        self._count = len(problem.start)
-
-    def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802 - OMPL calls it by this name
-        """Whether the straight motion is free."""
-        if self._test is None:
-            return False
-        return bool(self._test(np.array(first[0:self._count]), np.array(second[0:self._count])))
-
-    def release(self) -> None:
-        """Lets go of the collision world."""
-        self._test = None
-
-
-def _make_planner(kind: str, settings: Mapping[str, Any], information: Any) -> Any:
-    planner = PLANNERS[kind](information)
-    if hasattr(planner, "setRange"):
-        planner.setRange(DEFAULT_RANGE)
-    for key, value in settings.items():
-        setter = getattr(planner, _SETTERS.get(key, ""), None)
-        number = float(value) if isinstance(value, int | float | str) and str(value).strip() else 0.0
-        if setter is not None and not (key == "range" and number <= 0.0):  # range 0: the default below stays
-            setter(int(number) if key == "num_samples" else number)
-    return planner
-
-
-def solve(problem: JointProblem, planner_id: str, settings: Mapping[str, Any], deadline: float) -> Array | None:
-    """Searches for a path.
-
-    Args:
-        problem: what to solve.
-        planner_id: key of PLANNERS.
-        settings: its parameters in ompl_planning.yaml's words.
-        deadline: monotonic time [s] at which to give up.
-
-    Returns:
-        Vertices of shape (n, joints) from the start to one of the goals, or None when the time ran out.
-    """
-    count = len(problem.start)
-    space = ob.RealVectorStateSpace(count)
-    bounds = ob.RealVectorBounds(count)
-    for number in range(count):
-        bounds.setLow(number, float(problem.lower[number]))
-        bounds.setHigh(number, float(problem.upper[number]))
-    space.setBounds(bounds)
-    information = ob.SpaceInformation(space)
-    validator = _EdgeValidator(information, problem)
-    information.setStateValidityChecker(lambda state: bool(problem.state_is_free(np.array(state[0:count]))))
-    information.setMotionValidator(validator)
-    information.setup()
-    definition = ob.ProblemDefinition(information)
-    definition.addStartState(_state(information, problem.start))
-    goal = ob.GoalStates(information)
-    for values in problem.goals:
-        goal.addState(_state(information, values))
-    definition.setGoal(goal)
-    planner = _make_planner(planner_id, settings, information)
-    planner.setProblemDefinition(definition)
-    planner.setup()
-    condition = ob.PlannerTerminationCondition(lambda: bool(time.monotonic() > deadline or problem.cancelled()))
-    try:
-        planner.solve(condition)
-        return _vertices(definition, count)
-    finally:
-        validator.release()
-        information.setStateValidityChecker(lambda state: False)
-
-
-def _state(information: Any, values: Array) -> Any:
-    state = information.allocState()
-    for number, value in enumerate(values):
-        state[number] = float(value)
-    return state
-
-
-def _vertices(definition: Any, count: int) -> Array | None:
-    if not definition.hasExactSolution():
-        return None
-    return np.array([list(state[0:count]) for state in definition.getSolutionPath().getStates()])
-
-
 class OmplPlanner:
-    """Samples the joint space of the group with one of OMPL's geometric planners."""
+    """Samples the joint space of the group.
 
-    planner_ids = (DEFAULT_PLANNER, *sorted(name for name in PLANNERS if name != DEFAULT_PLANNER))
+    Parameters below a planner's configuration or the group: those of the planner (see ompl_planners.py),
+    `projection_evaluator`, `longest_valid_segment_fraction` (edges are checked at least that finely, as a share of
+    the extent of the joint space) and `maximum_waypoint_distance` [rad]; `seeded_iterations` of the pipeline.
+    """
+
+    planner_ids = tuple(PLANNERS)
+    description = "OMPL"
+
+    @staticmethod
+    def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:
+        """Says which settings of a planner are unknown or unreadable."""
+        return parameter_faults(planner_id, settings)
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the shortest of `attempts` paths; the straight way where that is valid."""
+        """Returns the shortest of the paths that `attempts` searches find; the straight way where that is valid.
+
+        Raises:
+            PlanningError: no path was found, a setting is wrong, or the planner cannot do what is asked.
+        """
         begun = time.monotonic()
         start, goals = problem.start_values, problem.goal_states()
+        step = edge_step(problem)
         for goal in goals:
-            if problem.edge_is_valid(start, goal):
+            if problem.edge_is_valid(start, goal, step):
                 return PlannedPath(np.vstack([start, goal]))
-        lower, upper = problem.bounds
-        lower = np.maximum(lower, np.minimum(start, goals.min(axis=0)) - 2.0 * np.pi)
-        upper = np.minimum(upper, np.maximum(start, goals.max(axis=0)) + 2.0 * np.pi)
-        search = JointProblem(lower, upper, start, goals, problem.state_is_valid, problem.edge_is_valid,
-                              problem.cancelled)
-        paths = []
+        if problem.constraints is not None and constraints_are_tight(problem):
+            return ConstrainedSearch(problem, step).run()
+        if problem.repeatable and problem.planner_id in THREADED:
+            raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' works in threads and "
+                                "cannot repeat a plan; choose another planner or do not set a seed")
+        paths, states = [], 0
         for _ in range(max(1, problem.request.attempts)):
-            path = solve(search, problem.planner_id, problem.planner_parameters, problem.deadline_s)
+            search = _Search(problem, goals, step)
+            path = search.run()
+            states += search.states
             if path is not None:
                 paths.append(path)
             if problem.interrupted():
                 break
         if not paths:
-            raise no_path(problem, begun, problem.planner_id)
+            raise no_path(problem, begun, problem.planner_id, states)
         return PlannedPath(min(paths, key=path_length))
+
+
+def edge_step(problem: PlanningProblem) -> float:
+    """Returns the distance of checks along an edge [rad or m] that the problem and the group's parameters ask for."""
+    step = problem.step
+    low, high = problem.bounds
+    extent = float(np.linalg.norm(np.minimum(high - low, 4.0 * np.pi)))
+    for key, unit in (("longest_valid_segment_fraction", extent), ("maximum_waypoint_distance", 1.0)):
+        value = problem.planner_parameters.get(key)
+        try:
+            size = float(str(value)) * unit if value is not None else 0.0
+        except ValueError as error:
+            raise PlanningError(ErrorCode.PLANNING_FAILED, f"{key} of group '{problem.group.name}' is '{value}'; it "
+                                "must be a number above 0") from error
+        step = min(step, size) if size > 0.0 else step
+    return max(step, problem.settings.motion_step)
+
+
+class _EdgeValidator(ob.MotionValidator):
+    """Hands whole edges to the search; `release` breaks the tie to the collision world afterwards."""
+
+    def __init__(self, information: Any, search: _Search) -> None:
+        super().__init__(information)
+        self._search: _Search | None = search
+
+    def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802 - OMPL calls it by this name
+        """Whether the straight motion is free."""
+        return self._search is not None and self._search.edge_is_valid(first, second)
+
+    def release(self) -> None:
+        """Lets go of the collision world."""
+        self._search = None
+
+
+class _Search:
+    """One run of one planner."""
+
+    def __init__(self, problem: PlanningProblem, goals: Array, step: float) -> None:
+        self._problem, self._goals, self._step = problem, goals, step
+        self._count = len(problem.group.joints)
+        self._condition: Any = None
+        self._iterations = 0
+        self.states = 0
+
+    def run(self) -> Array | None:
+        """Returns vertices of shape (n, joints) from the start to one of the goals, or None.
+
+        Raises:
+            PlanningError: a setting is wrong.
+        """
+        problem = self._problem
+        information = ob.SpaceInformation(self._space())
+        validator = _EdgeValidator(information, self)
+        information.setStateValidityChecker(self._state_is_valid)
+        information.setMotionValidator(validator)
+        information.setup()
+        definition = ob.ProblemDefinition(information)
+        definition.addStartState(self._state(information, problem.start_values))
+        goal = ob.GoalStates(information)
+        for values in self._goals:
+            goal.addState(self._state(information, values))
+        definition.setGoal(goal)
+        planner = make_planner(problem.planner_id, problem.planner_parameters, information)
+        text = str(problem.planner_parameters.get("projection_evaluator") or "")
+        projection = None
+        if text and hasattr(planner, "setProjectionEvaluator"):
+            projection = projection_evaluator(text, problem, information.getStateSpace())
+            planner.setProjectionEvaluator(projection)
+        try:
+            planner.setProblemDefinition(definition)
+            planner.setup()
+            self._condition = self._termination()
+            planner.solve(self._condition)
+            return self._vertices(definition)
+        finally:
+            self._condition = None
+            validator.release()
+            if hasattr(projection, "release"):
+                projection.release()
+            information.setStateValidityChecker(lambda state: False)
+
+    def _space(self) -> Any:
+        """Returns the joint space, no wider than two turns around the start and the goals."""
+        start, goals = self._problem.start_values, self._goals
+        low, high = self._problem.bounds
+        low = np.maximum(low, np.minimum(start, goals.min(axis=0)) - 2.0 * np.pi)
+        high = np.minimum(high, np.maximum(start, goals.max(axis=0)) + 2.0 * np.pi)
+        space, bounds = ob.RealVectorStateSpace(self._count), ob.RealVectorBounds(self._count)
+        for number in range(self._count):
+            bounds.setLow(number, float(low[number]))
+            bounds.setHigh(number, float(high[number]))
+        space.setBounds(bounds)
+        return space
+
+    def _termination(self) -> Any:
+        """Returns when to stop: the clock, or a number of iterations where the plan must be repeatable."""
+        problem = self._problem
+        if problem.planner_id in THREADED:
+            return ob.timedPlannerTerminationCondition(max(1e-3, problem.deadline_s - time.monotonic()))
+        if not problem.repeatable:
+            return ob.PlannerTerminationCondition(problem.interrupted)
+        limit = problem.settings.seeded_iterations if problem.planner_id in ANYTIME else None
+
+        def stop() -> bool:
+            self._iterations += 1
+            if problem.interrupted():
+                return True
+            return limit is not None and self._iterations > limit
+
+        return ob.PlannerTerminationCondition(stop)
+
+    def _state_is_valid(self, state: Any) -> bool:
+        self.states += 1
+        if self._problem.cancelled() and self._condition is not None:
+            self._condition.terminate()
+            return False
+        return bool(self._problem.state_is_valid(np.array(state[0:self._count])))
+
+    def edge_is_valid(self, first: Any, second: Any) -> bool:
+        """Whether the straight motion between two OMPL states is free and keeps the constraints."""
+        self.states += 1
+        return bool(self._problem.edge_is_valid(np.array(first[0:self._count]), np.array(second[0:self._count]),
+                                                self._step))
+
+    def _state(self, information: Any, values: Array) -> Any:
+        state = information.allocState()
+        for number, value in enumerate(values):
+            state[number] = float(value)
+        return state
+
+    def _vertices(self, definition: Any) -> Array | None:
+        if not definition.hasExactSolution():
+            return None
+        if self._problem.repeatable and self._problem.interrupted():
+            return None  # what was found until the clock ran out is not what the next run finds
+        return np.array([list(state[0:self._count]) for state in definition.getSolutionPath().getStates()])

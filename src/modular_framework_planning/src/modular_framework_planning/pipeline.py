@@ -2,6 +2,7 @@
 """One planning pipeline: a planner, the request adapters around it, and the check every motion has to pass."""
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from modular_framework_planning.adapters.limit_max_cartesian_link_speed import LimitMaxCartesianLinkSpeed
 from modular_framework_planning.adapters.request_adapter import RequestAdapter, chain
 from modular_framework_planning.collision import ATTACHED, WORLD, CollisionChecker
 from modular_framework_planning.contact_report import describe_contacts as describe_contacts
@@ -86,15 +88,19 @@ class PlanningPipeline:
         check = getattr(self._planner, "parameter_faults", None)
         return list(check(kind, parameters)) if check else []
 
-    def plan(self, request: PlanningRequest) -> PlanningAnswer:
+    def plan(self, request: PlanningRequest, repeatable: bool = False) -> PlanningAnswer:
         """Plans a motion.
+
+        Args:
+            request: what to plan.
+            repeatable: bound searches by iterations; the clock only ends them with a failure.
 
         Raises:
             PlanningError: with the code and the reason; nothing is returned by halves.
         """
         begun = time.monotonic()
-        problem = self._problem(request, begun)
-        run = chain(self._adapters, self._search)
+        problem = replace(self._problem(request, begun), repeatable=repeatable)
+        run = chain(self._adapters_for(request), self._search)
         fault = ""
         for step in self._steps():
             path = run(replace(problem, step=step, _goals=[]))
@@ -105,6 +111,13 @@ class PlanningPipeline:
                 break
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion found fails the last check: {fault}; move "
                             "the goal or the start away from contact")
+
+    def _adapters_for(self, request: PlanningRequest) -> tuple[RequestAdapter, ...]:
+        """Returns the adapters; a speed limit that is asked for is kept even where no parameter names its adapter."""
+        if request.max_cartesian_speed == 0.0 or any(isinstance(item, LimitMaxCartesianLinkSpeed)
+                                                     for item in self._adapters):
+            return self._adapters
+        return LimitMaxCartesianLinkSpeed(), *self._adapters
 
     def _steps(self) -> tuple[float, ...]:
         """Edge steps of the search; a motion that fails the last check is searched again with the next."""
@@ -215,7 +228,7 @@ class PlanningPipeline:
 
 
 def _require_start(problem: PlanningProblem) -> None:
-    """Raises PlanningError unless the start is within bounds and free."""
+    """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
     faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
     if faults:
         raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {'; '.join(faults)}; move the robot within "
@@ -225,12 +238,18 @@ def _require_start(problem: PlanningProblem) -> None:
         raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state in collision: "
                             f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
                             "FixStartStateCollision")
+    if problem.constraints is not None and not problem.constraints.satisfied(problem.start):
+        raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
+                            f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "
+                            "path constraints or use the adapter FixStartStatePathConstraints")
 
 
 def _shortened(problem: PlanningProblem, path: Array) -> Array:
     """Shortens a path; what it accepts was also looked at on the fine grid."""
     now = time.monotonic()
     limit = min(max(problem.deadline_s, now + 0.05), now + MAX_SHORTENING_S)
+    if problem.repeatable:
+        limit = math.inf
     fine = min(problem.step, FINE_STEPS * problem.settings.motion_step)
 
     def edge(first: Array, second: Array) -> bool:

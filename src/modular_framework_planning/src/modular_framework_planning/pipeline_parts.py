@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib
 import re
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from modular_framework_planning.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -12,12 +13,16 @@ from modular_framework_planning.planner_interface import Planner
 from modular_framework_planning.planning_request import PipelineSettings
 from modular_framework_planning.robot_model import RobotModel
 
+if TYPE_CHECKING:
+    from modular_framework_planning.kinematics import KinematicsPool
+    from modular_framework_planning.pipeline import PlanningPipeline
+
 PACKAGE = "modular_framework_planning"
 PLANNERS = {
     "ompl_interface/OMPLPlanner": f"{PACKAGE}.ompl_planning/OmplPlanner",
     "pilz_industrial_motion_planner/CommandPlanner": f"{PACKAGE}.pilz.command_planner/CommandPlanner",
-    "stomp_moveit/StompPlannerManager": f"{PACKAGE}.stomp/StompPlanner",
-    "stomp_moveit/StompPlanner": f"{PACKAGE}.stomp/StompPlanner",
+    "stomp_moveit/StompPlannerManager": f"{PACKAGE}.stomp.planner/StompPlanner",
+    "stomp_moveit/StompPlanner": f"{PACKAGE}.stomp.planner/StompPlanner",
 }
 ADAPTERS = ("AddIterativeSplineParameterization", "AddRuckigTrajectorySmoothing", "AddTimeOptimalParameterization",
             "AddTimeParameterization", "FixStartStateBounds", "FixStartStateCollision",
@@ -28,6 +33,28 @@ MOVEIT_ADAPTERS = "default_planner_request_adapters"
 DEFAULT_ADAPTERS = " ".join(f"{MOVEIT_ADAPTERS}/{name}" for name in (
     "LimitMaxCartesianLinkSpeed", "AddTimeOptimalParameterization", "FixWorkspaceBounds", "FixStartStateBounds",
     "FixStartStateCollision", "FixStartStatePathConstraints"))
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineSpec:
+    """How a pipeline is built; can be sent to another process.
+
+    Attributes:
+        name: what `pipeline_id` calls it.
+        planner, adapters: parameters planning_plugin and request_adapters.
+    """
+
+    name: str
+    planner: str
+    adapters: str
+    settings: PipelineSettings
+
+    def build(self, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
+        """Builds the pipeline; raises PlanningError for an unknown part or a parameter a part refuses."""
+        from modular_framework_planning.pipeline import PlanningPipeline
+
+        return PlanningPipeline(model, kinematics, self.settings, make_planner(self.planner, model, self.settings),
+                                make_adapters(self.adapters), self.name)
 
 
 def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> Planner:

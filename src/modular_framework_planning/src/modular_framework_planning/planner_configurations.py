@@ -26,6 +26,16 @@ class PlannerConfigurations:
         with self._lock:
             return {**self._entries.get(("", name), {}), **(self._entries.get((group, name), {}) if group else {})}
 
+    def snapshot(self) -> dict[tuple[str, str], dict[str, Any]]:
+        """Returns everything, for `restore` in another process."""
+        with self._lock:
+            return {key: dict(entry) for key, entry in self._entries.items()}
+
+    def restore(self, entries: Mapping[tuple[str, str], Mapping[str, Any]]) -> None:
+        """Takes over what `snapshot` returned."""
+        with self._lock:
+            self._entries = {key: dict(entry) for key, entry in entries.items()}
+
     def set(self, name: str, group: str, values: Mapping[str, Any], replace: bool) -> None:
         """Changes settings.
 

@@ -87,22 +87,9 @@ class PlanningProblem:
             PlanningError: there is none; says why.
         """
         if not self._goals:
-            free = GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
-                                self.rng, self.constraints).resolve()
-            self._goals.append(self._constrained(free))
+            self._goals.append(GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
+                                            self.rng, self.constraints).resolve())
         return self._goals[0]
-
-    def _constrained(self, goals: Array) -> Array:
-        """Returns the goals that satisfy the path constraints; raises PlanningError where none does."""
-        constraints = self.constraints
-        if constraints is None:
-            return goals
-        kept = [values for values in goals if constraints.satisfied(self.motion.whole(values))]
-        if not kept:
-            raise PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, "goal: "
-                                f"{constraints.describe(self.motion.whole(goals[0]))}; none of {len(goals)} free goal "
-                                "states satisfies the path constraints: move the goal or widen the tolerances")
-        return np.array(kept)
 
     def state_is_valid(self, values: Array) -> bool:
         """Whether a joint vector is free of collisions and satisfies the path constraints."""

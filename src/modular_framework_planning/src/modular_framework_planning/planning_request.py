@@ -56,6 +56,7 @@ class PipelineSettings:
         parameters: everything below the pipeline's name on the parameter server.
         robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
         seed: of every plan of the pipeline; None for fresh random numbers each time.
+        seeded_iterations: after how many a planner that goes on to improve its path stops, where a seed is set.
     """
 
     start_state_max_bounds_error: float = 0.1
@@ -75,6 +76,7 @@ class PipelineSettings:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
+    seeded_iterations: int = 2000
 
     def default_planner(self, group: str) -> str:
         """Returns the planner of requests that name none; empty where no parameter says."""

@@ -67,6 +67,7 @@ class RobotModel:
 
     def __init__(self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None,
                  resolve: MeshResolver = package_resolver) -> None:
+        self.source = (urdf, srdf, dict(limits or {}), resolve)  # makes the same robot in another process
         self.document = load_urdf(urdf, resolve)
         self.semantics: SemanticDescription = parse_srdf(srdf)
         self.name = self.document.robot_name

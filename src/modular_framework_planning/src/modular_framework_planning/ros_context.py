@@ -33,7 +33,7 @@ class MoveGroupContext:
         Raises:
             PlanningError: no such pipeline, or no plan; code and reason.
         """
-        return self.pipelines.choose(request.pipeline_id).plan(request)
+        return self.pipelines.plan(request)
 
     @property
     def default_pipeline(self) -> str:

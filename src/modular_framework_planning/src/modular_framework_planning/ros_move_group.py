@@ -75,6 +75,7 @@ def advertise(context: MoveGroupContext) -> None:
     context.markers.show_scene(context.monitor.snapshot())
     context.execution.connect()
     rospy.on_shutdown(context.execution.close)
+    rospy.on_shutdown(context.pipelines.close)
     for capability in chosen_capabilities(CAPABILITIES):
         capability(context).connect()
 

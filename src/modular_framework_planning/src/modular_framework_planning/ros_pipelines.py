@@ -11,9 +11,10 @@ import rospy
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import DEFAULT_PLANNER, PlanningPipeline
-from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, make_adapters, make_planner
-from modular_framework_planning.planning_request import PipelineSettings
+from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, PipelineSpec
+from modular_framework_planning.planning_request import PipelineSettings, PlanningAnswer, PlanningRequest
 from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.seeded_planning import SeededPlanning
 
 ROBOT_PLANNING = "robot_description_planning"
 PARENT = "~planning_pipelines"
@@ -22,9 +23,17 @@ PARENT = "~planning_pipelines"
 class PipelineSet(Mapping[str, PlanningPipeline]):
     """The pipelines of the node, by name."""
 
-    def __init__(self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str]) -> None:
-        """Args: the pipelines; which one an empty name means; why others, which the parameters name, are not there."""
-        self._loaded, self.default, self._refused = dict(loaded), default, dict(refused)
+    def __init__(self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str],
+                 seeded: SeededPlanning) -> None:
+        """Stores the parts.
+
+        Args:
+            loaded: the pipelines.
+            default: name of the one an empty name means.
+            refused: why others, which the parameters name, are not there.
+            seeded: plans requests with a seed.
+        """
+        self._loaded, self.default, self._refused, self._seeded = dict(loaded), default, dict(refused), seeded
 
     def __getitem__(self, name: str) -> PlanningPipeline:
         return self._loaded[name]
@@ -34,6 +43,16 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
 
     def __len__(self) -> int:
         return len(self._loaded)
+
+    def plan(self, request: PlanningRequest) -> PlanningAnswer:
+        """Plans with the pipeline the request names; in a process of its own where it or the pipeline has a seed."""
+        pipeline = self.choose(request.pipeline_id)
+        seed = pipeline.settings.seed if request.seed is None else request.seed
+        return pipeline.plan(request) if seed is None else self._seeded.plan(pipeline, request, seed)
+
+    def close(self) -> None:
+        """Ends what runs in other processes."""
+        self._seeded.close()
 
     def choose(self, name: str) -> PlanningPipeline:
         """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
@@ -89,9 +108,12 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet
     parameters, default = pipeline_parameters()
     loaded: dict[str, PlanningPipeline] = {}
     refused: dict[str, str] = {}
+    specs: list[PipelineSpec] = []
     for name, item in parameters.items():
         try:
-            loaded[name] = _build(name, item, model, kinematics)
+            spec = _spec(name, item)
+            loaded[name] = _build(spec, model, kinematics)
+            specs.append(spec)
         except PlanningError as error:
             refused[name] = error.reason
     if default not in loaded:
@@ -100,17 +122,22 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet
                          f"{reason}; usable: {', '.join(loaded) or 'none'}")
     for name, reason in refused.items():
         rospy.logwarn("planning pipeline '%s' is left out: %s", name, reason)
-    return PipelineSet(loaded, default, refused)
+    seeded = SeededPlanning(model, specs)
+    if any(pipeline.settings.seed is not None for pipeline in loaded.values()):
+        seeded.start()
+    return PipelineSet(loaded, default, refused, seeded)
 
 
-def _build(name: str, parameters: Mapping[str, Any], model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
-    settings = pipeline_settings(parameters)
-    planner = make_planner(str(parameters.get("planning_plugin") or DEFAULT_PLANNER), model, settings)
+def _spec(name: str, parameters: Mapping[str, Any]) -> PipelineSpec:
     given = parameters.get("request_adapters")
-    adapters = make_adapters(DEFAULT_ADAPTERS if given is None else
-                             " ".join(given) if isinstance(given, list) else str(given))
-    pipeline = PlanningPipeline(model, kinematics, settings, planner, adapters, name)
+    adapters = DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given)
+    return PipelineSpec(name, str(parameters.get("planning_plugin") or DEFAULT_PLANNER), adapters,
+                        pipeline_settings(parameters))
+
+
+def _build(spec: PipelineSpec, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
+    pipeline = spec.build(model, kinematics)
     for configuration in pipeline.configurations.names():
         for fault in pipeline.parameter_faults(configuration):
-            rospy.logwarn("planning pipeline '%s', planner_configs/%s: %s", name, configuration, fault)
+            rospy.logwarn("planning pipeline '%s', planner_configs/%s: %s", spec.name, configuration, fault)
     return pipeline
