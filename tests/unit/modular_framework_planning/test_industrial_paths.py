@@ -38,7 +38,7 @@ def test_phases_are_those_of_the_closed_form(distance: float, limits: tuple[floa
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.floats(1e-5, 50.0), st.floats(0.01, 5.0), st.floats(0.01, 20.0), st.floats(0.01, 20.0))
+@given(st.floats(1e-5, 50.0), st.floats(0.05, 5.0), st.floats(0.01, 20.0), st.floats(0.01, 20.0))
 def test_profiles_go_the_distance_within_limits_and_rest_at_both_ends(
         distance: float, velocity: float, acceleration: float, deceleration: float) -> None:
     profile = fastest_profile(distance, velocity, acceleration, deceleration)
@@ -51,8 +51,8 @@ def test_profiles_go_the_distance_within_limits_and_rest_at_both_ends(
     assert speed.max() <= velocity * (1 + 1e-9) and speed.min() >= -1e-9 * velocity
     assert change.max() <= acceleration * (1 + 1e-6) and change.min() >= -deceleration * (1 + 1e-6)
     points = sample_times(profile.duration_s, profile.knots, 0.1)
-    assert points[0] == 0.0 and points[-1] == profile.duration_s and (np.diff(points) >= 0.99e-4).all()
-    assert np.diff(points).max() <= 0.1 + 1e-9
+    assert points[0] == 0.0 and points[-1] == pytest.approx(profile.duration_s, abs=1e-9)
+    assert np.diff(points).min() >= 0.99e-4 and np.diff(points).max() <= 0.1 + 1e-8
 
 
 def test_the_rotation_speeds_up_in_the_ratio_of_the_translation() -> None:

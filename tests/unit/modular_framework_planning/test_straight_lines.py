@@ -92,6 +92,8 @@ def test_jumps_end_the_line_and_name_the_joint(solver: InverseKinematics, jumps:
 
 @pytest.mark.parametrize(("changes", "text"), [
     ({"max_step_m": 0.0}, "max_step is 0.0"), ({"max_step_m": float("nan")}, "max_step is nan"),
+    ({"max_step_m": 1e-9}, "at most 50000 are followed"),
+    ({"waypoints": [pin.SE3.Identity()] * 50_001}, "waypoints: 50001; at most 50000"),
     ({"waypoints": []}, "at least one pose"), ({"jumps": JumpThresholds(factor=-1.0)}, "'factor' is -1.0"),
     ({"link": "nobody"}, "nobody")])
 def test_requests_without_meaning_are_refused(solver: InverseKinematics, changes: dict[str, object], text: str) -> None:

@@ -21,6 +21,7 @@ from modular_framework_planning.spatial import Array, Transform
 
 LONGEST_STEP_M = 0.01  # a longer max_step is followed in steps of this length
 RADIANS_PER_METRE = 3.5  # a step of 0.01 m may turn by 0.035 rad, as in MoveIt
+MOST_STEPS = 50_000  # of one request
 FEWEST_STEPS_FOR_MEAN = 10  # of a line, where a jump is told by the mean step
 
 Objection = Callable[[Array, Array], str]
@@ -102,16 +103,18 @@ def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints:
         objection: told the joint values before and after each step; says why it is not allowed, or nothing.
 
     Raises:
-        PlanningError: the step is not above 0, a threshold is below 0, there is no waypoint, or the link is not
-            moved by the group.
+        PlanningError: the step is not above 0 or gives more than 50,000 steps, a threshold is below 0, there is no
+            waypoint, or the link is not moved by the group.
     """
     _require_usable(waypoints, max_step_m, jumps)
     follower = PoseFollower(solver, link, start)
     rows = [np.array(start[follower.group.indices], dtype=float)]
     reached: list[int] = []
-    pose = follower.pose(rows[0])
-    for number, waypoint in enumerate(waypoints):
-        line = _Line(follower, pose, waypoint, min(max_step_m, LONGEST_STEP_M), jumps, objection)
+    poses = [follower.pose(rows[0]), *waypoints]
+    lines = [_Line(follower, before, after, min(max_step_m, LONGEST_STEP_M), jumps, objection)
+             for before, after in zip(poses[:-1], poses[1:], strict=True)]
+    _require_countable(lines, max_step_m)
+    for number, line in enumerate(lines):
         followed, stop, code = line.follow(rows[-1])
         rows += followed
         if stop:
@@ -119,13 +122,15 @@ def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints:
             return StraightLine(np.array(rows), fraction, tuple(reached), f"waypoint {number}, step "
                                 f"{len(followed) + 1} of {line.count}: {stop}", code)
         reached.append(len(rows) - 1)
-        pose = waypoint
     return StraightLine(np.array(rows), 1.0, tuple(reached), "", ErrorCode.SUCCESS)
 
 
 def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: JumpThresholds) -> None:
     if not waypoints:
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "waypoints: there is none; give at least one pose")
+    if len(waypoints) > MOST_STEPS:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"waypoints: {len(waypoints)}; at most {MOST_STEPS} are "
+                            "followed: thin them out")
     if not (np.isfinite(max_step_m) and max_step_m > 0.0):
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_step is {max_step_m}; a length above 0 m is needed")
     for name in ("factor", "prismatic", "revolute"):
@@ -133,6 +138,13 @@ def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: Ju
         if not (np.isfinite(value) and value >= 0.0):
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"jump threshold '{name}' is {value}; it must be above "
                                 "0, or 0 for no such test")
+
+
+def _require_countable(lines: Sequence[_Line], max_step_m: float) -> None:
+    steps = sum(line.count for line in lines)
+    if steps > MOST_STEPS:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{len(lines)} waypoints with max_step {max_step_m} m take "
+                            f"{steps} steps; at most {MOST_STEPS} are followed: choose a longer step or fewer lines")
 
 
 class _Line:
