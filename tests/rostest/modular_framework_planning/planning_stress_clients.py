@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 from xmlrpc.client import ServerProxy
 
-import actionlib
 import coal
 import numpy as np
 import rosgraph
@@ -27,6 +26,8 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from planning_wire import ARM, LAUNCH, OK, START, FakeArm, add, box, joint_goal, plan, request
+
+from modular_framework_control.ros_action_client import SteadyActionClient
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit/modular_framework_planning"))
 from independent_checker import IndependentChecker, pose_matrix  # noqa: E402
@@ -151,7 +152,7 @@ class Clients:
 
     def _ask_action(self, _: int) -> None:
         """The wall comes as planning_scene_diff."""
-        client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+        client = SteadyActionClient("move_group", MoveGroupAction)
         assert client.wait_for_server(rospy.Duration(10.0))
         while time.monotonic() < self._end:
             walls, wanted, kind = self._question()

@@ -24,6 +24,7 @@ WITH_MARKER = LAUNCH.replace("</launch>", f"""  <include file="{LAUNCH_FILE}">
     <arg name="acceleration_scaling" value="0.5"/>
   </include>
 </launch>""")
+WORDS_ABOVE_TIP_M = 0.45
 NEAR = (0.1, 0.5, 0.95)
 GREEN, RED = (0.2, 0.8, 0.3), (0.9, 0.15, 0.1)
 
@@ -76,7 +77,7 @@ class Rviz:
     def goal_is_at(self, *place: float) -> bool:
         """Whether the words above the goal are above this place [m]."""
         text = next((item.pose.position for item in self.ghosts["goal"] if item.ns == "status"), None)
-        return text is not None and np.allclose([text.x, text.y, text.z - 0.25], place, atol=1e-4)
+        return text is not None and np.allclose([text.x, text.y, text.z - WORDS_ABOVE_TIP_M], place, atol=1e-4)
 
     def press(self, name: str) -> None:
         self._panel[name].publish(Empty())

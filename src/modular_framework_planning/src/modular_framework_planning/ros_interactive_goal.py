@@ -26,6 +26,7 @@ from modular_framework_planning.spatial import Array
 VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
 START_COLOR = (0.2, 0.4, 0.9, 0.4)
 RANDOM_ATTEMPTS = 200
+WORDS_ABOVE_TIP_M = 0.45  # clear of the hand
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
 DEFAULT_PLANNER = "move_group's default"
 
@@ -256,7 +257,7 @@ class InteractiveGoal:
                    *robot_markers(self._model, self._goal, "goal", self._goal_color)]
         text = Marker(type=Marker.TEXT_VIEW_FACING, ns="status", text=self._status[:200], pose=self._tip_pose())
         text.header.frame_id = self._model.planning_frame
-        text.pose.position.z += 0.25
+        text.pose.position.z += WORDS_ABOVE_TIP_M
         text.scale.z = 0.04
         text.color.r = text.color.g = text.color.b = text.color.a = 1.0
         self._ghosts["goal"].publish(_numbered([*markers, text] if text.text else markers))

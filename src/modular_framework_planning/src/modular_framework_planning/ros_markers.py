@@ -22,6 +22,7 @@ OBJECT_COLOR = (0.45, 0.75, 0.35, 0.8)
 ATTACHED_COLOR = (0.75, 0.3, 0.75, 0.9)
 GHOST_COLOR = (1.0, 0.6, 0.1)
 INTERMEDIATE_GHOSTS = 3
+LINE_POINTS = 60
 PLANE_SIZE_M = 3.0
 
 
@@ -53,7 +54,7 @@ class MarkerPublisher:
         self._display.publish(DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
         group = scene.model.group(response.group_name)
         rows = answer.trajectory.positions
-        markers = [Marker(action=Marker.DELETEALL), _tip_line(scene, group, rows, answer.start)]
+        markers = [Marker(action=Marker.DELETEALL), *_tip_line(scene, group, rows, answer.start)]
         for share in np.linspace(0.0, 1.0, INTERMEDIATE_GHOSTS + 2)[1:]:
             positions = answer.start.copy()
             positions[group.indices] = rows[int(round(share * (len(rows) - 1)))]
@@ -122,16 +123,19 @@ def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, num
     return marker
 
 
-def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> Marker:
+def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> list[Marker]:
+    """The line along which the tip goes; none for a motion of one point, which RViz would call an error."""
+    if len(rows) < 2:
+        return []
     line = _marker(Marker.LINE_STRIP, scene.model.planning_frame, "tip")
     line.scale.x = 0.006
     _paint(line, (*GHOST_COLOR, 1.0))
     link = group.tip_link or group.links[-1]
-    for row in rows[:: max(1, len(rows) // 60)]:
+    for number in np.linspace(0, len(rows) - 1, min(len(rows), LINE_POINTS)).round().astype(int):
         positions = start.copy()
-        positions[group.indices] = row
+        positions[group.indices] = rows[number]
         line.points.append(Point(*scene.model.link_transforms(positions)[link].translation))
-    return line
+    return [line]
 
 
 def robot_markers(model: RobotModel, positions: Array, namespace: str, color: Color) -> list[Marker]:

@@ -17,7 +17,7 @@ from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.ros_goal_runner import GoalRunner
 from modular_framework_planning.ros_motion_watch import WatchedMotion
-from modular_framework_planning.ros_planning import plan
+from modular_framework_planning.ros_planning import answer
 from modular_framework_planning.scene_messages import apply_scene
 
 DEFAULT_REPLAN_ATTEMPTS = 5
@@ -91,11 +91,14 @@ class MoveAction:
         change = scene_change(goal.planning_options, moves)
         feedback(MoveGroupFeedback("PLANNING"))
         planned_in = self._context.monitor.snapshot()
-        response = plan(self._context, request, change, cancelled.is_set)
+        result = MoveGroupResult()
+        try:
+            response = answer(self._context, request, change, cancelled.is_set)
+        except PlanningError as error:
+            result.error_code.val = int(error.code)
+            return result, error.reason
         result = MoveGroupResult(error_code=response.error_code, trajectory_start=response.trajectory_start,
                                  planned_trajectory=response.trajectory, planning_time=response.planning_time)
-        if response.error_code.val != ErrorCode.SUCCESS:
-            return result, "planning failed; see the log and planning_report"
         if not moves:
             return result, "planned"
         feedback(MoveGroupFeedback("MONITOR"))
