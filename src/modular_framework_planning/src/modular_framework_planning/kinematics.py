@@ -31,6 +31,7 @@ FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it
 MAX_TURNS = 4096
 POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 25, 20
 STARTS_A_BATCH = 4
+LEAST_BATCHES = 8  # tried even where the time is over, so that a busy machine does not turn poses unreachable
 FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
 ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
 APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
@@ -239,15 +240,15 @@ class InverseKinematics:
         lower = np.maximum(problem.lower, problem.seed - 2.0 * np.pi)
         upper = np.minimum(problem.upper, problem.seed + 2.0 * np.pi)
         found = np.empty((0, len(lower)))
-        fruitless, enough = 0, ENOUGH if len(lower) <= 6 else ENOUGH_REDUNDANT
+        fruitless, batches, enough = 0, 0, ENOUGH if len(lower) <= 6 else ENOUGH_REDUNDANT
         starts = np.clip(problem.seed, lower, upper)[None, :]
         while fruitless < FRUITLESS_BATCHES and len(found) < enough:
             arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, enough)
             rows = np.vstack([found, starts[arrived]])
             rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
             fruitless = fruitless + 1 if len(rows) == len(found) else 0
-            found = rows
-            if time.monotonic() > problem.deadline:
+            found, batches = rows, batches + 1
+            if time.monotonic() > problem.deadline and (len(found) or batches >= LEAST_BATCHES):
                 break
             starts = rng.uniform(lower, upper, (STARTS_A_BATCH, len(lower)))
         return whole_turns(found, self._turning, problem.lower, problem.upper, MAX_TURNS)
