@@ -89,7 +89,7 @@ class Rviz:
 
     @property
     def status(self) -> str:
-        return next((item.text for item in self.ghosts["goal"] if item.ns == "status"), "")
+        return next((item.text.replace("\n", " ") for item in self.ghosts["goal"] if item.ns == "status"), "")
 
     @property
     def color(self) -> tuple[float, ...]:

@@ -90,6 +90,8 @@ class GoalMarker:
         self._server.applyChanges()
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
+        if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
+            self._server.applyChanges()  # other viewers see where it was dragged to
         if feedback.event_type != InteractiveMarkerFeedback.POSE_UPDATE:
             return
         p, q = feedback.pose.position, feedback.pose.orientation

@@ -2,6 +2,7 @@
 """Drag a goal in RViz, see whether the robot can be there, plan and execute: MoveIt's panel by stock displays."""
 from __future__ import annotations
 
+import textwrap
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -27,6 +28,7 @@ VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.
 START_COLOR = (0.2, 0.4, 0.9, 0.4)
 RANDOM_ATTEMPTS = 200
 WORDS_ABOVE_TIP_M = 0.45  # clear of the hand
+WORDS_WIDTH, WORDS_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
 DEFAULT_PLANNER = "move_group's default"
 
@@ -255,7 +257,8 @@ class InteractiveGoal:
     def _show_goal(self) -> None:
         markers = [Marker(action=Marker.DELETEALL),
                    *robot_markers(self._model, self._goal, "goal", self._goal_color)]
-        text = Marker(type=Marker.TEXT_VIEW_FACING, ns="status", text=self._status[:200], pose=self._tip_pose())
+        text = Marker(type=Marker.TEXT_VIEW_FACING, ns="status",
+                      text="\n".join(textwrap.wrap(self._status, WORDS_WIDTH)[:WORDS_LINES]), pose=self._tip_pose())
         text.header.frame_id = self._model.planning_frame
         text.pose.position.z += WORDS_ABOVE_TIP_M
         text.scale.z = 0.04
