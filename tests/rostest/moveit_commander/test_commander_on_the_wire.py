@@ -13,6 +13,7 @@ import pytest
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_commander import MoveGroupCommander, MoveItCommanderException, RobotCommander
+from moveit_commander.servers import Servers
 from moveit_msgs.msg import (
     Constraints,
     MoveItErrorCodes,
@@ -427,20 +428,17 @@ def test_one_joint_moves_alone(robot: RobotCommander) -> None:
 
 
 def test_a_straight_line_is_followed_or_the_missing_service_named(arm: MoveGroupCommander) -> None:
-    try:
-        rospy.wait_for_service("compute_cartesian_path", 0.2)
-        offered = True
-    except rospy.ROSException:
-        offered = False
     pose = arm.get_current_pose().pose
     pose.position.z += 0.02
-    if offered:
-        for options in ((), (0.0,), (0.0, True), (True,), (True, Constraints())):
-            path, fraction = arm.compute_cartesian_path([pose], 0.01, *options)
-            assert fraction == pytest.approx(1.0) and path.joint_trajectory.points
-    else:
-        with pytest.raises(MoveItCommanderException, match="service /compute_cartesian_path.*nobody offers it"):
+    for options in ((), (0.0,), (0.0, True), (True,), (True, Constraints())):
+        path, fraction = arm.compute_cartesian_path([pose], 0.01, *options)
+        assert fraction == pytest.approx(1.0) and path.joint_trajectory.points
+    servers, arm._servers = arm._servers, Servers("nowhere")
+    try:
+        with pytest.raises(MoveItCommanderException, match="service /nowhere/compute_cartesian_path.*nobody offers it"):
             arm.compute_cartesian_path([pose], 0.01, avoid_collisions=True)
+    finally:
+        arm._servers = servers
     with pytest.raises(TypeError, match="allowed"):
         arm.compute_cartesian_path([pose], 0.01, 0.0, True, None, 1)
     with pytest.raises(MoveItCommanderException, match="constraint type"):

@@ -6,11 +6,11 @@ import threading
 import time
 from typing import Any
 
-import actionlib
 import rospy
 from actionlib import CommState
 from rosgraph.names import ns_join
 
+from modular_framework_control.ros_action_client import SteadyActionClient
 from moveit_commander.exception import ServerError
 
 SERVICE_TIMEOUT_S = 5.0
@@ -65,7 +65,7 @@ class ActionCaller:
 
     def __init__(self, name: str, kind: Any) -> None:
         self.name = name
-        self._client = actionlib.SimpleActionClient(name, kind)
+        self._client = SteadyActionClient(name, kind)
         self._settled = False
 
     def connect(self, timeout_s: float) -> None:
