@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from modular_framework_planning.constraints import (
+from modular_framework_planning.constraint_kinds import (
     FrameOnRobot,
     JointConstraint,
-    KinematicConstraints,
     OrientationConstraint,
     Parameterization,
     PositionConstraint,
     euler_xyz,
 )
+from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.regions import BoxSolid, ConeSolid, CylinderSolid, HullSolid, Solid, SphereSolid
 from modular_framework_planning.robot_model import RobotModel

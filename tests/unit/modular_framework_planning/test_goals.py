@@ -9,13 +9,13 @@ import pinocchio as pin
 import pytest
 
 from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constraints import (
+from modular_framework_planning.constraint_kinds import (
     FrameOnRobot,
     JointConstraint,
-    KinematicConstraints,
     OrientationConstraint,
     PositionConstraint,
 )
+from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.goals import GoalResolver
 from modular_framework_planning.kinematics import KinematicsPool

@@ -9,15 +9,15 @@ import numpy as np
 from moveit_msgs.msg import ConstraintEvalResult
 from shape_msgs.msg import SolidPrimitive
 
-from modular_framework_planning.constraints import (
+from modular_framework_planning.constraint_kinds import (
     ConstraintResult,
     FrameOnRobot,
     JointConstraint,
-    KinematicConstraints,
     OrientationConstraint,
     Parameterization,
     PositionConstraint,
 )
+from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, GeometryError, PlanningError, UnknownNameError
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.regions import BoxSolid, ConeSolid, CylinderSolid, HullSolid, Solid, SphereSolid
