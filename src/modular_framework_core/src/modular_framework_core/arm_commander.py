@@ -28,6 +28,8 @@ from moveit_msgs.srv import (
     GetPositionIKRequest,
     GetStateValidity,
     GetStateValidityRequest,
+    QueryPlannerInterfaces,
+    QueryPlannerInterfacesRequest,
 )
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -54,6 +56,7 @@ from modular_framework_core.ros_calls import (
 )
 
 EXECUTE_ACTION = "execute_trajectory"
+PLANNERS_SERVICE = "query_planner_interface"
 REPORT_TOPIC = "move_group/planning_report"
 REPORT_WAIT_S = 0.3
 CLOCK_WAIT_S = 0.3
@@ -86,7 +89,7 @@ class ArmCommander:
             raise CommanderError("set_ground=True is not supported; put the ground into the scene or the world file.")
         self.group_name = name
         self._velocity_scaling = 1.0
-        self._planner_id = ""
+        self._pipeline_id = self._planner_id = ""
         self._attempts = 1
         self._planning_time_s = 5.0
         self._connect_lock = threading.Lock()
@@ -148,8 +151,25 @@ class ArmCommander:
         self._velocity_scaling = float(factor)
 
     def set_planner_id(self, planner_id: str) -> None:
-        """Sets the planner by the name move_group knows it by; empty for the group's default."""
-        self._planner_id = str(planner_id)
+        """Sets the planner by the name move_group knows it by, or ``pipeline/planner``; empty for the default."""
+        pipeline, _, planner = str(planner_id).rpartition("/")
+        self._pipeline_id, self._planner_id = pipeline, planner
+
+    def planner_names(self) -> list[str]:
+        """Returns the planners move_group offers: all by their names alone, and as ``pipeline/planner``.
+
+        Raises:
+            CommanderError: move_group does not answer.
+        """
+        proxy = rospy.ServiceProxy(PLANNERS_SERVICE, QueryPlannerInterfaces)
+        try:
+            wait_for_service(proxy, SERVICE_TIMEOUT_S)
+            answer = call_service(proxy, QueryPlannerInterfacesRequest(), SERVICE_TIMEOUT_S)
+        except CallError as error:
+            raise CommanderError(str(error)) from error
+        names = {name for item in answer.planner_interfaces for planner in item.planner_ids
+                 for name in (planner, f"{item.pipeline_id}/{planner}")}
+        return sorted(names)
 
     def set_num_planning_attempts(self, attempts: int) -> None:
         """Sets how often a plan is tried for.
@@ -291,7 +311,7 @@ class ArmCommander:
         request = GetMotionPlanRequest()
         message = request.motion_plan_request
         message.group_name = self.group_name
-        message.planner_id = self._planner_id
+        message.pipeline_id, message.planner_id = self._pipeline_id, self._planner_id
         message.num_planning_attempts = self._attempts
         message.allowed_planning_time = self._planning_time_s
         message.max_velocity_scaling_factor = message.max_acceleration_scaling_factor = self._velocity_scaling

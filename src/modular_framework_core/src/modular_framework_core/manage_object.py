@@ -71,6 +71,34 @@ def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
                          options.reference)
 
 
+def request_to_spawn(name: str, object_type: str, position_m: Sequence[float], rpy_rad: Sequence[float],
+                     reference_frame: str, model_path: str) -> ObjectRequest:
+    """Makes a request to spawn an object by its type.
+
+    Args:
+        name: Name of the object.
+        object_type: Folder of the model.
+        position_m: x, y, z in the reference frame [m].
+        rpy_rad: Roll, pitch, yaw in the reference frame [rad].
+        reference_frame: Frame of the pose.
+        model_path: Folder of the models.
+
+    Raises:
+        ObjectRequestError: There is no such model, or the pose has not three numbers each.
+    """
+    file = _model_file(object_type, model_path)
+    if not file.is_file():
+        raise ObjectRequestError(f"there is no file '{file}'; the type must be a folder of '{model_path}' with a "
+                                 f"{MODEL_FILE}")
+    return ObjectRequest(False, name, object_type, file, _triplet("position", position_m),
+                         _triplet("orientation", rpy_rad), reference_frame)
+
+
+def request_to_delete(name: str) -> ObjectRequest:
+    """Makes a request to delete an object."""
+    return ObjectRequest(True, name, name, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "world")
+
+
 def _model_file(object_type: str, model_path: str) -> Path:
     if not object_type:
         raise ObjectRequestError("neither a type (-t) nor a file (-f) is given; one of them says what to spawn")
@@ -91,7 +119,7 @@ def _split_triplets(arguments: Sequence[str]) -> list[str]:
     return result
 
 
-def _triplet(what: str, values: Sequence[str]) -> tuple[float, float, float]:
+def _triplet(what: str, values: Sequence[str] | Sequence[float]) -> tuple[float, float, float]:
     try:
         numbers = [float(value) for value in values]
     except ValueError as error:

@@ -2,7 +2,7 @@
 """Fetches messages from the managers and stores plans there, on behalf of the states."""
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, get_args
 
 import rospy
 from moveit_msgs.msg import RobotTrajectory
@@ -21,6 +21,9 @@ _GET: dict[str, tuple[str, Any, str, str]] = {
     "pose": ("get_pose_stamped", srv.GetPoseStamped, "pose_name", "pose_stamped"),
     "grasp": ("get_grasp", srv.GetStandardisedGrasp, "grasp_name", "grasp_message"),
 }
+
+
+Kind = Literal["joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp"]
 
 
 class ManagerError(RuntimeError):
@@ -63,6 +66,23 @@ def store_plan(plan: RobotTrajectory, name: str) -> None:
     answer = _call("add_plan", srv.AddMoveitPlan, srv.AddMoveitPlanRequest(moveit_plan=plan, plan_name=name))
     if not answer.success:
         raise ManagerError(f"service '{rospy.resolve_name('add_plan')}' refused the plan '{name}'")
+
+
+def all_kinds() -> tuple[Kind, ...]:
+    """Returns the kinds of messages there are managers for."""
+    return get_args(Kind)
+
+
+def file_request(verb: Literal["save", "load", "reload"], kind: Kind, path: str) -> None:
+    """Saves, loads or reloads what a manager holds.
+
+    Raises:
+        ManagerError: The manager does not answer, or refuses.
+    """
+    plural = "trajectories" if kind == "trajectory" else f"{kind}s"
+    answer = _call(f"{verb}_{plural}", srv.MessageFile, srv.MessageFileRequest(path=path))
+    if not answer.success:
+        raise ManagerError(f"service '{rospy.resolve_name(f'{verb}_{plural}')}' refused: {answer.message}")
 
 
 def _call(service: str, service_type: Any, request: Any) -> Any:

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A state to begin with: copy this file, name it after your class (open_door.py: class OpenDoor) and change it.
+
+A task finds it by ``states_directory:=<its folder>`` and ``source: my_state``. Its test, test_my_state.py, is beside it.
+"""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from modular_framework_core.framework_state import FrameworkState
+
+
+class MyState(FrameworkState):
+    """Says in one sentence what it does, and when it is positive.
+
+    Args:
+        side: One of several words; the annotation is what a task file is checked against.
+        timeout: A number with its unit [s].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written; ``chosen_side`` receives the side when it is listed.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, side: Literal["left", "right"], timeout: float = 5.0,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._side, self._timeout_s = side, float(timeout)
+
+    def execute(self, userdata: Any) -> str:
+        """Does the work; waits only with ``wait_until``, which a request to stop ends."""
+        self.feedback = f"looking to the {self._side}"
+        if not self.wait_until(self._is_done, self._timeout_s):
+            if self.preempt_requested():
+                return self.stopped()
+            return self.fail(f"nothing was seen on the {self._side} within {self._timeout_s} s")
+        if "chosen_side" in self.get_registered_output_keys():
+            userdata.chosen_side = self._side
+        return self.succeed()
+
+    def _is_done(self) -> bool:
+        return self._side == "left"

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task send a goal to any action server."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import actionlib
+import roslib.message
+import rospy
+import rostopic
+from actionlib_msgs.msg import GoalStatus
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result, wait_until
+from modular_framework_states.message_filling import FillingError, difference, filled
+
+RESULT = "result"
+
+
+class CallAction(FrameworkState):
+    """Sends a goal and waits for its end; positive when the goal succeeded and the result is as expected.
+
+    Args:
+        action_name: Action; its type is found out when it is there.
+        goal: Field to value, nested as the goal is; fields left out keep their default.
+        expect: Field to value of the result, nested as it is.
+        timeout: Longest wait for the end of the goal [s]; a goal that takes longer is cancelled.
+        server_timeout: Longest wait for the action server [s].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+            ``result`` receives the result when it is listed.
+    """
+
+    def __init__(self, action_name: str, goal: Mapping[str, Any] | None = None,
+                 expect: Mapping[str, Any] | None = None, timeout: float = 60.0, server_timeout: float = 10.0,
+                 outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._name, self._goal, self._expected = str(action_name), dict(goal or {}), dict(expect or {})
+        self._timeout_s, self._server_timeout_s = float(timeout), float(server_timeout)
+
+    def execute(self, userdata: Any) -> str:
+        """Sends the goal and waits."""
+        name = rospy.resolve_name(self._name)
+        try:
+            action_type = self._type_of(name)
+            goal = filled(type(action_type().action_goal.goal), self._goal)
+            client = actionlib.SimpleActionClient(name, action_type)
+            wait_for_action(client, name, self._server_timeout_s)
+        except (CallError, FillingError) as error:
+            return self.fail(f"action '{name}': {error}")
+        if self.preempt_requested():
+            return self.stopped()
+        client.send_goal(goal)
+        status = wait_for_result(client, self._timeout_s, self.preempt_requested)
+        if self.preempt_requested():
+            return self.stopped()
+        if status == GoalStatus.LOST:
+            return self.fail(f"action '{name}' did not end within {self._timeout_s} s; the goal was cancelled")
+        if status != GoalStatus.SUCCEEDED:
+            return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}: "
+                             f"{client.get_goal_status_text() or 'it gave no reason'}")
+        result = client.get_result()
+        wrong = difference(result, self._expected)
+        if wrong:
+            return self.fail(f"action '{name}' succeeded, but {wrong}")
+        if RESULT in self.get_registered_output_keys():
+            userdata[RESULT] = result
+        return self.succeed()
+
+    def _type_of(self, name: str) -> Any:
+        found: list[str] = []
+
+        def known() -> bool:
+            kind, _, _ = rostopic.get_topic_type(f"{name}/goal")
+            found[:] = [kind] if kind else []
+            return bool(kind)
+
+        if not wait_until(lambda: known() or self.preempt_requested(), self._server_timeout_s, 0.1) or not found:
+            raise CallError(f"nobody offers it within {self._server_timeout_s:.1f} s; start the node that does")
+        action_type = roslib.message.get_message_class(found[0].removesuffix("Goal"))
+        if action_type is None:
+            raise CallError(f"its type {found[0].removesuffix('Goal')} is not built in this workspace")
+        return action_type

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task repeat a part of itself a number of times."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Counter(FrameworkState):
+    """Counts how often it is passed: positive the first times, negative when the count is used up, then it starts anew.
+
+    For a loop, lead the positive outcome to the first state of the part to repeat. For a retry, lead the negative
+    outcomes of what may fail to the counter, and the counter's positive outcome back to it.
+
+    Args:
+        count: How many times it is positive.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+            ``counter`` receives how often it was passed, from 1, when it is listed.
+    """
+
+    def __init__(self, count: int, outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if int(count) < 1:
+            raise ValueError(f"Counter: count is {count}, allowed is 1 or more")
+        self._count, self._passed = int(count), 0
+
+    def execute(self, userdata: Any) -> str:
+        """Counts."""
+        self._passed += 1
+        if "counter" in self.get_registered_output_keys():
+            userdata.counter = self._passed
+        if self._passed <= self._count:
+            return self.succeed()
+        self._passed = 0
+        return self.fail(f"all {self._count} times are used up")

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task take an object out of the simulation."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.manage_object import request_to_delete
+from modular_framework_core.ros_manage_object import RefusedError, delete
+
+
+class DeleteObject(FrameworkState):
+    """Deletes an object from the simulation, the map of types and the collision matrix.
+
+    Args:
+        object_name: Name of the object.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, object_name: str, outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._object_name = object_name
+
+    def execute(self, userdata: Any) -> str:
+        """Deletes the object."""
+        try:
+            delete(request_to_delete(self._object_name))
+        except RefusedError as error:
+            return self.fail(f"object '{self._object_name}': {error}")
+        return self.succeed()

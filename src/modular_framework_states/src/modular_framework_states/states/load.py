@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A state that brings back what a manager once held."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_states.manager_clients import Kind, ManagerError, file_request
+
+
+class Load(FrameworkState):
+    """Reads what ``store`` wrote into a manager, beside what it holds.
+
+    Args:
+        kind: Kind of messages.
+        path: A .yaml file; a relative path starts in the folder of the managers, below ``$ROS_HOME``.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, kind: Kind, path: str, outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._kind, self._path = kind, str(path)
+
+    def execute(self, userdata: Any) -> str:
+        """Asks the manager."""
+        try:
+            file_request("load", self._kind, self._path)
+        except ManagerError as error:
+            return self.fail(str(error))
+        return self.succeed()

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task begin again with what the configuration says."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_states.manager_clients import Kind, ManagerError, all_kinds, file_request
+
+
+class ReinitialiseManagers(FrameworkState):
+    """Makes managers forget what was added, and read their files of named messages again.
+
+    Args:
+        kinds: Which managers; all of them by default.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, kinds: Sequence[Kind] = (), outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._kinds = tuple(kinds) or all_kinds()
+
+    def execute(self, userdata: Any) -> str:
+        """Asks one manager after the other; goes on after one that fails."""
+        faults = []
+        for kind in self._kinds:
+            try:
+                file_request("reload", kind, "")
+            except ManagerError as error:
+                faults.append(str(error))
+        return self.fail("; ".join(faults)) if faults else self.succeed()

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task choose how its next motions are planned."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_core.framework_state import FrameworkState
+
+
+class SetPlanner(FrameworkState):
+    """Changes the settings of the arm commander; what is left out stays as it is.
+
+    Args:
+        planner_id: Name of the planner, or ``pipeline/planner``; empty leaves it.
+        planning_time: Time a plan may take [s].
+        attempts: How often a plan is tried for.
+        speed_factor: Share of the joints' velocity and acceleration limits, in (0, 1].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+    """
+
+    def __init__(self, planner_id: str = "", planning_time: float | None = None, attempts: int | None = None,
+                 speed_factor: float | None = None, outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
+                 io_keys: Sequence[str] = ("arm_commander",)) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._planner_id = planner_id
+        self._settings = {"set_planning_time": planning_time, "set_num_planning_attempts": attempts,
+                          "set_max_velocity_scaling_factor": speed_factor}
+
+    def execute(self, userdata: Any) -> str:
+        """Sets what was given, after a look whether there is such a planner."""
+        commander = userdata.arm_commander
+        try:
+            if self._planner_id:
+                known = commander.planner_names()
+                if self._planner_id not in known:
+                    return self.fail(f"there is no planner '{self._planner_id}'; move_group has {', '.join(known)}")
+                commander.set_planner_id(self._planner_id)
+            for setter, value in self._settings.items():
+                if value is not None:
+                    getattr(commander, setter)(value)
+        except (ValueError, RuntimeError) as error:
+            return self.fail(str(error))
+        return self.succeed()

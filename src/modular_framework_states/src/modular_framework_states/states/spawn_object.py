@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task bring an object into the simulation."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.manage_object import ObjectRequestError, request_to_spawn
+from modular_framework_core.ros_manage_object import RefusedError, spawn
+
+
+class SpawnObject(FrameworkState):
+    """Spawns an object; positive when simulation, map of types and collision matrix all have it.
+
+    Args:
+        object_type: Folder of the model in the folder of models (parameter ``gazebo_model_path``).
+        object_name: Name of the object; empty takes the type.
+        position: x, y, z [m].
+        orientation: Roll, pitch, yaw [rad].
+        reference_frame: Frame of the pose.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, object_type: str, object_name: str = "", position: Sequence[float] = (0.0, 0.0, 0.0),
+                 orientation: Sequence[float] = (0.0, 0.0, 0.0), reference_frame: str = "world",
+                 outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._object_type, self._object_name = object_type, object_name or object_type
+        self._position, self._orientation = tuple(position), tuple(orientation)
+        self._frame = reference_frame
+
+    def execute(self, userdata: Any) -> str:
+        """Spawns the object."""
+        try:
+            spawn(request_to_spawn(self._object_name, self._object_type, self._position, self._orientation, self._frame,
+                                   str(rospy.get_param("gazebo_model_path", ""))))
+        except (ObjectRequestError, RefusedError) as error:
+            return self.fail(f"object '{self._object_name}': {error}")
+        return self.succeed()

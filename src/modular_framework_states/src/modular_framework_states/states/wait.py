@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task pause."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Wait(FrameworkState):
+    """Waits for some time of the robot's clock: simulated time in simulation.
+
+    Args:
+        duration: How long [s].
+        timeout: Longest wait of wall time [s], for a clock that stands still; None waits three times the duration and
+            ten seconds more.
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written.
+    """
+
+    def __init__(self, duration: float, timeout: float | None = None, outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._duration_s = float(duration)
+        if not 0.0 <= self._duration_s < float("inf"):
+            raise ValueError(f"Wait: duration is {duration} s, allowed is 0 or more")
+        self._timeout_s = 3.0 * self._duration_s + 10.0 if timeout is None else float(timeout)
+
+    def execute(self, userdata: Any) -> str:
+        """Waits."""
+        begun = rospy.Time.now()
+        if self.wait_until(lambda: (rospy.Time.now() - begun).to_sec() >= self._duration_s, self._timeout_s):
+            return self.succeed()
+        if self.preempt_requested():
+            return self.stopped()
+        passed = (rospy.Time.now() - begun).to_sec()
+        return self.fail(f"only {passed:.2f} of {self._duration_s} s passed on the robot's clock within "
+                         f"{self._timeout_s:.1f} s; is the simulation paused or slow?")

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""States that are not about motions: waiting, counting, any topic, service and action, managers, objects, figures."""
+from __future__ import annotations
+
+import json
+import threading
+import time
+from types import SimpleNamespace
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import GripperCommandAction, GripperCommandResult
+from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
+from geometry_msgs.msg import PointStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, SetBoolResponse
+
+import smach
+from modular_framework_core import srv
+from modular_framework_states.states.call_action import CallAction
+from modular_framework_states.states.call_service import CallService
+from modular_framework_states.states.counter import Counter
+from modular_framework_states.states.delete_object import DeleteObject
+from modular_framework_states.states.load import Load
+from modular_framework_states.states.log_metric import LogMetric
+from modular_framework_states.states.reinitialise_managers import ReinitialiseManagers
+from modular_framework_states.states.set_planner import SetPlanner
+from modular_framework_states.states.spawn_object import SpawnObject
+from modular_framework_states.states.store import Store
+from modular_framework_states.states.wait import Wait
+from modular_framework_states.states.wait_for_message import WaitForMessage
+
+LAUNCH = """<launch><node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"
+args="{file}"/></launch>"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def managers(ros_launch, tmp_path_factory: pytest.TempPathFactory):
+    file = tmp_path_factory.mktemp("config") / "states.yaml"
+    file.write_text("up: {a: 1}\n")
+    session = ros_launch(LAUNCH.format(file=file))
+    session.wait_for_service("/get_object_type", 20)
+    return session
+
+
+def run(state: smach.State, **values: object) -> tuple[str, smach.UserData]:
+    machine = smach.StateMachine(outcomes=["success", "fail", "preempted"])
+    for key, value in values.items():
+        machine.userdata[key] = value
+    with machine:
+        smach.StateMachine.add("ONLY", state, transitions={})
+    return machine.execute(), machine.userdata
+
+
+def names(kind: str) -> list[str]:
+    return list(rospy.ServiceProxy(f"list_{kind}", srv.ListMessages)().names)
+
+
+def test_wait_takes_its_time_and_ends_when_stopped() -> None:
+    begun = time.monotonic()
+    assert run(Wait(0.3))[0] == "success"
+    assert 0.3 <= time.monotonic() - begun < 2.0
+    state = Wait(60.0)
+    threading.Timer(0.2, state.request_preempt).start()
+    begun = time.monotonic()
+    assert run(state)[0] == "fail"
+    assert state.reason == "stopped on request" and time.monotonic() - begun < 2.0
+
+
+def test_wait_for_message_takes_any_type_and_passes_over_what_is_not_expected() -> None:
+    publisher = rospy.Publisher("points", PointStamped, queue_size=10)
+    state = WaitForMessage("points", 10.0, {"point": {"x": 2.0}}, output_keys=("message",))
+
+    def publish() -> None:
+        while publisher.get_num_connections() == 0:
+            time.sleep(0.01)
+        for x in (1.0, 2.0):
+            message = PointStamped()
+            message.point.x = x
+            publisher.publish(message)
+
+    threading.Thread(target=publish, daemon=True).start()
+    outcome, userdata = run(state)
+    assert outcome == "success", state.reason
+    assert userdata.message.point.x == 2.0
+    late = WaitForMessage("points", 0.3, {"point": {"x": 9.0}})
+    threading.Thread(target=publish, daemon=True).start()
+    assert run(late)[0] == "fail"
+    assert "no message as expected came on topic '/points' within 0.3 s" in late.reason
+
+
+def test_a_counter_is_positive_its_number_of_times_and_begins_anew() -> None:
+    state = Counter(2, output_keys=("counter",))
+    assert [run(state)[0] for _ in range(4)] == ["success", "success", "fail", "success"]
+    assert run(state)[1].counter == 2
+
+
+def test_call_service_finds_the_type_and_is_positive_only_when_the_answer_is() -> None:
+    service = rospy.Service("switch", SetBool, lambda request: SetBoolResponse(request.data, "the lamp is broken"))
+    outcome, userdata = run(CallService("switch", {"data": True}, output_keys=("response",)))
+    assert outcome == "success" and userdata.response.success
+    cases = [(CallService("switch", {"data": False}), "answered success: false: the lamp is broken"),
+             (CallService("switch", {"data": True}, {"message": "fine"}), "message is 'the lamp is broken', expected"),
+             (CallService("switch", {"on": True}), "its fields are data (bool)"),
+             (CallService("switch", {"data": "yes"}), "do not fit std_srvs/SetBoolRequest"),
+             (CallService("nobody", timeout=0.3), "was not advertised within 0.3 s")]
+    for state, reason in cases:
+        assert run(state)[0] == "fail"
+        assert reason in state.reason
+    service.shutdown()
+
+
+class Gripper:
+    """An action server that closes, or refuses, or never ends."""
+
+    def __init__(self) -> None:
+        self.preempted = False
+        self._server = actionlib.SimpleActionServer("hand", GripperCommandAction, self._execute, auto_start=False)
+        self._server.start()
+
+    def _execute(self, goal) -> None:
+        if goal.command.position > 1.0:
+            while not self._server.is_preempt_requested():
+                time.sleep(0.01)
+            self.preempted = True
+            self._server.set_preempted()
+        elif goal.command.position < 0.0:
+            self._server.set_aborted(GripperCommandResult(), "fingers do not open that far")
+        else:
+            self._server.set_succeeded(GripperCommandResult(position=goal.command.position, reached_goal=True))
+
+
+def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:
+    gripper = Gripper()
+    outcome, userdata = run(CallAction("hand", {"command": {"position": 0.5}}, {"reached_goal": True},
+                                       output_keys=("result",)))
+    assert outcome == "success" and userdata.result.position == 0.5
+    cases = [(CallAction("hand", {"command": {"position": -1.0}}), "ended as ABORTED: fingers do not open that far"),
+             (CallAction("hand", {"command": {"position": 0.5}}, {"stalled": True}), "stalled is False, expected True"),
+             (CallAction("hand", {"force": 1}), "the values do not fit control_msgs/GripperCommandGoal"),
+             (CallAction("hand", {"command": {"position": 2.0}}, timeout=0.3), "did not end within 0.3 s"),
+             (CallAction("foot", server_timeout=0.3), "nobody offers it within 0.3 s")]
+    for state, reason in cases:
+        assert run(state)[0] == "fail"
+        assert reason in state.reason, state.reason
+    assert gripper.preempted
+    assert GoalStatus.ABORTED == 4
+
+
+def test_what_managers_hold_is_stored_loaded_and_forgotten() -> None:
+    add = rospy.ServiceProxy("add_joint_state", srv.AddJointState)
+    add(JointState(name=["a"], position=[0.5]), "mine")
+    assert run(Store("joint_state", "kept.yaml"))[0] == "success"
+    assert run(ReinitialiseManagers(("joint_state",)))[0] == "success"
+    assert names("joint_states") == ["up"]
+    assert run(Load("joint_state", "kept.yaml"))[0] == "success"
+    assert names("joint_states") == ["mine", "up"]
+    assert run(ReinitialiseManagers())[0] == "success"
+    for state, reason in ((Load("plan", "kept.yaml"), "holds messages of the kind 'joint state'"),
+                          (Store("pose", "poses.txt"), "a file that ends in .yaml")):
+        assert run(state)[0] == "fail"
+        assert reason in state.reason
+
+
+def test_a_metric_is_published_and_must_be_a_number() -> None:
+    heard: list[dict[str, object]] = []
+    rospy.Subscriber("task_metrics", String, lambda message: heard.append(json.loads(message.data)))
+    assert run(LogMetric("height", 0.25, unit="m"))[0] == "success"
+    deadline = time.monotonic() + 10.0
+    while not heard and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert (heard[0]["name"], heard[0]["value"], heard[0]["unit"]) == ("height", 0.25, "m")
+    state = LogMetric("grip", from_key="force", input_keys=("force",))
+    assert run(state, force=3)[0] == "success"
+    assert run(state, force="much")[0] == "fail"
+    assert "metric 'grip' is 'much'" in state.reason
+
+
+def test_set_planner_changes_what_is_given_and_refuses_unknown_planners() -> None:
+    calls: list[tuple[str, object]] = []
+    commander = SimpleNamespace(
+        planner_names=lambda: ["RRTConnect", "pilz/LIN"], set_planner_id=lambda value: calls.append(("id", value)),
+        set_planning_time=lambda value: calls.append(("time", value)),
+        set_num_planning_attempts=lambda value: calls.append(("attempts", value)),
+        set_max_velocity_scaling_factor=lambda value: calls.append(("speed", value)))
+    assert run(SetPlanner("pilz/LIN", speed_factor=0.1), arm_commander=commander)[0] == "success"
+    assert calls == [("id", "pilz/LIN"), ("speed", 0.1)]
+    state = SetPlanner("RRTConect")
+    assert run(state, arm_commander=commander)[0] == "fail"
+    assert "there is no planner 'RRTConect'; move_group has RRTConnect, pilz/LIN" in state.reason
+
+
+def test_objects_are_spawned_and_deleted_and_unknown_models_named(tmp_path) -> None:
+    (tmp_path / "cube").mkdir()
+    (tmp_path / "cube" / "model.sdf").write_text("<sdf/>")
+    rospy.set_param("gazebo_model_path", str(tmp_path))
+    models: dict[str, object] = {}
+
+    def spawn(request):
+        models[request.model_name] = request
+        return SpawnModelResponse(True, "")
+
+    services = [rospy.Service("gazebo/spawn_sdf_model", SpawnModel, spawn),
+                rospy.Service("gazebo/delete_model", DeleteModel, lambda request: DeleteModelResponse(
+                    models.pop(request.model_name, None) is not None, "no such model"))]
+    rospy.ServiceProxy("set_init_acm", srv.SetInitACM)(srv.SetInitACMRequest().acm)
+    assert run(SpawnObject("cube", "mine", (0.1, 0.2, 0.3)))[0] == "success"
+    assert models["mine"].initial_pose.position.y == 0.2
+    for state, reason in ((SpawnObject("cube", "mine"), "an object 'mine' already"),
+                          (SpawnObject("sphere"), "the type must be a folder of"),
+                          (SpawnObject("cube", position=(0.0, 1.0)), "expected three finite numbers"),
+                          (DeleteObject("other"), "no such model")):
+        assert run(state)[0] == "fail"
+        assert reason in state.reason, state.reason
+    assert run(DeleteObject("mine"))[0] == "success"
+    assert models == {}
+    for service in services:
+        service.shutdown()
