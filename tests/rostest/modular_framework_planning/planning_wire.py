@@ -6,6 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import actionlib
@@ -132,20 +133,39 @@ def plan(message: MotionPlanRequest) -> Any:
     return call("plan_kinematic_path", GetMotionPlan, message).motion_plan_response
 
 
+class Reports:
+    """Every planning report of the module's move_group, heard by one subscriber for all tests.
+
+    A subscriber sees its connection before the publisher does: a report that comes at once would pass a new one by.
+    """
+
+    def __init__(self) -> None:
+        self.heard: list[dict[str, Any]] = []
+        subscriber = rospy.Subscriber("move_group/planning_report", String,
+                                      lambda message: self.heard.append(json.loads(message.data)))
+        deadline = time.monotonic() + 10.0
+        while subscriber.get_num_connections() == 0:
+            assert time.monotonic() < deadline, "nobody publishes planning reports"
+            time.sleep(0.01)
+        time.sleep(0.5)
+
+
+@cache
+def reports() -> Reports:
+    return Reports()
+
+
 def report_of(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
     """What the work returned and the planning report it caused."""
-    reports: list[dict[str, Any]] = []
-    subscriber = rospy.Subscriber("move_group/planning_report", String, lambda m: reports.append(json.loads(m.data)))
-    deadline = time.monotonic() + 5.0
-    while subscriber.get_num_connections() == 0 and time.monotonic() < deadline:
-        time.sleep(0.01)
+    heard = reports().heard
+    time.sleep(0.05)  # what was published before is here
+    known = len(heard)
     result = work()
     deadline = time.monotonic() + 5.0
-    while not reports and time.monotonic() < deadline:
+    while len(heard) == known and time.monotonic() < deadline:
         time.sleep(0.01)
-    subscriber.unregister()
-    assert reports, "no planning report within 5 s"
-    return result, reports[-1]
+    assert len(heard) > known, "no planning report within 5 s"
+    return result, heard[-1]
 
 
 def joint_goal(name: str, value: float) -> Constraints:
