@@ -107,3 +107,9 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
     columns = [np.concatenate([getattr(parts[0], name), *(getattr(part, name)[1:] for part in parts[1:])])
                for name in ("positions", "velocities", "accelerations")]
     return Trajectory(parts[0].joint_names, np.round(times, 9), *columns)
+
+
+def warm_up() -> None:
+    """Compiles the loops of this module, or loads them: the first motion then waits for nothing."""
+    limits = np.ones(2)
+    parameterize(("a", "b"), np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), np.array([0.1]), limits, limits)

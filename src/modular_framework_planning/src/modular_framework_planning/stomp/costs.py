@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a state of a motion costs: depth in obstacles, violation of path constraints."""
+from __future__ import annotations
+
+import numpy as np
+
+from modular_framework_planning.compiled_collision import World
+from modular_framework_planning.planner_interface import PlanningProblem
+from modular_framework_planning.spatial import Array
+from modular_framework_planning.stomp.compiled_costs import cover_of, depths
+
+WIDEST_SPHERE = 0.07  # [m]; of those that stand for the bodies
+
+
+class StateCosts:
+    """Costs of states; the exact check has the last word on whether one is valid."""
+
+    def __init__(self, problem: PlanningProblem) -> None:
+        self._problem = problem
+        self._world = problem.checker.world
+        self._cover = cover_of(self._world, WIDEST_SPHERE)
+
+    def __call__(self, values: Array) -> Array:
+        """Returns costs of joint vectors (n, joints), shape (n,)."""
+        states = np.array([self._problem.motion.whole(row) for row in values])
+        costs = np.asarray(depths(self._world, self._cover, states))
+        if self._problem.constraints is not None:
+            costs += [self._violation(row) for row in values]
+        return costs
+
+    def _violation(self, values: Array) -> float:
+        constraints = self._problem.constraints
+        assert constraints is not None
+        results = constraints.evaluate(self._problem.motion.whole(values))
+        return float(sum(1.0 + item.distance for item in results if not item.satisfied))
+
+
+def warm_up(world: World) -> None:
+    """Compiles the loops of this module, or loads them; any world will do."""
+    depths(world, cover_of(world, WIDEST_SPHERE), np.zeros((1, len(world.tree.parents))))

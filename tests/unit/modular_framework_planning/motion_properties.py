@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Random problems for each planning pipeline, and what every returned motion must be true of."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+from independent_checker import IndependentChecker
+
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.constraints import JointConstraint, KinematicConstraints
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.ompl_planning import OmplPlanner
+from modular_framework_planning.pilz.command_planner import CommandPlanner
+from modular_framework_planning.pipeline import PlanningPipeline
+from modular_framework_planning.planning_request import (
+    JointGoal,
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+    PoseGoal,
+)
+from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Box
+from modular_framework_planning.stomp import StompPlanner
+
+GROUP, TIP = "arm_and_manipulator", "eg_manipulator"
+BOXES = 6
+SCALING = 0.5
+PLANNERS = {"ompl": "RRTConnect", "ptp": "PTP", "lin": "LIN", "stomp": "STOMP"}
+CARTESIAN_LIMITS = {"max_trans_vel": 0.5, "max_trans_acc": 1.0, "max_trans_dec": -1.0, "max_rot_vel": 1.0}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A request, the world for the second checker, and the goal: joint positions or a pose."""
+
+    request: PlanningRequest
+    world: list[tuple[object, ...]]
+    goal: np.ndarray | pin.SE3
+
+
+@dataclass
+class Tally:
+    """What a pipeline made of some problems: solved, refused or unsolved, and motions that lack a property."""
+
+    solved: int = 0
+    unsolved: int = 0
+    violations: list[str] = None  # type: ignore[assignment]
+
+
+def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
+    """The pipeline a problem of a kind is given to."""
+    settings = PipelineSettings(seed=seed, robot_planning={"cartesian_limits": CARTESIAN_LIMITS})
+    planner = {"ompl": OmplPlanner, "stomp": StompPlanner}.get(kind, CommandPlanner)
+    adapters = () if kind in ("ptp", "lin") else None
+    made = planner.configure(model, settings) if hasattr(planner, "configure") else planner()
+    return PlanningPipeline(model, KinematicsPool(model), settings, made, adapters)
+
+
+def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, list[tuple[object, ...]]]:
+    scene, world = empty_scene(model), []
+    for number in range(BOXES):
+        angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.45, 0.9)
+        pose = pin.SE3(np.eye(3), np.array([distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.9, 1.6)]))
+        size = rng.uniform(0.05, 0.25, 3)
+        scene = scene.with_object(CollisionObject(f"b{number}", pose, ((Box(*size), pin.SE3.Identity()),)))
+        world.append((f"b{number}", coal.Box(*size), float(np.linalg.norm(size)) / 2, pose.homogeneous))
+    return scene, world
+
+
+def _free_state(model: RobotModel, checker: CollisionChecker, rng: np.random.Generator) -> np.ndarray:
+    positions = model.default_positions()
+    while True:
+        positions[model.group(GROUP).indices] = rng.uniform(-np.pi, np.pi, 6)
+        if checker.is_free(positions):
+            return positions.copy()
+
+
+def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Problem]:
+    """Random worlds, starts and goals; every second one has a path constraint (but for lines, which give their own)."""
+    rng = np.random.default_rng([seed, sorted(PLANNERS).index(kind)])
+    indices = model.group(GROUP).indices
+    for number in range(count):
+        scene, world = _world(model, rng)
+        checker = CollisionChecker(scene, indices)
+        start, end = _free_state(model, checker, rng), _free_state(model, checker, rng)
+        constraints = None
+        if kind == "lin":
+            target = model.link_transforms(start)[TIP]
+            target.translation += rng.uniform(-0.2, 0.2, 3)
+            goal, asked = target, PoseGoal(TIP, target)
+        else:
+            goal = end[indices]
+            asked = JointGoal(dict(zip(model.group(GROUP).joints, goal.tolist(), strict=True)))
+            if number % 2:
+                joint = int(indices[0])
+                low, high = sorted((start[joint], end[joint]))
+                constraints = KinematicConstraints(model, [JointConstraint(
+                    model.joint_names[joint], joint, 0.5 * (low + high), 0.5 * (high - low) + 0.3,
+                    0.5 * (high - low) + 0.3)])
+        yield Problem(PlanningRequest(scene.with_positions(start), GROUP, (asked,), PLANNERS[kind], 1, 10.0, SCALING,
+                                      SCALING, path_constraints=constraints), world, goal)
+
+
+def violations(model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer) -> list[str]:
+    """Properties the motion lacks, looked at on the curve of a controller, at 1 ms samples."""
+    motion, indices = answer.trajectory, model.group(GROUP).indices
+    faults = []
+    if motion.times[0] != 0.0 or not (np.diff(motion.times) > 0.0).all():
+        faults.append("times do not increase strictly")
+    positions, velocities, accelerations, _ = motion.at(motion.sample_times(0.001))
+    shares = (np.abs(velocities) / model.max_velocity[indices]).max(), (
+        np.abs(accelerations) / model.max_acceleration[indices]).max()
+    faults += [f"{name} is {share / SCALING:.4f} of its limit" for name, share in zip(
+        ("velocity", "acceleration"), shares, strict=True) if share > SCALING * (1.0 + 1e-9)]
+    if (positions < model.lower[indices] - 1e-9).any() or (positions > model.upper[indices] + 1e-9).any():
+        faults.append("a position is out of bounds")
+    if not np.allclose(positions[0], problem.request.scene.positions[indices], atol=1e-9):
+        faults.append("the motion does not begin at the start")
+    faults += _goal_faults(model, problem, positions[-1])
+    constraints = problem.request.path_constraints
+    rest = problem.request.scene.positions.copy()
+    if constraints is not None:
+        for row in positions:
+            rest[indices] = row
+            if not constraints.satisfied(rest):
+                faults.append(f"path constraint: {constraints.describe(rest)}")
+                break
+    checker.set_world(problem.world)
+    named = dict(zip(model.joint_names, problem.request.scene.positions.tolist(), strict=True))
+    hits = checker.colliding_states(motion.joint_names, motion.curve(0.01), named)
+    return faults + ([f"{hits} states collide"] if hits else [])
+
+
+def _goal_faults(model: RobotModel, problem: Problem, end: np.ndarray) -> list[str]:
+    if isinstance(problem.goal, np.ndarray):
+        return [] if np.allclose(end, problem.goal, atol=1e-6) else ["the motion does not end at the goal"]
+    whole = problem.request.scene.positions.copy()
+    whole[model.group(GROUP).indices] = end
+    error = pin.log6(model.link_transforms(whole)[TIP].actInv(problem.goal)).vector
+    return [] if np.abs(error).max() < 1e-3 else [f"the motion ends {np.abs(error).max():.4f} from the goal"]
+
+
+def examine(model: RobotModel, checker: IndependentChecker, kind: str, count: int, seed: int = 1) -> Tally:
+    """Plans random problems and collects what is wrong with the motions."""
+    pipeline, tally = make_pipeline(model, kind, seed), Tally(violations=[])
+    for number, problem in enumerate(problems(model, kind, count, seed)):
+        try:
+            answer = pipeline.plan(problem.request)
+        except PlanningError:
+            tally.unsolved += 1
+            continue
+        tally.solved += 1
+        tally.violations += [f"{kind} {number}: {text}" for text in violations(model, checker, problem, answer)]
+    return tally

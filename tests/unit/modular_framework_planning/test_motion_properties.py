@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Motions of every pipeline have the properties a robot relies on; all 200 problems each: benchmarks/properties."""
+from __future__ import annotations
+
+import os
+
+import pytest
+from independent_checker import IndependentChecker
+from motion_properties import examine
+
+from modular_framework_planning.urdf_document import package_resolver
+
+SHARE = {"ompl": 8, "ptp": 30, "lin": 30, "stomp": 5}
+
+
+@pytest.mark.parametrize("kind", SHARE)
+def test_random_motions_have_all_properties(robot: object, kind: str) -> None:
+    """PROPERTY_PROBLEMS sets the number of problems of each pipeline."""
+    count = int(os.environ.get("PROPERTY_PROBLEMS", SHARE[kind]))
+    checker = IndependentChecker(robot.urdf, robot.srdf, package_resolver)
+    tally = examine(robot.model, checker, kind, count)
+    print(f"{kind}: {tally.solved} solved, {tally.unsolved} not")
+    assert not tally.violations
+    assert tally.solved >= count // 10, "there are motions to look at"
