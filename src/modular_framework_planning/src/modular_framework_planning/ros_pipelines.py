@@ -2,6 +2,7 @@
 """Builds the planning pipelines from the parameters of the node, in the layouts config packages load them."""
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any
@@ -124,8 +125,16 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet
         rospy.logwarn("planning pipeline '%s' is left out: %s", name, reason)
     seeded = SeededPlanning(model, specs)
     if any(pipeline.settings.seed is not None for pipeline in loaded.values()):
-        seeded.start()
+        threading.Thread(target=_start, args=(seeded,), daemon=True).start()
     return PipelineSet(loaded, default, refused, seeded)
+
+
+def _start(seeded: SeededPlanning) -> None:
+    """Starts the worker early; a request that cannot wait for it gets the reason itself."""
+    try:
+        seeded.start()
+    except PlanningError as error:
+        rospy.logerr("%s", error.reason)
 
 
 def _spec(name: str, parameters: Mapping[str, Any]) -> PipelineSpec:

@@ -24,7 +24,7 @@ from modular_framework_planning.scene_pickling import from_bytes, to_bytes
 from modular_framework_planning.seeded_worker import LENGTH, Failure, WorkerSetup, receive, send
 
 POLL_S = 0.02
-START_TIMEOUT_S = 180.0
+START_TIMEOUT_S = 300.0
 GRACE_S = 30.0  # after the allowed time, before a child that does not answer is given up
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
 
@@ -131,7 +131,8 @@ class SeededPlanning:
         begun = time.monotonic()
         while not select.select([connection], [], [], POLL_S)[0]:
             if request.cancelled():
-                raise PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {time.monotonic() - begun:.2f} s")
+                raise PlanningError(ErrorCode.PREEMPTED,
+                                    f"planning was cancelled after {time.monotonic() - begun:.2f} s")
             if time.monotonic() > end:
                 raise PlanningError(ErrorCode.TIMED_OUT, "the process of a seeded plan gave no answer within "
                                     f"{request.allowed_time_s + GRACE_S:.0f} s")
