@@ -11,7 +11,8 @@ import pinocchio as pin
 from independent_checker import IndependentChecker
 
 from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constraints import JointConstraint, KinematicConstraints
+from modular_framework_planning.constraint_kinds import JointConstraint
+from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.ompl_planning import OmplPlanner

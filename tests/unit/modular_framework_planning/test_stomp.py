@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.constraints import JointConstraint, KinematicConstraints
+from modular_framework_planning.constraint_kinds import JointConstraint
+from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
