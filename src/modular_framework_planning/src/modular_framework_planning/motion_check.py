@@ -1,33 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks straight motions of one group: a whole edge per call, far-apart samples first so that hits show early."""
+"""Checks straight motions of one group: a whole edge or path per call."""
 from __future__ import annotations
-
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.spatial import Array
-
-
-@lru_cache(maxsize=4096)
-def bisecting_order(count: int) -> NDArray[np.int64]:
-    """Returns 1..count in an order that halves the largest unchecked gap each time, the last sample first."""
-    order, seen = [count], {0, count}
-    gaps = [(0, count)]
-    while gaps:
-        following = []
-        for low, high in gaps:
-            middle = (low + high) // 2
-            if middle in (low, high):
-                continue
-            if middle not in seen:
-                order.append(middle)
-                seen.add(middle)
-            following += [(low, middle), (middle, high)]
-        gaps = following
-    return np.array(order, dtype=np.int64)
 
 
 class MotionChecker:
@@ -57,21 +36,12 @@ class MotionChecker:
 
         The start itself is not looked at, the end is.
         """
-        delta = end - start
-        count = max(1, int(np.ceil(float(np.abs(delta).max()) / step)))
-        samples = start + bisecting_order(count)[:, None] / count * delta
-        if self._members:
-            return all(self.state_is_free(values) for values in samples)
-        positions = self._rest.copy()
-        indices, is_free = self._indices, self._checker.is_free
-        for values in samples:
-            positions[indices] = values
-            if not is_free(positions):
-                return False
-        return True
+        return self._checker.path_is_free(self._whole_path(np.array([start, end])), step, 1)
 
     def first_collision(self, polyline: Array, step: float) -> Array | None:
         """Returns the first colliding sample along straight pieces (start included), or None."""
+        if self._checker.path_is_free(self._whole_path(polyline), step):
+            return None
         if not self.state_is_free(polyline[0]):
             return polyline[0]
         for start, end in zip(polyline[:-1], polyline[1:], strict=True):
@@ -83,3 +53,11 @@ class MotionChecker:
                 if not self.state_is_free(values):
                     return values
         return None
+
+    def _whole_path(self, path: Array) -> Array:
+        if self._members:
+            return np.array([self.whole(values) for values in path])
+        result = np.empty((len(path), len(self._rest)))
+        result[:] = self._rest
+        result[:, self._indices] = path
+        return result

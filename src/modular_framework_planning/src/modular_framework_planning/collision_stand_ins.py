@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes the stand-ins of collision geometries that compiled checks work on.
+
+Whatever Coal geometry a body has, it gets stand-ins: a surface of triangles, a solid in closed form, or both. A
+stand-in encloses the body; where it is larger, a hit with it is not final and the exact check is asked.
+"""
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_planning.collision_bodies import PlacedGeometry
+from modular_framework_planning.compiled_collision import Surfaces
+from modular_framework_planning.compiled_distance import (
+    BOX,
+    CAPSULE,
+    CONE,
+    CYLINDER,
+    HALF_SPACE,
+    PLANE,
+    SPHERE,
+    SURFACE,
+)
+from modular_framework_planning.compiled_triangles import build_sphere_tree, cut_long_edges
+from modular_framework_planning.shapes import Octree, Shape
+from modular_framework_planning.spatial import Array, Transform
+
+LONGEST_EDGE, LONGEST_SHARE = 0.02, 0.05  # [m], and as a share of a surface's extent; longer triangles are cut
+SIDES = 64  # of the prism around a cylinder or cone: 1.2 mm too wide at 1 m radius
+_lock = threading.Lock()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StandIn:
+    """What a geometry is checked as, in its own frame.
+
+    Attributes:
+        surface: sphere tree over triangles, or None.
+        swell: radius of a ball around every point of the surface that belongs to it [m].
+        surface_is_exact: whether the swollen surface is the geometry's own.
+        kind, size: closed form, SURFACE for none; solid_is_exact: whether it is the geometry's own.
+        offset: pose of both in the geometry's frame.
+        is_closed: whether the surface has an inside.
+    """
+
+    surface: Surfaces | None
+    swell: float = 0.0
+    surface_is_exact: bool = True
+    kind: int = SURFACE
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    solid_is_exact: bool = True
+    offset: Transform = field(default_factory=pin.SE3.Identity)
+    is_closed: bool = False
+
+
+_of_shapes: WeakKeyDictionary[Shape, StandIn] = WeakKeyDictionary()
+
+
+def stand_in(part: PlacedGeometry) -> StandIn:
+    """Returns the stand-in of a geometry; that of a shape is made once."""
+    if not isinstance(part.source, Shape):
+        return _make(part.geometry, part.source)
+    with _lock:
+        found = _of_shapes.get(part.source)
+        if found is None:
+            found = _of_shapes[part.source] = _make(part.geometry, part.source)
+        return found
+
+
+def _make(geometry: Any, source: Any) -> StandIn:
+    if isinstance(source, Octree):
+        points = np.tile(source.centers, 3)
+        return StandIn(_surface(points), source.resolution * np.sqrt(0.75), surface_is_exact=False)
+    match geometry:
+        case coal.BVHModelBase():
+            triangles = _mesh_triangles(geometry)
+            return StandIn(_surface(triangles), is_closed=_is_closed(triangles))
+        case coal.Box():
+            x, y, z = (float(value) for value in geometry.halfSide)
+            return StandIn(_surface(_box_triangles(x, y, z)), kind=BOX, size=(x, y, z))
+        case coal.Sphere():
+            return StandIn(_surface(np.zeros((1, 9))), float(geometry.radius), kind=SPHERE,
+                           size=(float(geometry.radius), 0.0, 0.0))
+        case coal.Capsule():
+            radius, half = float(geometry.radius), float(geometry.halfLength)
+            return StandIn(_surface(np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float)), radius,
+                           kind=CAPSULE, size=(radius, half, 0.0))
+        case coal.Cylinder():
+            radius, half = float(geometry.radius), float(geometry.halfLength)
+            return StandIn(_surface(_prism_triangles(radius, radius, half)), 0.0, False, CYLINDER, (radius, half, 0.0))
+        case coal.Cone():
+            radius, half = float(geometry.radius), float(geometry.halfLength)
+            return StandIn(_surface(_prism_triangles(radius, 0.0, half)), 0.0, False, CONE, (radius, half, 0.0))
+        case coal.Plane() | coal.Halfspace():
+            normal = np.array(geometry.n, dtype=float)
+            kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
+            return StandIn(None, kind=kind, size=(float(normal[0]), float(normal[1]), float(normal[2])),
+                           offset=pin.SE3(np.eye(3), normal * float(geometry.d)))
+        case _:
+            return _bounding_box(geometry)
+
+
+def _bounding_box(geometry: Any) -> StandIn:
+    geometry.computeLocalAABB()
+    low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
+    x, y, z = (float(value) for value in 0.5 * (high - low))
+    middle = 0.5 * (low + high)
+    return StandIn(_surface(_box_triangles(x, y, z)), 0.0, False, BOX, (x, y, z), False,
+                   pin.SE3(np.eye(3), middle))
+
+
+def _surface(triangles: Array) -> Surfaces:
+    triangles = np.ascontiguousarray(triangles, dtype=float)
+    corners = triangles.reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    triangles = cut_long_edges(triangles, max(LONGEST_EDGE, LONGEST_SHARE * extent))
+    spheres, boxes, links = build_sphere_tree(triangles)
+    return Surfaces(spheres, boxes, links, triangles)
+
+
+def _mesh_triangles(mesh: Any) -> Array:
+    vertices = np.array(mesh.vertices(), dtype=float)
+    corners = np.array([[triangle[0], triangle[1], triangle[2]]
+                        for triangle in (mesh.tri_indices(number) for number in range(mesh.num_tris))])
+    return vertices[corners].reshape(-1, 9)
+
+
+def _is_closed(triangles: Array) -> bool:
+    """Whether every edge is passed as often in one direction as in the other: then the surface has an inside."""
+    _, corners = np.unique(np.round(triangles.reshape(-1, 3), 7), axis=0, return_inverse=True)
+    faces = corners.reshape(-1, 3).astype(np.int64)
+    starts, ends = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    size = int(faces.max()) + 1
+    return bool(np.array_equal(np.sort(starts * size + ends), np.sort(ends * size + starts)))
+
+
+def _box_triangles(x: float, y: float, z: float) -> Array:
+    result = []
+    for axis, half in enumerate((x, y, z)):
+        for sign in (-1.0, 1.0):
+            corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+            face = np.insert(corners, axis, sign, axis=1) * (x, y, z)
+            result += [face[[0, 1, 2]], face[[0, 2, 3]]]
+    return np.array(result).reshape(-1, 9)
+
+
+def _prism_triangles(below: float, above: float, half: float) -> Array:
+    """A prism (or pyramid) around a cylinder (or cone) along z with the given radii at both ends."""
+    angles = np.arange(SIDES + 1) * 2.0 * np.pi / SIDES
+    rim = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / SIDES)
+    result = []
+    for here, there in zip(rim[:-1], rim[1:], strict=True):
+        a, b, c, d = ([*(point * radius), z] for z, radius in ((-half, below), (half, above)) for point in (here, there))
+        result += [[a, b, [0, 0, -half]], [a, b, d], [a, d, c]]
+        if above > 0.0:
+            result.append([c, d, [0, 0, half]])
+    return np.array(result, dtype=float).reshape(-1, 9)
+
+
+def moved(surface: Surfaces, pose: Transform) -> Surfaces:
+    """Returns a surface in the frame in which its own frame has the given pose."""
+    spheres = surface.spheres.copy()
+    spheres[:, :3] = spheres[:, :3] @ pose.rotation.T + pose.translation
+    boxes = surface.boxes.copy()
+    boxes[:, :3] = boxes[:, :3] @ pose.rotation.T + pose.translation
+    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3) @ pose.rotation.T).reshape(-1, 9)
+    corners = surface.triangles.reshape(-1, 3) @ pose.rotation.T + pose.translation
+    return Surfaces(spheres, boxes, surface.links, np.ascontiguousarray(corners.reshape(-1, 9)))
+
+
+def stacked(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:
+    """Returns surfaces in one set of arrays and the root node of each."""
+    nodes = np.cumsum([0, *(len(item.spheres) for item in surfaces)])
+    faces = np.cumsum([0, *(len(item.triangles) for item in surfaces)])
+    links = [np.where(item.links[:, :1] < 0, [[-1, 0]] + item.links * [[0, 1]] + [[0, face]], item.links + node)
+             for item, node, face in zip(surfaces, nodes, faces, strict=False)]
+    if not surfaces:
+        return Surfaces(np.zeros((0, 4)), np.zeros((0, 15)), np.zeros((0, 2), np.int32), np.zeros((0, 9))), []
+    return Surfaces(np.concatenate([item.spheres for item in surfaces]),
+                    np.concatenate([item.boxes for item in surfaces]),
+                    np.ascontiguousarray(np.concatenate(links), dtype=np.int32),
+                    np.concatenate([item.triangles for item in surfaces])), nodes[:-1].tolist()

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Compiled work on triangle meshes: trees of bounding spheres, and the exact distance of two triangles."""
+from __future__ import annotations
+
+import numpy as np
+
+from numba import njit
+
+CENTRING_STEPS = 12
+RAY = (0.4613, 0.5417, 0.7027)  # a direction no mesh is likely to have edges along; of length 1 within 1e-4
+
+
+@njit(cache=True, nogil=True)
+def cut_long_edges(triangles, longest):  # type: ignore[no-untyped-def]
+    """Halves triangles (m, 9) until no edge is longer than `longest` [m]: a sphere fits badly around a long one."""
+    kept = np.empty((2 * len(triangles) + 16, 9))
+    waiting = np.empty((64, 9))
+    used = 0
+    for triangle in triangles:
+        waiting[0] = triangle
+        depth = 1
+        while depth > 0:
+            depth -= 1
+            if depth > 60 or halve_longest_edge(waiting, depth, longest * longest):
+                if used == len(kept):
+                    larger = np.empty((2 * used, 9))
+                    larger[:used] = kept
+                    kept = larger
+                kept[used] = waiting[depth]
+                used += 1
+            else:
+                depth += 2
+    return kept[:used].copy()
+
+
+@njit(cache=True, nogil=True)
+def halve_longest_edge(pieces, at, enough):  # type: ignore[no-untyped-def]
+    """Puts the halves that its longest edge gives in the place of a triangle and behind it.
+
+    Returns:
+        True, and changes nothing, where the square of that edge is at most `enough`.
+    """
+    t = pieces[at]
+    a = (t[0] - t[3]) ** 2 + (t[1] - t[4]) ** 2 + (t[2] - t[5]) ** 2
+    b = (t[3] - t[6]) ** 2 + (t[4] - t[7]) ** 2 + (t[5] - t[8]) ** 2
+    c = (t[6] - t[0]) ** 2 + (t[7] - t[1]) ** 2 + (t[8] - t[2]) ** 2
+    if max(a, max(b, c)) <= enough:
+        return True
+    first, second = (0, 3) if a >= b and a >= c else ((3, 6) if b >= c else (6, 0))
+    for row in range(9):
+        pieces[at + 1, row] = t[row]
+    for row in range(3):
+        middle = 0.5 * (t[first + row] + t[second + row])
+        pieces[at + 1, first + row] = middle
+        t[second + row] = middle
+    return False
+
+
+@njit(cache=True, nogil=True)
+def build_sphere_tree(triangles):  # type: ignore[no-untyped-def]
+    """Builds a binary tree of spheres and boxes, each around all corners of the triangles below it.
+
+    Args:
+        triangles: corners, shape (m, 9) [m]; at least one.
+
+    Returns:
+        spheres (2 m - 1, 4): centre and radius; boxes (2 m - 1, 15): centre, three axes, half lengths;
+        links (2 m - 1, 2): children, or (-1, triangle) for a leaf. Node 0 is the root.
+    """
+    count = len(triangles)
+    spheres, boxes = np.empty((2 * count - 1, 4)), np.empty((2 * count - 1, 15))
+    links = np.empty((2 * count - 1, 2), np.int32)
+    order = np.arange(count)
+    waiting = np.empty((count + 1, 3), np.int64)
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 0, count
+    depth, used = 1, 1
+    while depth > 0:
+        depth -= 1
+        node, low, high = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
+        members = order[low:high]
+        _enclose(triangles, members, spheres[node])
+        _enbox(triangles, members, boxes[node])
+        if high - low == 1:
+            links[node, 0], links[node, 1] = -1, members[0]
+            continue
+        middle = low + _split(triangles, members)
+        links[node, 0], links[node, 1] = used, used + 1
+        waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = used, low, middle
+        waiting[depth + 1, 0], waiting[depth + 1, 1], waiting[depth + 1, 2] = used + 1, middle, high
+        depth += 2
+        used += 2
+    return spheres, boxes, links
+
+
+@njit(cache=True, nogil=True)
+def _split(triangles, members):  # type: ignore[no-untyped-def]
+    """Sorts the members into those before and behind the middle of their widest axis; returns how many are before."""
+    widest, extent, value = 0, -1.0, 0.0
+    for axis in range(3):
+        least, most = np.inf, -np.inf
+        for member in members:
+            centre = triangles[member, axis] + triangles[member, axis + 3] + triangles[member, axis + 6]
+            least, most = min(least, centre), max(most, centre)
+        if most - least > extent:
+            widest, extent, value = axis, most - least, 0.5 * (least + most)
+    before = 0
+    for place in range(len(members)):
+        member = members[place]
+        if triangles[member, widest] + triangles[member, widest + 3] + triangles[member, widest + 6] < value:
+            members[place], members[before] = members[before], member
+            before += 1
+    return before if 0 < before < len(members) else len(members) // 2
+
+
+@njit(cache=True, nogil=True)
+def _enclose(triangles, members, sphere):  # type: ignore[no-untyped-def]
+    """Writes a small sphere around the members' corners (Badoiu and Clarkson's steps towards the farthest corner)."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for member in members:
+        for place in range(9):
+            low[place % 3] = min(low[place % 3], triangles[member, place])
+            high[place % 3] = max(high[place % 3], triangles[member, place])
+    x, y, z = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
+    best = np.inf
+    for step in range(CENTRING_STEPS):
+        squared, far, corner = -1.0, 0, 0
+        for member in members:
+            for place in range(0, 9, 3):
+                distance = ((triangles[member, place] - x) ** 2 + (triangles[member, place + 1] - y) ** 2
+                            + (triangles[member, place + 2] - z) ** 2)
+                if distance > squared:
+                    squared, far, corner = distance, member, place
+        if squared < best:
+            best = squared
+            sphere[0], sphere[1], sphere[2] = x, y, z
+        x += (triangles[far, corner] - x) / (step + 3.0)
+        y += (triangles[far, corner + 1] - y) / (step + 3.0)
+        z += (triangles[far, corner + 2] - z) / (step + 3.0)
+    sphere[3] = np.sqrt(best) * (1.0 + 1.0e-12) + 1.0e-12
+
+
+@njit(cache=True, nogil=True)
+def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
+    """Writes a box around the members, thin along their mean normal: a patch of a surface is nearly flat."""
+    nx, ny, nz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for member in members:
+        t = triangles[member]
+        ux, uy, uz, vx, vy, vz = t[3] - t[0], t[4] - t[1], t[5] - t[2], t[6] - t[0], t[7] - t[1], t[8] - t[2]
+        nx, ny, nz = nx + uy * vz - uz * vy, ny + uz * vx - ux * vz, nz + ux * vy - uy * vx
+        mx, my, mz = mx + t[0] + t[3] + t[6], my + t[1] + t[4] + t[7], mz + t[2] + t[5] + t[8]
+    mx, my, mz = mx / (3 * len(members)), my / (3 * len(members)), mz / (3 * len(members))
+    size = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if size > 1e-200:
+        nx, ny, nz = nx / size, ny / size, nz / size
+    else:
+        nx, ny, nz = 0.0, 0.0, 1.0
+    longest, ax, ay, az = 0.0, 0.0, 0.0, 0.0
+    for member in members:
+        for place in range(0, 9, 3):
+            x, y, z = triangles[member, place] - mx, triangles[member, place + 1] - my, triangles[member, place + 2] - mz
+            height = x * nx + y * ny + z * nz
+            x, y, z = x - height * nx, y - height * ny, z - height * nz
+            if x * x + y * y + z * z > longest:
+                longest, ax, ay, az = x * x + y * y + z * z, x, y, z
+    if longest < 1e-24:
+        height = nx if abs(nx) < 0.7 else ny
+        ax, ay, az = -height * nx, -height * ny, -height * nz
+        if abs(nx) < 0.7:
+            ax += 1.0
+        else:
+            ay += 1.0
+        longest = ax * ax + ay * ay + az * az
+    size = np.sqrt(longest)
+    box[3], box[4], box[5], box[6], box[7], box[8] = nx, ny, nz, ax / size, ay / size, az / size
+    box[9] = ny * box[8] - nz * box[7]
+    box[10] = nz * box[6] - nx * box[8]
+    box[11] = nx * box[7] - ny * box[6]
+    box[0], box[1], box[2] = 0.0, 0.0, 0.0
+    for axis in range(3):
+        dx, dy, dz = box[3 + 3 * axis], box[4 + 3 * axis], box[5 + 3 * axis]
+        low, high = np.inf, -np.inf
+        for member in members:
+            for place in range(0, 9, 3):
+                value = (dx * triangles[member, place] + dy * triangles[member, place + 1]
+                         + dz * triangles[member, place + 2])
+                low, high = min(low, value), max(high, value)
+        box[12 + axis] = 0.5 * (high - low) + 1e-12
+        middle = 0.5 * (low + high)
+        box[0], box[1], box[2] = box[0] + middle * dx, box[1] + middle * dy, box[2] + middle * dz
+
+
+@njit(cache=True, nogil=True)
+def triangle_distance(first, second):  # type: ignore[no-untyped-def]
+    """Returns the distance [m] of two triangles of 9 corner coordinates each; 0 where they cross."""
+    best = min(_faces_distance(first, second), _faces_distance(second, first))
+    if best <= 0.0:
+        return 0.0
+    for edge in range(3):
+        for other in range(3):
+            best = min(best, _edge_distance(first, edge, second, other))
+    return np.sqrt(best)
+
+
+@njit(cache=True, nogil=True)
+def _faces_distance(face, other):  # type: ignore[no-untyped-def]
+    """Squared distance of the corners of `other` that lie above the inside of `face`; 0 if an edge goes through it."""
+    ux, uy, uz = face[3] - face[0], face[4] - face[1], face[5] - face[2]
+    vx, vy, vz = face[6] - face[0], face[7] - face[1], face[8] - face[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    size = nx * nx + ny * ny + nz * nz
+    if size <= 0.0:
+        return np.inf
+    best = np.inf
+    heights = np.empty(3)
+    for corner in range(3):
+        heights[corner] = ((other[3 * corner] - face[0]) * nx + (other[3 * corner + 1] - face[1]) * ny
+                           + (other[3 * corner + 2] - face[2]) * nz)
+    for corner in range(3):
+        following = (corner + 1) % 3
+        span = heights[corner] - heights[following]
+        if heights[corner] * heights[following] > 0.0:
+            continue
+        share = heights[corner] / span if span != 0.0 else 0.0
+        p, q = 3 * corner, 3 * following
+        if _above(face, nx, ny, nz, other[p] + share * (other[q] - other[p]),
+                  other[p + 1] + share * (other[q + 1] - other[p + 1]),
+                  other[p + 2] + share * (other[q + 2] - other[p + 2])):
+            return 0.0
+    for corner in range(3):
+        p = 3 * corner
+        if _above(face, nx, ny, nz, other[p], other[p + 1], other[p + 2]):
+            best = min(best, heights[corner] * heights[corner] / size)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _above(face, nx, ny, nz, x, y, z):  # type: ignore[no-untyped-def]
+    """Whether a point's projection lies inside the face of that normal."""
+    for corner in range(3):
+        p, q = 3 * corner, 3 * ((corner + 1) % 3)
+        ex, ey, ez = face[q] - face[p], face[q + 1] - face[p + 1], face[q + 2] - face[p + 2]
+        dx, dy, dz = x - face[p], y - face[p + 1], z - face[p + 2]
+        if (ey * dz - ez * dy) * nx + (ez * dx - ex * dz) * ny + (ex * dy - ey * dx) * nz < 0.0:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
+    """Squared distance of one edge of each triangle."""
+    p, q, r, s = 3 * edge, 3 * ((edge + 1) % 3), 3 * other, 3 * ((other + 1) % 3)
+    ax, ay, az = first[q] - first[p], first[q + 1] - first[p + 1], first[q + 2] - first[p + 2]
+    bx, by, bz = second[s] - second[r], second[s + 1] - second[r + 1], second[s + 2] - second[r + 2]
+    wx, wy, wz = first[p] - second[r], first[p + 1] - second[r + 1], first[p + 2] - second[r + 2]
+    aa, bb, ab = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, ax * bx + ay * by + az * bz
+    aw, bw = ax * wx + ay * wy + az * wz, bx * wx + by * wy + bz * wz
+    det = aa * bb - ab * ab
+    along = min(max((ab * bw - bb * aw) / det, 0.0), 1.0) if det > 1.0e-12 * aa * bb else 0.0
+    across = (ab * along + bw) / bb if bb > 0.0 else 0.0
+    if across < 0.0 or across > 1.0:
+        across = min(max(across, 0.0), 1.0)
+        along = min(max((ab * across - aw) / aa, 0.0), 1.0) if aa > 0.0 else 0.0
+    return ((wx + along * ax - across * bx) ** 2 + (wy + along * ay - across * by) ** 2
+            + (wz + along * az - across * bz) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def encloses(spheres, links, triangles, root, x, y, z):  # type: ignore[no-untyped-def]
+    """Whether a closed surface goes round a point: a ray from it leaves more often than it enters."""
+    dx, dy, dz = RAY
+    stack = np.empty(512, np.int32)
+    stack[0] = root
+    depth, crossings = 1, 0
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        wx, wy, wz = spheres[node, 0] - x, spheres[node, 1] - y, spheres[node, 2] - z
+        along = wx * dx + wy * dy + wz * dz
+        squared = wx * wx + wy * wy + wz * wz
+        reach = spheres[node, 3] * spheres[node, 3]
+        if squared - along * along > reach or (along < 0.0 and squared > reach):
+            continue
+        if links[node, 0] >= 0:
+            stack[depth], stack[depth + 1] = links[node, 0], links[node, 1]
+            depth += 2
+            continue
+        crossings += _crossing(triangles[links[node, 1]], x, y, z)
+    return crossings > 0
+
+
+@njit(cache=True, nogil=True)
+def _crossing(t, x, y, z):  # type: ignore[no-untyped-def]
+    """1 where the ray from a point leaves through the front of a triangle, -1 where it enters, else 0."""
+    dx, dy, dz = RAY
+    ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
+    vx, vy, vz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    slope = dx * nx + dy * ny + dz * nz
+    if slope == 0.0:
+        return 0
+    distance = ((t[0] - x) * nx + (t[1] - y) * ny + (t[2] - z) * nz) / slope
+    if distance < 0.0 or not _above(t, nx, ny, nz, x + distance * dx, y + distance * dy, z + distance * dz):
+        return 0
+    return 1 if slope > 0.0 else -1
