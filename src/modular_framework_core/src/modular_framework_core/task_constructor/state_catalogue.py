@@ -144,7 +144,7 @@ def _read_state(name: str, file: Path) -> StateSource:
             f"{file} must define the class {wanted} (the file name in camel case); it defines: "
             f"{', '.join(classes) or 'no class'}"
         )
-    options, takes_any = _constructor_options(classes[wanted], classes, _aliases(tree))
+    options, takes_any = _constructor_options(classes[wanted], classes, {**_imported(tree, file), **_aliases(tree)})
     return StateSource(name, file, wanted, options, takes_any, ast.get_docstring(classes[wanted]) or "")
 
 
@@ -152,6 +152,20 @@ def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
     """Return the plain assignments of a module: the names a type may have been given."""
     return {node.targets[0].id: node.value for node in tree.body
             if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)}
+
+
+def _imported(tree: ast.Module, file: Path) -> dict[str, ast.expr]:
+    """Return the plain assignments of modules beside a file, as far as it imports them by name from its own package."""
+    root = file.parent
+    while (root / "__init__.py").is_file():
+        root = root.parent
+    found: dict[str, ast.expr] = {}
+    for node in tree.body:
+        source = root.joinpath(*(node.module or "").split(".")) if isinstance(node, ast.ImportFrom) else root
+        if isinstance(node, ast.ImportFrom) and not node.level and (source := source.with_suffix(".py")).is_file():
+            aliases = _aliases(ast.parse(source.read_text(encoding="utf-8")))
+            found |= {item.asname or item.name: aliases[item.name] for item in node.names if item.name in aliases}
+    return found
 
 
 def _constructor_options(

@@ -2,10 +2,11 @@
 """Lets a task execute a plan, and makes sure that the arm got where the plan ends."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_states.arm_positions import worst_joint
 from modular_framework_states.manager_clients import ManagerError, fetch
 
 SETTLE_TIME_S = 2.0
@@ -44,7 +45,7 @@ class Move(FrameworkState):
             return self.fail(f"plan '{self._plan_name}' has no point")
         first, last = (dict(zip(trajectory.joint_names, trajectory.points[index].positions, strict=False))
                        for index in (0, -1))
-        away = self._worst(commander, first)
+        away = worst_joint(commander.current_joints(), first)
         if away[1] > self._start_tolerance:
             return self.fail(f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
                              f"its first point, allowed is {self._start_tolerance}; plan again from the current state")
@@ -53,10 +54,11 @@ class Move(FrameworkState):
             return self.stopped()
         if not result:
             return self.fail(f"plan '{self._plan_name}' was not executed: {result.reason}")
-        if not self.wait_until(lambda: self._worst(commander, last)[1] <= self._goal_tolerance, SETTLE_TIME_S):
+        if not self.wait_until(lambda: worst_joint(commander.current_joints(), last)[1] <= self._goal_tolerance,
+                               SETTLE_TIME_S):
             if self.preempt_requested():
                 return self.stopped()
-            joint, distance = self._worst(commander, last)
+            joint, distance = worst_joint(commander.current_joints(), last)
             return self.fail(f"plan '{self._plan_name}' was executed, but joint '{joint}' is {distance:.4f} away from "
                              f"its last point, allowed is {self._goal_tolerance}")
         return self.succeed()
@@ -67,11 +69,3 @@ class Move(FrameworkState):
         if userdata.selected_plan is None:
             raise ManagerError("userdata 'selected_plan' is empty; select or make a plan first")
         return userdata.selected_plan
-
-    @staticmethod
-    def _worst(commander: Any, wanted: Mapping[str, float]) -> tuple[str, float]:
-        """Returns the joint farthest from where it should be, and how far it is."""
-        current = commander.current_joints()
-        distances = {joint: abs(current.get(joint, float("inf")) - position) for joint, position in wanted.items()}
-        worst = max(distances, key=distances.__getitem__)
-        return worst, distances[worst]

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sends stages of a grasp to the manipulator's action server and understands the answer, on behalf of the states."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, get_args
+
+from modular_framework_core.msg import GraspCommand, GraspGoal
+from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result
+
+Stage = Literal["pregrasp", "grasp", "postgrasp"]
+STAGES = get_args(Stage)
+SERVER_TIMEOUT_S = 10.0
+SUCCEEDED = 3
+_NUMBERS = {"pregrasp": GraspCommand.PRE_GRASP_STATE, "grasp": GraspCommand.GRASP_STATE,
+            "postgrasp": GraspCommand.POST_GRASP_STATE}
+_RESULT_FLAGS = {"pregrasp": "pregrasped", "grasp": "grasped", "postgrasp": "postgrasped"}
+
+
+class GraspGoalError(RuntimeError):
+    """A stage was not reached; the text says why."""
+
+
+def send(client: Any, stage: Stage, grasp: Any, max_torque: float, timeout_s: float,
+         stop_requested: Callable[[], bool]) -> None:
+    """Sends a stage of a grasp and waits for its end; returns when the server says that the stage was reached.
+
+    Args:
+        client: Client of the manipulator's action server; None when the task has no manipulator.
+        stage: Stage of the grasp.
+        grasp: The grasp message.
+        max_torque: Share of the greatest torque.
+        timeout_s: Longest wait for the end [s].
+        stop_requested: Asked all the time; True cancels the goal.
+
+    Raises:
+        GraspGoalError: There is no manipulator or no server, or the stage was not reached, or a stop was requested.
+    """
+    if client is None:
+        raise GraspGoalError("the task has no manipulator; set manipulator_prefix to drive one")
+    try:
+        wait_for_action(client, "the manipulator's action server", SERVER_TIMEOUT_S)
+    except CallError as error:
+        raise GraspGoalError(str(error)) from error
+    command = GraspCommand(grasp_state=_NUMBERS[stage], grasp=grasp, max_torque=float(max_torque))
+    client.send_goal(GraspGoal(grasp_command=command))
+    status = wait_for_result(client, timeout_s, stop_requested)
+    result = client.get_result()
+    if status == SUCCEEDED and result is not None and getattr(result, _RESULT_FLAGS[stage]).data:
+        return
+    raise GraspGoalError(client.get_goal_status_text() or f"the server answered status {status} and no reason")

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task run a trajectory that was written down, not planned."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import rospy
+from moveit_msgs.msg import RobotTrajectory
+from moveit_msgs.srv import GetStateValidity, GetStateValidityRequest
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.moveit_requests import robot_state
+from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_states.arm_positions import worst_joint
+from modular_framework_states.manager_clients import ManagerError, fetch
+
+SETTLE_TIME_S = 2.0
+TIMEOUT_S = 10.0
+
+
+class ExecuteTrajectory(FrameworkState):
+    """Runs a trajectory of the trajectory manager from where the arm is; positive when the arm stands at its end.
+
+    The way from where the arm is to the first point is part of the motion. As nobody planned it, every state on the
+    way is checked for collisions first.
+
+    Args:
+        trajectory_name: Name of the trajectory; empty takes the oldest anonymous one. Userdata
+            ``selected_trajectory`` is taken instead when it is an input key.
+        step: Distance of the collision checks [rad or m]; 0 leaves them out.
+        goal_tolerance: Greatest distance from the last point that counts as there [rad or m].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+    """
+
+    def __init__(self, trajectory_name: str = "", step: float = 0.05, goal_tolerance: float = 0.03,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if not float(step) >= 0.0 or not float(goal_tolerance) > 0.0:
+            raise ValueError(f"ExecuteTrajectory: step {step} must be 0 or more and goal_tolerance {goal_tolerance} "
+                             "above 0")
+        self._name, self._step, self._goal_tolerance = trajectory_name, float(step), float(goal_tolerance)
+
+    def execute(self, userdata: Any) -> str:
+        """Checks the way and runs the trajectory."""
+        commander = userdata.arm_commander
+        what = f"trajectory '{self._name or 'selected'}'"
+        try:
+            trajectory = from_current(self._trajectory(userdata), commander.current_joints())
+            contact = self._first_contact(commander, trajectory) if self._step else ""
+        except (ManagerError, CallError, ValueError) as error:
+            return self.fail(f"{what}: {error}")
+        if self.preempt_requested():
+            return self.stopped()
+        if contact:
+            return self.fail(f"{what} was not run: {contact}")
+        result = commander.execute_plan(RobotTrajectory(joint_trajectory=trajectory),
+                                        stop_requested=self.preempt_requested)
+        if self.preempt_requested():
+            return self.stopped()
+        if not result:
+            return self.fail(f"{what} was not run to its end: {result.reason}")
+        last = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
+        if self.wait_until(lambda: worst_joint(commander.current_joints(), last)[1] <= self._goal_tolerance,
+                           SETTLE_TIME_S):
+            return self.succeed()
+        if self.preempt_requested():
+            return self.stopped()
+        joint, away = worst_joint(commander.current_joints(), last)
+        return self.fail(f"{what} was run, but joint '{joint}' is {away:.4f} away from its last point, allowed is "
+                         f"{self._goal_tolerance}")
+
+    def _trajectory(self, userdata: Any) -> JointTrajectory:
+        if "selected_trajectory" not in self.get_registered_input_keys():
+            return fetch("trajectory", self._name)
+        if userdata.selected_trajectory is None:
+            raise ManagerError("userdata 'selected_trajectory' is empty; select a trajectory first")
+        return userdata.selected_trajectory
+
+    def _first_contact(self, commander: Any, trajectory: JointTrajectory) -> str:
+        """Says where the first collision on the way is; nothing when the way is free."""
+        proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
+        wait_for_service(proxy, TIMEOUT_S)
+        for number, positions in samples(trajectory, self._step):
+            if self.preempt_requested():
+                return ""
+            joints = dict(zip(trajectory.joint_names, positions, strict=True))
+            request = GetStateValidityRequest(robot_state=robot_state(joints), group_name=commander.group_name)
+            answer = call_service(proxy, request, TIMEOUT_S)
+            if not answer.valid:
+                pairs = sorted({f"'{item.contact_body_1}' with '{item.contact_body_2}'" for item in answer.contacts})
+                return (f"on the way to point {number} the robot would be in collision "
+                        f"({', '.join(pairs[:3]) or 'move_group says only that the state is not valid'})")
+        return ""
+
+
+def from_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> JointTrajectory:
+    """Returns a trajectory that begins where the arm is: with that as a point at time 0, unless it has one.
+
+    Raises:
+        ValueError: The trajectory has no point, or a joint whose position is not known, or points of other lengths.
+    """
+    unknown = [joint for joint in trajectory.joint_names if joint not in current]
+    lengths = {len(point.positions) for point in trajectory.points}
+    if not trajectory.points or unknown or lengths != {len(trajectory.joint_names)}:
+        raise ValueError(f"it has {len(trajectory.points)} points of {sorted(lengths)} positions for "
+                         f"{len(trajectory.joint_names)} joints, and the joints {unknown} are none of the arm's: "
+                         f"{', '.join(current)}")
+    if trajectory.points[0].time_from_start.to_sec() <= 0.0:
+        return trajectory
+    start = JointTrajectoryPoint(positions=[current[joint] for joint in trajectory.joint_names],
+                                 time_from_start=rospy.Duration(0))
+    return JointTrajectory(joint_names=trajectory.joint_names, points=[start, *trajectory.points])
+
+
+def samples(trajectory: JointTrajectory, step: float) -> list[tuple[int, list[float]]]:
+    """Returns states on the straight pieces between points, each with the number of the point it leads to, from 0."""
+    rows = [np.asarray(point.positions, dtype=float) for point in trajectory.points]
+    result = [(0, rows[0].tolist())]
+    for number, (start, end) in enumerate(zip(rows[:-1], rows[1:], strict=True), start=1):
+        count = max(1, int(np.ceil(np.abs(end - start).max() / step)))
+        result += [(number, (start + share / count * (end - start)).tolist()) for share in range(1, count + 1)]
+    return result

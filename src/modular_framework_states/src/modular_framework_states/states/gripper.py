@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task open or close the manipulator without a grasp message."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import rospy
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.robot_groups import RobotModelError, read_group
+from modular_framework_states.grasp_goals import GraspGoalError, send
+
+
+class Gripper(FrameworkState):
+    """Brings the fingers to a posture; positive when they got there or, with ``grip``, when they hold something.
+
+    Args:
+        posture: Name of a state of the manipulator's planning group: open, closed.
+        positions: Joint to position [rad or m], instead of a posture.
+        grip: True closes on an object: it is positive when something stops the fingers before they are shut.
+        torque: Share of the greatest torque, in (0, 1].
+        timeout: Longest wait for the end of the motion [s].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
+    """
+
+    def __init__(self, posture: str = "", positions: Mapping[str, float] | None = None, grip: bool = False,
+                 torque: float = 1.0, timeout: float = 30.0, outcomes: Sequence[str] = ("success", "fail"),
+                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
+                 io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        if bool(posture) == bool(positions):
+            raise ValueError("Gripper: give either posture or positions")
+        if not 0.0 < float(torque) <= 1.0:
+            raise ValueError(f"Gripper: torque is {torque}, allowed is more than 0, up to 1")
+        self._posture, self._positions = posture, dict(positions or {})
+        self._stage = "grasp" if grip else "pregrasp"
+        self._torque, self._timeout_s = float(torque), float(timeout)
+
+    def execute(self, userdata: Any) -> str:
+        """Moves the fingers."""
+        wanted = self._posture or ", ".join(f"{joint} {position}" for joint, position in self._positions.items())
+        try:
+            positions = self._positions or self._positions_of_posture()
+            grasp = _grasp_with(positions, self._torque)
+            send(userdata.manipulator_controller_client, self._stage, grasp, userdata.max_torque, self._timeout_s,
+                 self.preempt_requested)
+        except (RobotModelError, GraspGoalError) as error:
+            return self.stopped() if self.preempt_requested() else self.fail(f"gripper to {wanted}: {error}")
+        return self.succeed()
+
+    def _positions_of_posture(self) -> dict[str, float]:
+        values = {name: str(rospy.get_param(name, "")) for name in
+                  ("manipulator_group_name", "robot_description", "robot_description_semantic")}
+        missing = [rospy.resolve_name(name) for name, value in values.items() if not value]
+        if missing:
+            raise RobotModelError(f"the parameters {', '.join(missing)} are not set; load the robot first")
+        group = read_group(values["robot_description"], values["robot_description_semantic"],
+                           values["manipulator_group_name"])
+        if self._posture not in group.states:
+            raise RobotModelError(f"group '{group.name}' has no state '{self._posture}'; it has "
+                                  f"{', '.join(group.states) or 'none'}")
+        return group.states[self._posture]
+
+
+def _grasp_with(positions: Mapping[str, float], torque: float) -> Any:
+    """Makes a grasp message whose stages all have one posture."""
+    pose = generate_pose_stamped_message("world", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    values = list(positions.values())
+    return get_standardised_grasp(list(positions), values, values, values, [torque] * len(values), pose, pose, pose)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What holds for every state of the framework, and for the one to begin with: found, documented, typed, explained."""
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.task_constructor.explanation import explain, option_meanings
+from modular_framework_core.task_constructor.option_types import Anything
+from modular_framework_core.task_constructor.state_catalogue import STATE_KEYS, StateCatalogue
+
+ROOT = Path(__file__).parents[3]
+STATES = ROOT / "src" / "modular_framework_states" / "src" / "modular_framework_states" / "states"
+EXAMPLES = ROOT / "docs" / "examples"
+CATALOGUE = StateCatalogue([STATES, EXAMPLES])
+NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_")]
+EXPECTED = {"wait_for_signal", "select", "plan", "move", "grasp", "allow_manipulator_collisions", "execute_trajectory",
+            "cartesian_move", "gripper", "call_service", "call_action", "wait", "wait_for_message", "counter",
+            "reinitialise_managers", "store", "load", "spawn_object", "delete_object", "set_planner", "log_metric"}
+
+
+def test_all_promised_states_are_there() -> None:
+    assert set(NAMES) == EXPECTED | {"my_state"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_one_class_in_a_file_that_bears_its_name(name: str) -> None:
+    source = CATALOGUE.get(name)
+    tree = ast.parse(source.file.read_text())
+    assert [node.name for node in tree.body if isinstance(node, ast.ClassDef)] == [source.class_name]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_has_the_keys_of_every_state_and_two_outcomes(name: str) -> None:
+    source = CATALOGUE.get(name)
+    assert list(source.options)[-4:] == list(STATE_KEYS)
+    assert source.default_names("outcomes") == ("success", "fail")
+    assert all(source.default_names(key) is not None for key in STATE_KEYS)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_option_has_a_type_and_a_meaning(name: str) -> None:
+    source = CATALOGUE.get(name)
+    meanings = option_meanings(source.doc)
+    for option in source.options.values():
+        assert meanings.get(option.name), f"{name}: {option.name} is not in the docstring"
+        assert not isinstance(option.type, Anything), f"{name}: {option.name} has no type a task can be checked against"
+    assert set(meanings) == set(source.options)
+    assert all(f"  {name}: " in explain(source) for name in source.options if name not in STATE_KEYS)
+
+
+@pytest.mark.parametrize("name", sorted(EXPECTED))
+def test_it_is_a_framework_state_that_does_nothing_while_it_is_imported(name: str) -> None:
+    module = importlib.import_module(f"modular_framework_states.states.{name}")
+    state = getattr(module, CATALOGUE.get(name).class_name)
+    assert issubclass(state, FrameworkState)
+    assert "execute" in vars(state)
+    source = inspect.getsource(state.execute)
+    assert "self.fail(" in source and "self.succeed()" in source or "_run" in source or name in {"wait"}
+
+
+def test_the_state_to_begin_with_passes_its_own_test() -> None:
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q", str(EXAMPLES / "test_my_state.py")],
+                          capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout
