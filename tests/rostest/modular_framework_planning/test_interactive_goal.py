@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
-from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes, PlanningScene, RobotState
-from moveit_msgs.srv import ApplyPlanningScene
-from planning_wire import ARM, DOWN, LAUNCH, OK, START, FakeArm, add, box, call, report_of
+from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes, PlanningScene, PositionIKRequest, RobotState
+from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK
+from planning_wire import ARM, DOWN, LAUNCH, OK, START, FakeArm, add, box, call, plan, report_of, request
 from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
 
@@ -102,6 +102,10 @@ def arm(ros_launch: Callable[..., Any]) -> Iterator[FakeArm]:
     session = ros_launch(WITH_MARKER)
     arm = FakeArm()
     session.wait_for_service("plan_kinematic_path", 60.0)
+    assert plan(request()).error_code.val == OK  # what is made on first use is made now
+    ask = PositionIKRequest(group_name="arm_and_manipulator", avoid_collisions=True)
+    ask.pose_stamped.header.frame_id, ask.pose_stamped.pose = "world", Pose(Point(*NEAR), DOWN)
+    assert call("compute_ik", GetPositionIK, ask).error_code.val == OK
     yield arm
     assert session.alive(), session.log()
 

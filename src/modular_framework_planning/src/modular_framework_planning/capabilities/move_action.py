@@ -97,6 +97,9 @@ class MoveAction:
         except PlanningError as error:
             result.error_code.val = int(error.code)
             return result, error.reason
+        if cancelled.is_set():  # a planner that goes on improving has a path by then, but nobody wants it any more
+            result.error_code.val = ErrorCode.PREEMPTED
+            return result, "cancelled while planning"
         result = MoveGroupResult(error_code=response.error_code, trajectory_start=response.trajectory_start,
                                  planned_trajectory=response.trajectory, planning_time=response.planning_time)
         if not moves:
