@@ -65,7 +65,8 @@ class Rviz:
 
     def _on_ghost(self, message: MarkerArray, name: str) -> None:
         self.ghosts[name] = [item for item in message.markers if item.action == Marker.ADD]
-        LAST_WORDS.append(self.status)
+        if name == "goal":
+            LAST_WORDS.append(self.status)
 
     def drag(self, pose: Pose) -> None:
         self._say(event_type=InteractiveMarkerFeedback.POSE_UPDATE, pose=pose)
