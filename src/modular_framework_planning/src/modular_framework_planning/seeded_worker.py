@@ -171,4 +171,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    from modular_framework_planning.seeded_worker import main as run  # what it sends must not be of module __main__
+
+    run()

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pipelines of move_group on the wire: chosen by name, a planner of the user's own, settings of planners, seeds."""
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, PlannerParams
+from moveit_msgs.srv import GetPlannerParams, QueryPlannerInterfaces, SetPlannerParams
+from planning_wire import ARM, GROUP, LAUNCH, OK, FakeArm, add, box, call, plan, report_of, request
+
+ROOT = Path(__file__).resolve().parents[3]
+POSITIONS = (0.2, -1.57, 1.2, -1.2, -1.57, 0.0)
+GOAL = Constraints(joint_constraints=[JointConstraint(name, value, 0.0, 0.0, 1.0)
+                                       for name, value in zip(ARM, POSITIONS, strict=True)])
+ADAPTERS = " ".join(f"default_planner_request_adapters/{name}" for name in (
+    "AddTimeOptimalParameterization", "FixStartStateBounds", "FixStartStateCollision"))
+PARAMETERS = f"""<launch>
+  <env name="PYTHONPATH" value="{{package}}/src:$(env PYTHONPATH)"/>
+  <rosparam ns="move_group/planning_pipelines">
+    mine: {{{{planning_plugin: my_planners/OneStop}}}}
+    chomp: {{{{planning_plugin: chomp_interface/CHOMPPlanner}}}}
+    wrong: {{{{planning_plugin: ompl_interface/OMPLPlanner, request_adapters: Nonsense}}}}
+    seeded: {{{{planning_plugin: ompl_interface/OMPLPlanner, request_adapters: {ADAPTERS}, seed: 5}}}}
+  </rosparam>"""
+
+
+def guide_planner() -> str:
+    """The planner that the guide shows."""
+    section = (ROOT / "docs/guide.md").read_text().split("### A planner of your own")[1]
+    block = re.search(r"```python\n(.*?)```", section, re.DOTALL)
+    assert block is not None
+    return block[1]
+
+
+@pytest.fixture(scope="module")
+def session(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Any:
+    package = tmp_path_factory.mktemp("my_robot_moveit_config")
+    (package / "src").mkdir()
+    (package / "src/my_planners.py").write_text(guide_planner())
+    session = ros_launch(LAUNCH.replace("<launch>", PARAMETERS.format(package=package)))
+    session.wait_for_service("plan_kinematic_path", 300.0)
+    session.arm = FakeArm()
+    assert add(box("wall", 0.33, 0.42, 1.0, (0.12, 0.12, 0.4)))
+    return session
+
+
+def motion(answer: Any) -> list[tuple[float, tuple[float, ...]]]:
+    return [(point.time_from_start.to_sec(), point.positions) for point in answer.trajectory.joint_trajectory.points]
+
+
+def test_the_planner_of_the_guide_plans(session: Any) -> None:
+    assert len(guide_planner().splitlines()) <= 22
+    answer, report = report_of(lambda: plan(request(GOAL, pipeline_id="mine", allowed_planning_time=120.0)))
+    assert answer.error_code.val == OK, report["reason"]
+    assert motion(answer)[-1][1] == pytest.approx(list(POSITIONS), abs=1e-6)
+
+
+@pytest.mark.parametrize(("changes", "parts"), [
+    ({"pipeline_id": "nobody"}, ("'nobody' is not loaded", "ompl", "mine")),
+    ({"pipeline_id": "chomp"}, ("chomp_interface/CHOMPPlanner", "available: ", "mine")),
+    ({"pipeline_id": "wrong"}, ("Nonsense", "default_planner_request_adapters/FixStartStateBounds")),
+    ({"planner_id": "BiTRRT"}, ("BiTRRT", "available: RRTConnect"))])
+def test_a_name_that_is_not_there_is_refused_with_the_list(session: Any, changes: Any, parts: Any) -> None:
+    answer, report = report_of(lambda: plan(request(GOAL, **changes)))
+    assert answer.error_code.val == MoveItErrorCodes.PLANNING_FAILED
+    assert all(part in report["reason"] for part in parts), report["reason"]
+
+
+def test_pipelines_and_planners_are_listed_also_by_group(session: Any) -> None:
+    answer = call("query_planner_interface", QueryPlannerInterfaces)
+    listed = {item.pipeline_id: item for item in answer.planner_interfaces}
+    assert {"ompl", "mine", "seeded"} <= listed.keys() and not {"chomp", "wrong"} & listed.keys()
+    assert listed["ompl"].name == "OMPL"
+    assert {"RRTConnect", "PRM", f"{GROUP}[RRTConnect]"} <= set(listed["ompl"].planner_ids)
+
+
+def settings(group: str = "") -> dict[str, str]:
+    params = call("get_planner_params", GetPlannerParams, "ompl", "RRT", group).params
+    return dict(zip(params.keys, params.values, strict=True))
+
+
+def test_settings_of_planners_are_read_and_changed_for_one_group_or_all(session: Any) -> None:
+    before = settings()
+    assert before["type"] == "geometric::RRT" and before["goal_bias"] == "0.05"
+    bias, kind = PlannerParams(["goal_bias"], ["0.2"], [""]), PlannerParams(["type"], ["geometric::RRT"], [""])
+    call("set_planner_params", SetPlannerParams, "ompl", "RRT", GROUP, bias, False)
+    assert settings(GROUP) == before | {"goal_bias": "0.2"} and settings() == before
+    call("set_planner_params", SetPlannerParams, "ompl", "RRT", "", kind, True)
+    assert settings() == {"type": "geometric::RRT"}
+
+
+def test_a_seed_repeats_the_motion_also_while_others_plan(session: Any) -> None:
+    message = request(GOAL, pipeline_id="seeded", allowed_planning_time=60.0)
+    answers = [plan(message)]
+    assert answers[0].error_code.val == OK
+
+    def work(pipeline: str) -> None:
+        answer = plan(request(GOAL, pipeline_id=pipeline, allowed_planning_time=60.0))
+        if pipeline == "seeded":
+            answers.append(answer)
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in ("seeded", "ompl", "seeded")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(120.0)
+    assert len(answers) == 3 and motion(answers[0]) == motion(answers[1]) == motion(answers[2])
