@@ -92,6 +92,19 @@ def test_wait_for_message_takes_any_type_and_passes_over_what_is_not_expected() 
     assert "no message as expected came on topic '/points' within 0.3 s" in late.reason
 
 
+def test_wait_for_message_and_other_subscribers_of_its_node_do_not_disturb_each_other() -> None:
+    heard: list[PointStamped] = []
+    publisher = rospy.Publisher("shared_points", PointStamped, queue_size=1, latch=True)
+    publisher.publish(PointStamped())
+    before = rospy.Subscriber("shared_points", PointStamped, heard.append)
+    state = WaitForMessage("shared_points", 10.0, {"point": {"x": 0.0}})
+    assert run(state)[0] == "success", state.reason
+    before.unregister()
+    nobody = WaitForMessage("unknown_points", 0.3)
+    assert run(nobody)[0] == "fail"
+    assert "no message came on topic '/unknown_points' within 0.3 s (nobody publishes it)" in nobody.reason
+
+
 def test_a_counter_is_positive_its_number_of_times_and_begins_anew() -> None:
     state = Counter(2, output_keys=("counter",))
     assert [run(state)[0] for _ in range(4)] == ["success", "success", "fail", "success"]

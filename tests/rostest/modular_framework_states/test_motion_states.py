@@ -40,7 +40,7 @@ class Arm:
     """One joint; the tip is at x = its position. A wall stands at x = 2."""
 
     group_name = "arm"
-    group = SimpleNamespace(tip_link="tip")
+    group = SimpleNamespace(tip_link="tip", joints=[SimpleNamespace(name="j", velocity=6.0)])
 
     def __init__(self) -> None:
         self.position, self.executed, self.stuck = 0.0, [], False
@@ -92,6 +92,7 @@ def managers(ros_launch):
     add = rospy.ServiceProxy("add_trajectory", srv.AddJointTrajectory)
     add(trajectory((0.5, 0.5), (1.0, 1.5)), "there")
     add(trajectory((0.5, 2.5), (1.0, 1.5)), "through_the_wall")
+    add(trajectory((0.5, 0.5), (0.6, 1.5)), "in_a_hurry")
     add(JointTrajectory(joint_names=["k"], points=[JointTrajectoryPoint(positions=[0.0])]), "other_robot")
     return session
 
@@ -121,6 +122,7 @@ def test_a_named_trajectory_begins_where_the_arm_is_and_ends_at_its_last_point(a
 
 @pytest.mark.parametrize(("name", "reason"), [
     ("through_the_wall", "on the way to point 1 the robot would be in collision ('tip' with 'wall')"),
+    ("in_a_hurry", "joint 'j' has 0.10 s to get to point 2 and needs 0.17 s at its greatest velocity, 6.00"),
     ("nowhere", "no trajectory named 'nowhere' is stored"), ("other_robot", "the joints ['k'] are none of the arm's")])
 def test_a_trajectory_that_cannot_be_run_is_not_begun(arm: Arm, name: str, reason: str) -> None:
     state = ExecuteTrajectory(name)

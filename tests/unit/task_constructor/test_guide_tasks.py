@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from task_folders import TEMPLATES
 
-from modular_framework_core.task_constructor import located_yaml
+from modular_framework_core.task_constructor import loading, located_yaml, task_graph
 from modular_framework_core.task_constructor.faults import TaskFault
-from modular_framework_core.task_constructor.pipeline import check_task
+from modular_framework_core.task_constructor.pipeline import check_task, construct_task
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder
 from modular_framework_core.task_constructor.task_spec import TaskSpec
@@ -19,75 +20,11 @@ SOURCE = Path(__file__).parents[3] / "src"
 STATES = SOURCE / "modular_framework_states" / "src" / "modular_framework_states" / "states"
 SCRIPTS = SOURCE / "modular_framework_api" / "task_constructor_scripts"
 
-JUST_PLANNING = """\
-name: just_planning
-source: framework_state_machine
-node_name: just_planning_sm
-outcomes: [sm_successful, sm_failed]
-states:
-  - PlanMotion:
-      source: state_plan
-      target_state_type: joint_state
-      target_state_name: stability_pose
-      plan_name: current_to_stability
-      outcomes: [success_to_plan, fail_to_plan]
-      transitions: {success_to_plan: sm_successful, fail_to_plan: sm_failed}
-"""
-WITH_PARAMS = """\
-name: just_planning
-source: framework_state_machine
-node_name: just_planning_sm
-outcomes: [sm_successful, sm_failed]
-states:
-  - PlanMotion:
-      source: state_plan
-      params: {target_state_type: joint_state, target_state_name: stability_pose, plan_name: current_to_stability,
-               outcomes: [success, fail], io_keys: [arm_commander]}
-      transitions: {success: sm_successful, fail: sm_failed}
-"""
-MOCK_TRAJECTORY = """\
-name: mock_trajectory
-source: framework_state_machine
-node_name: mock_trajectory_sm
-outcomes: [sm_successful, sm_failed]
-states:
-  - ConcurrentPlan:
-      source: concurrent_state_machine
-      params: {state_outcomes: [success, fail], state_io_keys: [arm_commander], target_type: joint_state}
-      name: simple_concurrent_planning
-      outcomes: [success_plans, fail_plans]
-      userdata: self.userdata
-      default_outcome: fail_plans
-      outcome_map: {success_plans: {PlanInitPose: success, PlanStabPose: success}}
-      transitions: {success_plans: MoveInit, fail_plans: sm_failed}
-      states:
-        - PlanInitPose:
-            source: state_plan
-            target_state_type: params.target_type
-            target_state_name: initial_pose
-            plan_name: current_to_init
-            outcomes: params.state_outcomes
-            io_keys: params.state_io_keys
-        - PlanStabPose:
-            source: state_plan
-            target_state_type: params.target_type
-            target_state_name: stability_pose
-            plan_name: init_to_stability
-            starting_state_type: params.target_type
-            starting_state_name: initial_pose
-            outcomes: params.state_outcomes
-            io_keys: params.state_io_keys
-  - MoveInit:
-      source: state_move
-      params: {outcomes: [success, fail], io_keys: [arm_commander]}
-      plan_name: current_to_init
-      transitions: {success: MoveStab, fail: sm_failed}
-  - MoveStab:
-      source: state_move
-      params: {outcomes: [success, fail], io_keys: [arm_commander]}
-      plan_name: init_to_stability
-      transitions: {success: sm_successful, fail: sm_failed}
-"""
+GUIDE_TASKS = Path(__file__).parents[2] / "guide_tasks"
+JUST_PLANNING, WITH_PARAMS, MOCK_TRAJECTORY = ((GUIDE_TASKS / f"{name}.yaml").read_text() for name in (
+    "just_planning", "just_planning_params", "mock_trajectory"))
+IN_ORDER = sorted([*(GUIDE_TASKS / f"{name}.yaml" for name in (
+    "just_planning", "just_planning_params", "mock_trajectory", "nested_initial_pose")), *SCRIPTS.glob("*.yaml")])
 
 
 def build(text: str) -> TaskSpec:
@@ -117,6 +54,53 @@ def test_both_ways_to_write_the_first_example_mean_the_same() -> None:
         assert first[key] == second[key]
 
 
+@pytest.mark.parametrize(("script", "told"), [
+    ("just_planning_all_options", (
+        "19:21: state 'PlanMotion': outcome 'success' is unknown; allowed: success_to_plan, fail_to_plan; "
+        "did you mean 'success_to_plan'?",
+        "19:45: state 'PlanMotion': outcome 'fail' is unknown; allowed: success_to_plan, fail_to_plan; "
+        "did you mean 'fail_to_plan'?",
+        "8:5: state 'PlanMotion': no transition for 'success_to_plan', 'fail_to_plan'")),
+    ("mock_trajectory_as_printed", (
+        "14:24: default_outcome 'fail' is unknown; allowed: sucess_plans, fail_plans; did you mean 'fail_plans'?",
+        "16:21: state 'ConcurrentPlan': outcome 'success_plans' is unknown; allowed: sucess_plans, fail_plans; "
+        "did you mean 'sucess_plans'?",
+        "15:37: outcome_map: state 'PlanInitPose' is unknown; allowed: PlanStabPose",
+        "25:11: the label 'PlanStabPose' is given twice; first in line 18")),
+    ("layout", ("15:56: the key '<state_outcome3>' is given twice; first in line 15",)),
+])
+def test_what_the_guide_prints_with_slips_is_refused_with_all_corrections_at_once(
+        script: str, told: tuple[str, ...]) -> None:
+    with pytest.raises(TaskFault) as caught:
+        check_task(GUIDE_TASKS / f"{script}.yaml", [STATES], [TEMPLATES])
+    assert all(f"{script}.yaml:{line}" in str(caught.value) for line in told), str(caught.value)
+
+
+def test_following_the_corrections_puts_the_printed_examples_in_order() -> None:
+    printed = (GUIDE_TASKS / "just_planning_all_options.yaml").read_text()
+    build(printed.replace("{success: sm_successful, fail:", "{success_to_plan: sm_successful, fail_to_plan:"))
+    printed = (GUIDE_TASKS / "mock_trajectory_as_printed.yaml").read_text()
+    printed = printed.replace("sucess_plans", "success_plans").replace("default_outcome: fail", "default_outcome: fail_plans")
+    build(printed.replace("- PlanStabPose:", "- PlanInitPose:", 1))
+
+
+def test_the_placeholders_of_the_layout_are_told_to_be_no_names() -> None:
+    message = faults((GUIDE_TASKS / "layout.yaml").read_text().replace("<state_outcome3>: <another", "x: <another"))
+    for placeholder in ("<state_machine_name>", "<template_filename>", "<state_filename>"):
+        assert placeholder in message
+
+
+@pytest.mark.parametrize("script", IN_ORDER, ids=lambda path: path.stem)
+def test_the_tasks_are_checked_drawn_generated_and_loaded(script: Path, tmp_path: Path) -> None:
+    task, module = construct_task(script, [STATES], [TEMPLATES], tmp_path)
+    task_graph.write(task, tmp_path / "task.svg")
+    drawn = ElementTree.parse(tmp_path / "task.svg").getroot()
+    assert {state.label for state in task.root.leaf_states()} <= {"".join(item.itertext()).strip() for item in drawn.iter(
+        "{http://www.w3.org/2000/svg}text")}
+    assert callable(loading.machine_factory(loading.load_module(module)))
+    assert module == tmp_path / f"{task.name}.py"
+
+
 def test_transitions_that_name_other_outcomes_than_declared_are_corrected() -> None:
     printed = JUST_PLANNING.replace(
         "{success_to_plan: sm_successful, fail_to_plan: sm_failed}", "{success: sm_successful, fail: sm_failed}"
@@ -128,7 +112,7 @@ def test_transitions_that_name_other_outcomes_than_declared_are_corrected() -> N
 
 def test_a_label_given_twice_is_corrected() -> None:
     message = faults(MOCK_TRAJECTORY.replace("- PlanInitPose:", "- PlanStabPose:"))
-    assert "t.yaml:23:11: the label 'PlanStabPose' is given twice; first in line 16" in message
+    assert "t.yaml:25:11: the label 'PlanStabPose' is given twice; first in line 18" in message
     assert "outcome_map: state 'PlanInitPose' is unknown; allowed: PlanStabPose; did you mean" in message
 
 

@@ -26,6 +26,7 @@ class Joint:
         upper: Highest position [rad or m]; infinity without a limit.
         effort: Greatest effort [N m or N]; infinity without a limit.
         mimics: Joint it follows; empty for an independent joint.
+        velocity: Greatest velocity [rad/s or m/s]; infinity without a limit.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Joint:
     upper: float
     effort: float
     mimics: str
+    velocity: float = math.inf
 
     @property
     def is_active(self) -> bool:
@@ -99,7 +101,8 @@ def read_joints(urdf: str) -> dict[str, Joint]:
             float(limit.get("lower", 0.0)) if limit is not None and bounded else -math.inf,
             float(limit.get("upper", 0.0)) if limit is not None and bounded else math.inf,
             float(limit.get("effort", math.inf)) if limit is not None else math.inf,
-            mimic.get("joint", "") if mimic is not None else "")
+            mimic.get("joint", "") if mimic is not None else "",
+            float(limit.get("velocity", math.inf)) if limit is not None else math.inf)
     return joints
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ class ExecuteTrajectory(FrameworkState):
     """Runs a trajectory of the trajectory manager from where the arm is; positive when the arm stands at its end.
 
     The way from where the arm is to the first point is part of the motion. As nobody planned it, every state on the
-    way is checked for collisions first.
+    way is checked for collisions first, and every piece of it for the joints' greatest velocities.
 
     Args:
         trajectory_name: Name of the trajectory; empty takes the oldest anonymous one. Userdata
@@ -53,13 +54,15 @@ class ExecuteTrajectory(FrameworkState):
         what = f"trajectory '{self._name or 'selected'}'"
         try:
             trajectory = from_current(self._trajectory(userdata), commander.current_joints())
-            contact = self._first_contact(commander, trajectory) if self._step else ""
+            fault = too_fast(trajectory, {joint.name: joint.velocity for joint in commander.group.joints})
+            if not fault and self._step:
+                fault = self._first_contact(commander, trajectory)
         except (ManagerError, CallError, ValueError) as error:
             return self.fail(f"{what}: {error}")
         if self.preempt_requested():
             return self.stopped()
-        if contact:
-            return self.fail(f"{what} was not run: {contact}")
+        if fault:
+            return self.fail(f"{what} was not run: {fault}")
         result = commander.execute_plan(RobotTrajectory(joint_trajectory=trajectory),
                                         stop_requested=self.preempt_requested)
         if self.preempt_requested():
@@ -117,6 +120,24 @@ def from_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> J
     start = JointTrajectoryPoint(positions=[current[joint] for joint in trajectory.joint_names],
                                  time_from_start=rospy.Duration(0))
     return JointTrajectory(joint_names=trajectory.joint_names, points=[start, *trajectory.points])
+
+
+def too_fast(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
+    """Says which straight piece asks a joint for more than its greatest velocity; nothing when none does.
+
+    Args:
+        trajectory: Points at increasing times.
+        limits: Greatest velocity of each joint [rad/s or m/s].
+    """
+    for number, (start, end) in enumerate(pairwise(trajectory.points), start=1):
+        time_s = (end.time_from_start - start.time_from_start).to_sec()
+        ways = np.abs(np.subtract(end.positions, start.positions))
+        needed = {joint: way / limits[joint] for joint, way in zip(trajectory.joint_names, ways, strict=True)}
+        slowest = max(needed, key=needed.__getitem__)
+        if needed[slowest] > time_s:
+            return (f"joint '{slowest}' has {time_s:.2f} s to get to point {number} and needs {needed[slowest]:.2f} s at "
+                    f"its greatest velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time")
+    return ""
 
 
 def samples(trajectory: JointTrajectory, step: float) -> list[tuple[int, list[float]]]:

@@ -2,8 +2,8 @@
 """Lets a task wait for a message of any type."""
 from __future__ import annotations
 
-import threading
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import roslib.message
@@ -38,40 +38,51 @@ class WaitForMessage(FrameworkState):
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._expected = dict(expect or {})
-        self._lock = threading.Lock()
         self._found: list[Any] = []
         self._last_difference = ""
 
     def execute(self, userdata: Any) -> str:
-        """Subscribes, waits and unsubscribes."""
-        self._found, self._last_difference = [], ""
-        subscriber = rospy.Subscriber(self._topic, rospy.AnyMsg, self._on_message, queue_size=10)
-        try:
-            arrived = self.wait_until(lambda: bool(self._found), self._timeout_s)
-            publishers = subscriber.get_num_connections()
-        finally:
-            subscriber.unregister()
+        """Waits for a publisher, whose type it takes, then subscribes, waits and unsubscribes."""
+        self._found, self._last_difference = [], "nobody publishes it"
+        end = None if self._timeout_s is None else time.monotonic() + self._timeout_s
+        name = rospy.resolve_name(self._topic)
+        arrived = self._wait(lambda: bool(published_type(name)), end, 0.1) and self._receive(name, end)
         if not arrived:
             if self.preempt_requested():
                 return self.stopped()
-            seen = self._last_difference or f"{publishers} publishers are connected"
-            return self.fail(f"no message came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s "
-                             f"({seen})" if not self._expected else
-                             f"no message as expected came on topic '{rospy.resolve_name(self._topic)}' within "
-                             f"{self._timeout_s} s ({seen})")
+            what = "no message as expected" if self._expected else "no message"
+            return self.fail(f"{what} came on topic '{name}' within {self._timeout_s} s ({self._last_difference})")
         if FOUND in self.get_registered_output_keys():
             userdata[FOUND] = self._found[0]
         return self.succeed()
 
-    def _on_message(self, raw: Any) -> None:
-        kind = raw._connection_header["type"]
+    def _receive(self, name: str, end: float | None) -> bool:
+        """Listens with the topic's own type: a node has one type a topic, and other subscribers in it need theirs."""
+        kind = published_type(name)
         message_type = roslib.message.get_message_class(kind)
         if message_type is None:
-            self._last_difference = f"its type {kind} is not built in this workspace"
-            return
-        message = message_type()
-        message.deserialize(raw._buff)
-        with self._lock:
-            self._last_difference = difference(message, self._expected)
-            if not self._last_difference:
-                self._found.append(message)
+            self._last_difference = f"its type {kind or 'is not known any more, and'} is not built in this workspace"
+            return False
+        self._last_difference = "it is published, but nothing was sent"
+        subscriber = rospy.Subscriber(name, message_type, self._on_message, queue_size=10)
+        try:
+            return self._wait(lambda: bool(self._found), end)
+        finally:
+            subscriber.unregister()
+
+    def _wait(self, condition: Callable[[], bool], end: float | None, period_s: float = 0.02) -> bool:
+        return self.wait_until(condition, None if end is None else max(0.0, end - time.monotonic()), period_s)
+
+    def _on_message(self, message: Any) -> None:
+        self._last_difference = difference(message, self._expected)
+        if not self._last_difference:
+            self._found.append(message)
+
+
+def published_type(name: str) -> str:
+    """Returns the type of a topic that is published, "" when nobody publishes it.
+
+    Args:
+        name: Resolved name of the topic.
+    """
+    return next((str(kind) for topic, kind in rospy.get_published_topics() if topic == name and kind != "*"), "")
