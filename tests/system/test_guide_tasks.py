@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tasks of the guide, and one of the states beside the guide's, move the simulated robot: one launch, task after task."""
+"""Tasks of the guide and one of the other states move the simulated robot: one launch, task after task."""
 from __future__ import annotations
 
 import json
@@ -78,6 +78,7 @@ def test_the_first_task_of_the_guide_plans(framework: Launch) -> None:
     (GUIDE_TASKS / "mock_trajectory.yaml", "sm_successful", "stability_pose"),
     (GUIDE_TASKS / "nested_initial_pose.yaml", "success", "initial_pose"),
     (OWN_TASKS / "motion_and_more.yaml", "done", "stability_pose"),
+    (API / "task_constructor_scripts" / "pick_and_hold.yaml", "successful_pipeline", "stability_pose"),
 ], ids=lambda value: value.stem if isinstance(value, Path) else "")
 def test_the_task_runs_and_the_arm_is_where_it_leads(session: RosSession, framework: Launch, script: Path,
                                                      outcome: str, pose: str) -> None:

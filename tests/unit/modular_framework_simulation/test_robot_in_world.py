@@ -118,6 +118,21 @@ def test_a_joint_tracks_a_moving_command_within_a_millimetre(lifter: Lifter) -> 
     assert worst < 0.001
 
 
+def test_a_robot_that_moves_when_the_end_is_asked_for_is_held_until_it_stands(lifter: Lifter) -> None:
+    def rise(time_s: float) -> None:
+        if not lifter.commander.resets:
+            lifter.commands["lift"].command += 0.2 * lifter.world.settings.time_step_s
+
+    lifter.run(0.5, rise)
+    assert lifter.states["lift"].velocity > 0.1
+    before = lifter.states["lift"].position
+    lifter.loop.stop()
+    lifter.loop.run()
+    assert lifter.commander.resets == 1
+    assert lifter.states["lift"].velocity == pytest.approx(0.0, abs=0.01)
+    assert lifter.states["lift"].position == pytest.approx(before, abs=0.01)
+
+
 def test_a_joint_holds_against_gravity(lifter: Lifter) -> None:
     lifter.run(2.0)
     assert lifter.states["lift"].position == pytest.approx(0.1, abs=1e-4)

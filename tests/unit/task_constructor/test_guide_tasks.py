@@ -80,8 +80,8 @@ def test_following_the_corrections_puts_the_printed_examples_in_order() -> None:
     printed = (GUIDE_TASKS / "just_planning_all_options.yaml").read_text()
     build(printed.replace("{success: sm_successful, fail:", "{success_to_plan: sm_successful, fail_to_plan:"))
     printed = (GUIDE_TASKS / "mock_trajectory_as_printed.yaml").read_text()
-    printed = printed.replace("sucess_plans", "success_plans").replace("default_outcome: fail", "default_outcome: fail_plans")
-    build(printed.replace("- PlanStabPose:", "- PlanInitPose:", 1))
+    printed = printed.replace("default_outcome: fail", "default_outcome: fail_plans")
+    build(printed.replace("sucess_plans", "success_plans").replace("- PlanStabPose:", "- PlanInitPose:", 1))
 
 
 def test_the_placeholders_of_the_layout_are_told_to_be_no_names() -> None:
@@ -95,8 +95,8 @@ def test_the_tasks_are_checked_drawn_generated_and_loaded(script: Path, tmp_path
     task, module = construct_task(script, [STATES], [TEMPLATES], tmp_path)
     task_graph.write(task, tmp_path / "task.svg")
     drawn = ElementTree.parse(tmp_path / "task.svg").getroot()
-    assert {state.label for state in task.root.leaf_states()} <= {"".join(item.itertext()).strip() for item in drawn.iter(
-        "{http://www.w3.org/2000/svg}text")}
+    texts = {"".join(item.itertext()).strip() for item in drawn.iter("{http://www.w3.org/2000/svg}text")}
+    assert {state.label for state in task.root.leaf_states()} <= texts
     assert callable(loading.machine_factory(loading.load_module(module)))
     assert module == tmp_path / f"{task.name}.py"
 

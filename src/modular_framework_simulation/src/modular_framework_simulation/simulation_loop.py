@@ -18,6 +18,9 @@ from modular_framework_simulation.robot_body import RobotBody
 from modular_framework_simulation.snapshots import HeldObject
 
 _PAUSED_TICK_S = 0.05
+_HALT_S = (0.1, 0.5)
+"""How long the robot is simulated after the end was asked for [s]: at least, for others to see it stand; at most."""
+_AT_REST = 0.01
 
 
 class Controllers(Protocol):
@@ -134,7 +137,7 @@ class SimulationLoop:
         self._stop.set()
 
     def run(self) -> None:
-        """Advances the world until `stop` is called."""
+        """Advances the world until `stop` is called; a robot that moves then is brought to rest first."""
         self.pacer.start(self._time_s())
         while not self._stop.is_set():
             self.requests.run_pending()
@@ -147,6 +150,19 @@ class SimulationLoop:
                 continue
             self.step()
             self.pacer.keep(self._time_s())
+        if self._actors is not None and not self._paused:
+            self._halt(self._actors.robot)
+
+    def _halt(self, robot: RobotBody) -> None:
+        """Has the controllers hold the robot where it is, and goes on until it stands."""
+        self._take_over_joints()
+        begun_s = self._time_s()
+        for shortest_s in _HALT_S:
+            while self._time_s() - begun_s < shortest_s:
+                self.step()
+                self.pacer.keep(self._time_s())
+            if all(abs(reading.velocity) < _AT_REST for reading in robot.read()):
+                return
 
     def step(self) -> None:
         """Advances the world by one physics step: measure, control, actuate, move."""

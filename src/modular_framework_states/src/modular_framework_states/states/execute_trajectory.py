@@ -135,8 +135,8 @@ def too_fast(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
         needed = {joint: way / limits[joint] for joint, way in zip(trajectory.joint_names, ways, strict=True)}
         slowest = max(needed, key=needed.__getitem__)
         if needed[slowest] > time_s:
-            return (f"joint '{slowest}' has {time_s:.2f} s to get to point {number} and needs {needed[slowest]:.2f} s at "
-                    f"its greatest velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time")
+            return (f"joint '{slowest}' has {time_s:.2f} s to get to point {number} and needs {needed[slowest]:.2f} s "
+                    f"at its greatest velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time")
     return ""
 
 

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One Ctrl-C in the middle of a simulated pick: when the task said its last word, when the arm stood, who was left."""
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ros_session import Launch, RosSession
+
+STOPPED_WITHIN_S = 1.0
+AT_REST_RAD_S = 0.02
+BY_ITSELF_S = 0.1
+LAST_WORD = "ended with outcome"
+START_TIMEOUT_S = 120.0
+STOP_TIMEOUT_S = 30.0
+
+# A node beside the launch: for each message of the joints the time [s, monotonic] and the fastest joint of the arm.
+WATCHER = """
+import os, sys, time
+import rosgraph, rospy
+from sensor_msgs.msg import JointState
+while not rosgraph.is_master_online():
+    time.sleep(0.05)
+rospy.init_node("watcher_of_the_arm", disable_signals=True)
+def write(message):
+    speeds = [abs(speed) for name, speed in zip(message.name, message.velocity) if "ezgripper" not in name]
+    if speeds:
+        print(time.monotonic(), max(speeds), flush=True)
+rospy.Subscriber("joint_states", JointState, write, queue_size=1, tcp_nodelay=True)
+sys.stdin.read()
+os._exit(0)
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """What one Ctrl-C did.
+
+    Attributes:
+        moment_s: When it was pressed, from the text that was waited for [s].
+        state: State that ran.
+        speed: Fastest joint of the arm then [rad/s].
+        last_word_s: From the signal to the task's last line [s].
+        outcome: That line.
+        rest_s: From the signal to the first message after which no joint of the arm moved any more [s].
+        last_speed: Fastest joint of the arm in the last message of the joints [rad/s].
+        launch_s: From the signal to the end of the launch [s].
+        left: Processes of the launch that were there after it, as command lines.
+    """
+
+    moment_s: float
+    state: str
+    speed: float
+    last_word_s: float
+    outcome: str
+    rest_s: float
+    last_speed: float
+    launch_s: float
+    left: tuple[str, ...]
+
+    def faults(self) -> list[str]:
+        """Says what is not as it should be; nothing when all is."""
+        return [text for wrong, text in (
+            (self.last_word_s > STOPPED_WITHIN_S, f"the last line came after {self.last_word_s:.2f} s"),
+            ("'preempted'" not in self.outcome, f"it says '{self.outcome}'"),
+            (self.last_speed > AT_REST_RAD_S, f"the arm was last seen moving at {self.last_speed:.3f} rad/s"),
+            (self.rest_s > STOPPED_WITHIN_S, f"the arm stood after {self.rest_s:.2f} s"),
+            (bool(self.left), f"these processes were left: {', '.join(self.left)}")) if wrong]
+
+    def figures(self) -> dict[str, Any]:
+        """Returns all as a mapping, for JSON."""
+        return asdict(self) | {"faults": self.faults()}
+
+
+def stop_a_pick(moment_s: float, after: str = "first state running") -> Stop | None:
+    """Starts the framework and presses Ctrl-C some time [s] after a text in its log.
+
+    Returns:
+        What that did; None when the task had ended before, or ended by itself as the keys were pressed.
+    """
+    session = RosSession()
+    session.env.pop("DISPLAY", None)
+    speeds = session.folder / "speeds.txt"
+    with speeds.open("w") as output:
+        watcher = subprocess.Popen([sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE,
+                                   stdout=output)
+    try:
+        launch = session.run_framework(gui="false", rviz="false")
+        _until(launch, after, START_TIMEOUT_S)
+        time.sleep(moment_s)
+        if LAST_WORD in launch.log() or not launch.alive():
+            return None
+        pressed = time.monotonic()
+        os.killpg(launch.process.pid, signal.SIGINT)
+        last_word_s = _until(launch, LAST_WORD, STOP_TIMEOUT_S) - pressed
+        launch.wait(STOP_TIMEOUT_S)
+        launch_s = time.monotonic() - pressed
+        if last_word_s < BY_ITSELF_S and "SUCCEEDED" in launch.log():
+            return None
+        return _stop(moment_s, launch.log(), pressed, last_word_s, launch_s, speeds, _left(session, watcher.pid))
+    finally:
+        watcher.kill()
+        watcher.wait()
+        session.stop()
+
+
+def _stop(moment_s: float, log: str, pressed: float, last_word_s: float, launch_s: float, speeds: Path,
+          left: tuple[str, ...]) -> Stop:
+    samples = [(float(line.split()[0]) - pressed, float(line.split()[1])) for line in speeds.read_text().splitlines()
+               if len(line.split()) == 2]
+    moving = [time_s for time_s, speed in samples if speed > AT_REST_RAD_S and time_s > 0.0]
+    last_word = next(line for line in log.splitlines() if LAST_WORD in line)
+    running = [line.split("'")[5] for line in log.splitlines() if "state machine goes from" in line]
+    return Stop(round(moment_s, 3), running[-1] if running else "the first", _speed_at(samples, 0.0),
+                round(last_word_s, 3), last_word.strip(), round(moving[-1] if moving else 0.0, 3), samples[-1][1],
+                round(launch_s, 3), left)
+
+
+def _speed_at(samples: list[tuple[float, float]], time_s: float) -> float:
+    return next((speed for at, speed in reversed(samples) if at <= time_s), 0.0)
+
+
+def _until(launch: Launch, text: str, timeout_s: float) -> float:
+    """Waits until a launch prints a text; returns when it was seen [s, monotonic]."""
+    end = time.monotonic() + timeout_s
+    while text not in launch.log():
+        assert time.monotonic() < end, f"'{text}' was not printed in {timeout_s} s:\n{launch.log()}"
+        assert launch.alive() or text in launch.log(), launch.log()
+        time.sleep(0.01)
+    return time.monotonic()
+
+
+def _left(session: RosSession, watcher: int) -> tuple[str, ...]:
+    """Returns the processes that know the session's master, but for the watcher: what the launch left behind."""
+    mark = f"ROS_MASTER_URI={session.env['ROS_MASTER_URI']}".encode()
+    found = []
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit() and int(folder.name) not in (watcher, os.getpid()):
+            with contextlib.suppress(OSError):
+                if mark in (folder / "environ").read_bytes().split(b"\0"):
+                    command = (folder / "cmdline").read_bytes().replace(b"\0", b" ")
+                    found.append(command.decode(errors="replace").strip())
+    return tuple(found)
