@@ -64,6 +64,11 @@ class FakeArm:
             self._gripper.start()
         self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
 
+    def close(self) -> None:
+        """Ends its joint states."""
+        self._timer.shutdown()
+        self._timer.join(1.0)
+
     def _publish(self, _: Any) -> None:
         if rospy.is_shutdown():
             return
