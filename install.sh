@@ -189,6 +189,30 @@ run_catkin_build() {  # --install or --no-install
   "$VENV/bin/python3" -m compileall -q src "$space/lib/python3/dist-packages"
 }
 
+# Machine code of the planner's loops, in the user's cache folder: without it the first launch compiles for two minutes.
+compile_loops() {
+  local digest stamp planning="$ROOT/src/modular_framework_planning/src"
+  [ "${INSTALL_SPACE:-0}" = 1 ] && planning="$ROOT/install/lib"
+  digest=$({
+    cat "$ROOT/requirements.txt"
+    find "$planning" -name 'compiled_*.py' -printf '%p %T@\n' | sort
+    find "$planning" \( -name 'compiled_*.py' -o -name compile_loops.py \) -print0 | sort -z | xargs -0 sha256sum
+  } | sha256sum | cut -d' ' -f1)
+  stamp="${XDG_CACHE_HOME:-$HOME/.cache}/modular_framework_planning/compiled_$digest"
+  if [ -f "$stamp" ]; then
+    say "      Loops of the planner: compiled already"
+    return
+  fi
+  step "      Loops of the planner: compiling (some minutes)" "read the messages above; then run this script again" \
+    run_compile_loops
+  touch "$stamp"
+}
+
+run_compile_loops() (
+  source_workspace
+  "$VENV/bin/python3" -m modular_framework_planning.compile_loops
+)
+
 find_underlay() {
   UNDERLAY=""
   if [ -f "/opt/ros/noetic/setup.sh" ]; then
@@ -209,6 +233,7 @@ set_up() {
   set_up_packages
   find_underlay
   build_workspace
+  compile_loops
 }
 
 source_workspace() {

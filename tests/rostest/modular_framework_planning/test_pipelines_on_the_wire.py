@@ -43,7 +43,7 @@ def session(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFac
     (package / "src").mkdir()
     (package / "src/my_planners.py").write_text(guide_planner())
     session = ros_launch(LAUNCH.replace("<launch>", PARAMETERS.format(package=package)))
-    session.wait_for_service("plan_kinematic_path", 300.0)
+    session.wait_for_service("plan_kinematic_path", 30.0)
     session.arm = FakeArm()
     assert add(box("wall", 0.33, 0.42, 1.0, (0.12, 0.12, 0.4)))
     return session
@@ -55,7 +55,7 @@ def motion(answer: Any) -> list[tuple[float, tuple[float, ...]]]:
 
 def test_the_planner_of_the_guide_plans(session: Any) -> None:
     assert len(guide_planner().splitlines()) <= 22
-    answer, report = report_of(lambda: plan(request(GOAL, pipeline_id="mine", allowed_planning_time=120.0)))
+    answer, report = report_of(lambda: plan(request(GOAL, pipeline_id="mine", allowed_planning_time=10.0)))
     assert answer.error_code.val == OK, report["reason"]
     assert motion(answer)[-1][1] == pytest.approx(list(POSITIONS), abs=1e-6)
 
@@ -95,12 +95,12 @@ def test_settings_of_planners_are_read_and_changed_for_one_group_or_all(session:
 
 
 def test_a_seed_repeats_the_motion_also_while_others_plan(session: Any) -> None:
-    message = request(GOAL, pipeline_id="seeded", allowed_planning_time=60.0)
+    message = request(GOAL, pipeline_id="seeded", allowed_planning_time=20.0)
     answers = [plan(message)]
     assert answers[0].error_code.val == OK
 
     def work(pipeline: str) -> None:
-        answer = plan(request(GOAL, pipeline_id=pipeline, allowed_planning_time=60.0))
+        answer = plan(request(GOAL, pipeline_id=pipeline, allowed_planning_time=20.0))
         if pipeline == "seeded":
             answers.append(answer)
 

@@ -174,13 +174,6 @@ class InverseKinematics:
                         np.array(seed[self.group.indices], dtype=float), *self._bounds(seed),
                         time.monotonic() + allowed)
 
-    def warm_up(self) -> None:
-        """Compiles, or loads from the cache, the loops of both ways to solve, so that the first answer is not late."""
-        seed = self.model.default_positions()
-        problem = self._problem(self.model.link_transforms(seed)[self._last_link], seed)
-        self._ranked(problem, self._from_closed_form(problem))
-        self._ranked(problem, self._from_search(problem, np.random.default_rng(0)))
-
     def _bounds(self, seed: Array) -> tuple[Array, Array]:
         """Returns the bounds of the group's joints; those without ends get three turns around the seed."""
         values = seed[self.group.indices]

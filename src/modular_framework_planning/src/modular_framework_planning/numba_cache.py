@@ -20,4 +20,9 @@ def cache_folder() -> Path:
     return base / "modular_framework_planning" / contents.hexdigest()[:16]
 
 
+def cache_is_empty() -> bool:
+    """Whether nothing has been compiled yet."""
+    return not any(Path(os.environ["NUMBA_CACHE_DIR"]).rglob("*.nbi"))
+
+
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))

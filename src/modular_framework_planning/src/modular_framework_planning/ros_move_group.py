@@ -24,8 +24,11 @@ from modular_framework_planning.capabilities.sequence_action import SequenceActi
 from modular_framework_planning.capabilities.sequence_service import SequenceService
 from modular_framework_planning.capabilities.state_validation_service import StateValidationService
 from modular_framework_planning.capabilities.tf_publisher import TfPublisher
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.compile_loops import compile_all
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.ros_execution import load_execution
@@ -89,15 +92,15 @@ def main() -> int:
     except PlanningError as error:
         rospy.logfatal("move_group cannot start: %s", error.reason)
         return 1
-    for group in context.model.groups.values():
-        if group.is_chain:
-            context.kinematics.solver(group.name).warm_up()
+    if cache_is_empty():
+        rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
+    compile_all()
+    scene = context.monitor.snapshot()
+    CollisionChecker(scene).is_free(scene.positions)  # reads the links' meshes
     advertise(context)
     rospy.loginfo("move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
                   context.model.name, ", ".join(context.model.groups), ", ".join(context.pipelines),
-                  context.default_pipeline,                   context.execution.describe(), time.monotonic() - begun)
-    import toppra.algorithm  # noqa: F401 - half a second that would otherwise be part of the first plan
-
+                  context.default_pipeline, context.execution.describe(), time.monotonic() - begun)
     rospy.spin()
     return 0
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from pinocchio import SE3 as Transform
 
+from modular_framework_planning.compile_loops import compile_all
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
@@ -129,15 +130,14 @@ def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> Any:
 
 
 def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
-    """Loads compiled loops once, for all children, with a short straight motion of every group among obstacles."""
+    """Loads compiled loops and meshes once, for all children, the meshes with a short straight motion of every group among obstacles."""
+    compile_all()
     far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
     scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
     straight = PlanningPipeline(model, kinematics, PipelineSettings(), _Straight())
     for group in model.groups.values():
         if not group.joints:
             continue
-        if group.is_chain:
-            kinematics.solver(group.name).warm_up()
         middle = 0.5 * (model.lower + model.upper)[group.indices]
         goal = JointGoal(dict(zip(group.joints, (scene.positions[group.indices] + 0.01 * np.sign(
             middle - scene.positions[group.indices])).tolist(), strict=True)))

@@ -89,6 +89,7 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
 def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
     """Returns the times of a trajectory's points: every period, every knot, the end; at least 0.1 ms apart.
 
+    A knot takes the place of a period's point nearer than that, so points are at most a period and 0.1 ms apart.
     They are whole nanoseconds, as messages carry them.
 
     Raises:

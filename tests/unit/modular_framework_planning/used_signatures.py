@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Prints which compiled loops the product calls with argument types that compile_all() did not compile.
+
+Run as a program: a loop that an earlier test has called would hide that compile_all() leaves it out. Reads the URDF and
+the SRDF of the shipped robot as a JSON list from standard input.
+"""
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pinocchio as pin
+from numba.core.dispatcher import Dispatcher
+
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.compile_loops import compile_all
+from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.octomap_encoding import read_stream, write_binary, write_full
+from modular_framework_planning.ompl_planning import OmplPlanner
+from modular_framework_planning.pipeline import PlanningPipeline
+from modular_framework_planning.planning_request import PipelineSettings, PlanningRequest, PoseGoal
+from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, empty_scene
+from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Box, Octree
+from modular_framework_planning.sight_mask import RegionCache, bodies_in_scene, mask_of
+from modular_framework_planning.stomp import StompPlanner
+from modular_framework_planning.voxel_map import empty_map
+
+GROUP = "arm_and_manipulator"
+START = (0.9, -1.57, 1.2, -1.2, -1.57, 0.0)
+
+
+def loops() -> dict[str, Dispatcher]:
+    """Every compiled loop of the modules loaded by now."""
+    return {f"{module}.{name}": value for module in sorted(sys.modules) if module.split(".")[-1].startswith("compiled_")
+            for name, value in vars(sys.modules[module]).items() if isinstance(value, Dispatcher)}
+
+
+def signatures() -> set[tuple[str, str]]:
+    """Loops with the argument types they were called with."""
+    return {(name, str(types)) for name, loop in loops().items() for types in loop.signatures}
+
+
+def held(name: str, link: str) -> AttachedObject:
+    """A small box in the hand."""
+    body = CollisionObject(name, pin.SE3.Identity(), ((Box(0.02, 0.02, 0.02), pin.SE3.Identity()),))
+    return AttachedObject(body, link, frozenset((link,)))
+
+
+def use(model: RobotModel) -> None:
+    """Maps, solves, plans in two ways and asks for contacts."""
+    far = np.array([[2.0, 0.3, 0.5], [2.0, 0.4, 0.5]])
+    voxels = empty_map(0.05).with_look(np.array([0.0, 0.0, 1.0]), far, far[:0], far + 1.0)
+    voxels = read_stream(write_full(voxels), 0.05, False).freed(voxels.keys[:1])
+    read_stream(write_binary(voxels), 0.05, True)
+    group = model.group(GROUP)
+    positions = model.merge(model.default_positions(), dict(zip(group.joints, START, strict=True)))
+    scene = empty_scene(model, positions).with_octomap(Octree(voxels), pin.SE3.Identity())
+    scene = scene.with_attached(held("held", group.tip_link))
+    mask_of(RegionCache(), bodies_in_scene(scene, positions), 1.0, 0.02).hides(far, np.zeros(3), 0.1)
+    goal = model.link_transforms(model.merge(positions, {group.joints[0]: -0.9}))[group.tip_link]
+    kinematics = KinematicsPool(model)
+    settings = PipelineSettings(seed=1, parameters={"num_iterations": 5})
+    for planner in (OmplPlanner(), StompPlanner.configure(model, settings)):
+        pipeline = PlanningPipeline(model, kinematics, settings, planner)
+        pipeline.plan(PlanningRequest(scene, GROUP, (PoseGoal(group.tip_link, goal),), allowed_time_s=60.0))
+    CollisionChecker(scene).contacts(positions)
+
+
+def main() -> None:
+    """Compares the argument types before and after."""
+    model = RobotModel(*json.load(sys.stdin))
+    compile_all()
+    compiled = signatures()
+    use(model)
+    json.dump(sorted(signatures() - compiled), sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
