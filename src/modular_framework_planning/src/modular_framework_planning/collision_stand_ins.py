@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -37,12 +38,12 @@ SIDES = 64  # of the prism around a cylinder or cone: 1.2 mm too wide at 1 m rad
 _lock = threading.Lock()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class StandIn:
     """What a geometry is checked as, in its own frame.
 
     Attributes:
-        surface: sphere tree over triangles, or None.
+        triangles: corners of the surface, shape (m, 9) [m], or None.
         swell: radius of a ball around every point of the surface that belongs to it [m].
         surface_is_exact: whether the swollen surface is the geometry's own.
         kind, size: closed form, SURFACE for none; solid_is_exact: whether it is the geometry's own.
@@ -50,7 +51,7 @@ class StandIn:
         is_closed: whether the surface has an inside.
     """
 
-    surface: Surfaces | None
+    triangles: Array | None
     swell: float = 0.0
     surface_is_exact: bool = True
     kind: int = SURFACE
@@ -58,6 +59,24 @@ class StandIn:
     solid_is_exact: bool = True
     offset: Transform = field(default_factory=pin.SE3.Identity)
     is_closed: bool = False
+
+    @cached_property
+    def surface(self) -> Surfaces | None:
+        """Sphere tree over the triangles; built when it is asked for, as most solids are checked in closed form."""
+        return None if self.triangles is None else _surface(self.triangles)
+
+    @property
+    def radius(self) -> float:
+        """Radius of a ball around the closed form's origin that holds it [m]; infinite without a closed form."""
+        x, y, z = self.size
+        match self.kind:
+            case _ if self.kind == BOX:
+                return float(np.sqrt(x * x + y * y + z * z))
+            case _ if self.kind in (CYLINDER, CONE):
+                return float(np.hypot(x, y))
+            case _ if self.kind in (SPHERE, CAPSULE):
+                return x + y
+        return np.inf
 
 
 _of_shapes: WeakKeyDictionary[Shape, StandIn] = WeakKeyDictionary()
@@ -77,27 +96,27 @@ def stand_in(part: PlacedGeometry) -> StandIn:
 def _make(geometry: Any, source: Any) -> StandIn:
     if isinstance(source, Octree):
         points = np.tile(source.centers, 3)
-        return StandIn(_surface(points), source.resolution * np.sqrt(0.75), surface_is_exact=False)
+        return StandIn(points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
     match geometry:
         case coal.BVHModelBase():
             triangles = _mesh_triangles(geometry)
-            return StandIn(_surface(triangles), is_closed=_is_closed(triangles))
+            return StandIn(triangles, is_closed=_is_closed(triangles))
         case coal.Box():
             x, y, z = (float(value) for value in geometry.halfSide)
-            return StandIn(_surface(_box_triangles(x, y, z)), kind=BOX, size=(x, y, z))
+            return StandIn(_box_triangles(x, y, z), kind=BOX, size=(x, y, z))
         case coal.Sphere():
-            return StandIn(_surface(np.zeros((1, 9))), float(geometry.radius), kind=SPHERE,
+            return StandIn(np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
                            size=(float(geometry.radius), 0.0, 0.0))
         case coal.Capsule():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(_surface(np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float)), radius,
+            return StandIn(np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
                            kind=CAPSULE, size=(radius, half, 0.0))
         case coal.Cylinder():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(_surface(_prism_triangles(radius, radius, half)), 0.0, False, CYLINDER, (radius, half, 0.0))
+            return StandIn(_prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0))
         case coal.Cone():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(_surface(_prism_triangles(radius, 0.0, half)), 0.0, False, CONE, (radius, half, 0.0))
+            return StandIn(_prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
         case coal.Plane() | coal.Halfspace():
             normal = np.array(geometry.n, dtype=float)
             kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
@@ -112,7 +131,7 @@ def _bounding_box(geometry: Any) -> StandIn:
     low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
     x, y, z = (float(value) for value in 0.5 * (high - low))
     middle = 0.5 * (low + high)
-    return StandIn(_surface(_box_triangles(x, y, z)), 0.0, False, BOX, (x, y, z), False,
+    return StandIn(_box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
                    pin.SE3(np.eye(3), middle))
 
 
@@ -164,15 +183,10 @@ def _prism_triangles(below: float, above: float, half: float) -> Array:
     return np.array(result, dtype=float).reshape(-1, 9)
 
 
-def moved(surface: Surfaces, pose: Transform) -> Surfaces:
-    """Returns a surface in the frame in which its own frame has the given pose."""
-    spheres = surface.spheres.copy()
-    spheres[:, :3] = spheres[:, :3] @ pose.rotation.T + pose.translation
-    boxes = surface.boxes.copy()
-    boxes[:, :3] = boxes[:, :3] @ pose.rotation.T + pose.translation
-    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3) @ pose.rotation.T).reshape(-1, 9)
-    corners = surface.triangles.reshape(-1, 3) @ pose.rotation.T + pose.translation
-    return Surfaces(spheres, boxes, surface.links, np.ascontiguousarray(corners.reshape(-1, 9)))
+def moved(triangles: Array, pose: Transform) -> Array:
+    """Returns triangles (m, 9) in the frame in which their own frame has the given pose."""
+    corners = triangles.reshape(-1, 3) @ pose.rotation.T + pose.translation
+    return np.ascontiguousarray(corners.reshape(-1, 9))
 
 
 def stacked(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:

@@ -2,7 +2,7 @@
 """Puts the bodies of a scene and the pairs to watch into the arrays that compiled collision checks work on."""
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.chain_model import tree_of
-from modular_framework_planning.collision_bodies import LINK, Body, PlacedGeometry, WatchedPair
+from modular_framework_planning.collision_bodies import LINK, WORLD, Body, PlacedGeometry, WatchedPair
 from modular_framework_planning.collision_stand_ins import StandIn, moved, stacked, stand_in
 from modular_framework_planning.compiled_collision import CELLS, UNKNOWN, Surfaces, World, arguments
 from modular_framework_planning.compiled_distance import SURFACE
@@ -57,8 +57,8 @@ def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
     for item in model.link_geometries:
         part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.geometry, item, 0.0)
         shape = stand_in(part)
-        if shape.surface is not None and shape.surface_is_exact and shape.swell == 0.0:
-            shape = StandIn(moved(shape.surface, item.placement * shape.offset), is_closed=shape.is_closed)
+        if shape.triangles is not None and shape.surface_is_exact and shape.swell == 0.0:
+            shape = StandIn(moved(shape.triangles, item.placement * shape.offset), is_closed=shape.is_closed)
         result.append(shape)
     return tuple(result)
 
@@ -105,7 +105,7 @@ def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[
         partners.setdefault(pair.second, set()).add((pair.first, pair.margin))
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, shape in enumerate(_link_stand_ins(model)):
-        if shape.kind == SURFACE and shape.surface is not None and number in partners:
+        if shape.kind == SURFACE and shape.triangles is not None and number in partners:
             groups.setdefault((parts[number].joint_id, frozenset(partners[number])), []).append(number)
     return tuple(tuple(group) for group in groups.values())
 
@@ -121,8 +121,7 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
     groups = _groups(model, parts, pairs)
     robot, roots = _link_surfaces(model, groups)
     members, place = _link_members(model, parts, groups, robot, roots)
-    scene = _add_others(model, parts, {number for pair in pairs for number in (pair.first, pair.second)},
-                        members, place)
+    scene = _add_others(model, parts, pairs, members, place)
     found: dict[tuple[int, int, float], list[int]] = {}
     uncompiled = []
     for number, pair in enumerate(pairs):
@@ -153,21 +152,40 @@ def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Gr
     return members, place
 
 
-def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], watched: set[int], members: list[_Member],
-                place: dict[int, int]) -> Surfaces:
-    """Appends links in closed form, held objects and the world; returns their surfaces."""
+def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
+                members: list[_Member], place: dict[int, int]) -> Surfaces:
+    """Appends links in closed form, held objects and the world; returns the surfaces they need."""
     links = _link_stand_ins(model)
+    watched = {number for pair in pairs for number in (pair.first, pair.second)}
     others = [number for number in sorted(watched) if number not in place]
     shapes = [links[number] if number < len(links) else stand_in(parts[number]) for number in others]
-    surfaces, roots = stacked([shape.surface for shape in shapes if shape.surface is not None])
+    wanted = _with_surface(dict(zip(others, shapes, strict=True)), parts, pairs)
+    surfaces, roots = stacked([shape.surface for number, shape in zip(others, shapes, strict=True)
+                               if number in wanted and shape.surface is not None])
     remaining = iter(roots)
     for number, shape in zip(others, shapes, strict=True):
-        root = -1 if shape.surface is None else next(remaining)
-        sphere = np.array([0.0, 0.0, 0.0, np.inf]) if root < 0 else surfaces.spheres[root] + [0, 0, 0, shape.swell]
+        root = next(remaining) if number in wanted and shape.triangles is not None else -1
+        sphere = np.array([0.0, 0.0, 0.0, shape.radius]) if root < 0 else (
+            surfaces.spheres[root] + [0, 0, 0, shape.swell])
         pose = (parts[number].placement * shape.offset).homogeneous[:3]
         place[number] = len(members)
         members.append(_Member(shape, parts[number].joint_id - 1, pose, root, True, sphere))
     return surfaces
+
+
+def _with_surface(shapes: Mapping[int, StandIn], parts: Sequence[PlacedGeometry],
+                  pairs: Sequence[WatchedPair]) -> set[int]:
+    """Returns which bodies are checked by their surface.
+
+    A solid of the world against a body whose surface is its own is checked in closed form. Its triangles would not be
+    looked at, and to build a tree over them takes longer than many plans.
+    """
+    plain = {number for number, shape in shapes.items()
+             if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_is_exact}
+    inexact = {number for number, shape in shapes.items() if not shape.surface_is_exact}
+    needed = {number for pair in pairs for number, other in ((pair.first, pair.second), (pair.second, pair.first))
+              if number in plain and (other in inexact or other in plain)}
+    return set(shapes) - (plain - needed)
 
 
 def _is_exact(members: Sequence[_Member], first: int, second: int) -> bool:

@@ -141,14 +141,16 @@ def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no
 
 @njit(cache=True, nogil=True)
 def _goes_round(world, outer, inner, poses):  # type: ignore[no-untyped-def]
-    """Whether a body without touching it surrounds the first corner of another body's surface."""
-    if world.roots[inner] < 0 or (world.kinds[outer] == SURFACE and not world.closed[outer]):
+    """Whether a body without touching it surrounds a point of another body."""
+    if not np.isfinite(world.spheres[inner, 3]) or (world.kinds[outer] == SURFACE and not world.closed[outer]):
         return False
-    surface = world.scene if world.scenic[inner] else world.robot
-    node = world.roots[inner]
-    while surface.links[node, 0] >= 0:
-        node = surface.links[node, 0]
-    corner = surface.triangles[surface.links[node, 1]]
+    corner = np.zeros(3)  # of a body in closed form: its centre
+    if world.roots[inner] >= 0:
+        surface = world.scene if world.scenic[inner] else world.robot
+        node = world.roots[inner]
+        while surface.links[node, 0] >= 0:
+            node = surface.links[node, 0]
+        corner = surface.triangles[surface.links[node, 1]][:3]
     one, two = poses[inner], poses[outer]
     local = np.empty(3)
     for row in range(3):
