@@ -17,6 +17,9 @@ from actionlib_msgs.msg import GoalStatus
 
 POLL_PERIOD_S = 0.01
 
+CANCEL_WAIT_S = 0.5
+"""How long the answer to a cancelled goal is waited for [s]; a task has to end within a second of a request to stop."""
+
 
 class CallError(RuntimeError):
     """A service or an action did not answer; the text names it and the time waited."""
@@ -129,5 +132,5 @@ def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,
     if wait_until(finished, timeout_s) and not stopped:
         return int(client.get_state())
     client.cancel_goal()
-    wait_until(ended, 2.0)
+    wait_until(ended, CANCEL_WAIT_S)
     return int(GoalStatus.PREEMPTED if stopped else GoalStatus.LOST)
