@@ -33,6 +33,8 @@ from modular_framework_planning.stomp import StompPlanner
 GROUP, TIP = "arm_and_manipulator", "eg_manipulator"
 BOXES = 6
 SCALING = 0.5
+JOINT_SCALING = {"lin": 1.0}  # of the joints' limits; SCALING unless named: a line's factors scale the tip's limits
+ROUNDING = 1.0e-6  # of a limit: points are at whole nanoseconds, some of them 4 ms apart
 PLANNERS = {"ompl": "RRTConnect", "ptp": "PTP", "lin": "LIN", "stomp": "STOMP"}
 CARTESIAN_LIMITS = {"max_trans_vel": 0.5, "max_trans_acc": 1.0, "max_trans_dec": -1.0, "max_rot_vel": 1.0}
 
@@ -109,8 +111,12 @@ def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Pr
                                       SCALING, path_constraints=constraints), world, goal)
 
 
-def violations(model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer) -> list[str]:
-    """Properties the motion lacks, looked at on the curve of a controller, at 1 ms samples."""
+def violations(model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer,
+               scaling: float) -> list[str]:
+    """Properties the motion lacks, looked at on the curve of a controller, at 1 ms samples.
+
+    Joints' limits count with the factor `scaling`, collisions along the curve and straight from point to point.
+    """
     motion, indices = answer.trajectory, model.group(GROUP).indices
     faults = []
     if motion.times[0] != 0.0 or not (np.diff(motion.times) > 0.0).all():
@@ -118,8 +124,8 @@ def violations(model: RobotModel, checker: IndependentChecker, problem: Problem,
     positions, velocities, accelerations, _ = motion.at(motion.sample_times(0.001))
     shares = (np.abs(velocities) / model.max_velocity[indices]).max(), (
         np.abs(accelerations) / model.max_acceleration[indices]).max()
-    faults += [f"{name} is {share / SCALING:.4f} of its limit" for name, share in zip(
-        ("velocity", "acceleration"), shares, strict=True) if share > SCALING * (1.0 + 1e-9)]
+    faults += [f"{name} is {share / scaling:.7f} of its limit" for name, share in zip(
+        ("velocity", "acceleration"), shares, strict=True) if share > scaling * (1.0 + ROUNDING)]
     if (positions < model.lower[indices] - 1e-9).any() or (positions > model.upper[indices] + 1e-9).any():
         faults.append("a position is out of bounds")
     if not np.allclose(positions[0], problem.request.scene.positions[indices], atol=1e-9):
@@ -135,7 +141,8 @@ def violations(model: RobotModel, checker: IndependentChecker, problem: Problem,
                 break
     checker.set_world(problem.world)
     named = dict(zip(model.joint_names, problem.request.scene.positions.tolist(), strict=True))
-    hits = checker.colliding_states(motion.joint_names, motion.curve(0.01), named)
+    hits = sum(checker.colliding_states(motion.joint_names, line, named)
+               for line in (motion.curve(0.01), *motion.chords()))
     return faults + ([f"{hits} states collide"] if hits else [])
 
 
@@ -158,5 +165,6 @@ def examine(model: RobotModel, checker: IndependentChecker, kind: str, count: in
             tally.unsolved += 1
             continue
         tally.solved += 1
-        tally.violations += [f"{kind} {number}: {text}" for text in violations(model, checker, problem, answer)]
+        tally.violations += [f"{kind} {number}: {text}" for text in violations(
+            model, checker, problem, answer, JOINT_SCALING.get(kind, SCALING))]
     return tally

@@ -10,7 +10,10 @@ from modular_framework_planning.spatial import Array
 
 
 class LastCheck:
-    """Looks at a timed motion at `motion_step`; a motion it has seen and passed is not looked at twice."""
+    """Looks at a timed motion, at its curve and at the straight ways between its points.
+
+    A motion it has seen and passed is not looked at twice.
+    """
 
     def __init__(self) -> None:
         self._passed: set[tuple[bytes, int]] = set()
@@ -29,18 +32,18 @@ class LastCheck:
         text = _not_in_order(path)
         if not text:
             curve = path.trajectory.curve(problem.settings.motion_step)
-            text = _collision(problem, _after(curve, path, path.lead_in)) or _violation(
-                problem, _after(curve, path, path.unconstrained))
+            chords = path.trajectory.chords(_place(path.trajectory.positions, path, path.lead_in))
+            text = next(filter(None, (_collision(problem, line) for line in (
+                curve[_place(curve, path, path.lead_in):], *chords))), "")
+            text = text or _violation(problem, curve[_place(curve, path, path.unconstrained):])
         if not text:
             self._passed.add(key)
         return text
 
 
-def _after(curve: Array, path: PlannedPath, vertices: int) -> Array:
-    """Returns the part of the motion from a vertex on."""
-    if not vertices:
-        return curve
-    return curve[int(np.argmin(np.linalg.norm(curve - path.vertices[vertices], axis=1))):]
+def _place(samples: Array, path: PlannedPath, vertex: int) -> int:
+    """Returns the number of the sample at a vertex of the path."""
+    return int(np.argmin(np.linalg.norm(samples - path.vertices[vertex], axis=1))) if vertex else 0
 
 
 def _not_in_order(path: PlannedPath) -> str:
@@ -53,7 +56,7 @@ def _not_in_order(path: PlannedPath) -> str:
 
 
 def _collision(problem: PlanningProblem, samples: Array) -> str:
-    step = problem.settings.motion_step
+    step = problem.settings.finest_step
     hit = problem.motion.first_collision(samples, step)
     if hit is None:
         return ""

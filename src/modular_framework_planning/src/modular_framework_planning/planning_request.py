@@ -13,6 +13,8 @@ from modular_framework_planning.trajectory import Trajectory
 if TYPE_CHECKING:
     from modular_framework_planning.constraints import KinematicConstraints
 
+PARTS_OF_MOTION_STEP = 16
+
 
 @dataclass(frozen=True, slots=True)
 class JointGoal:
@@ -48,7 +50,8 @@ class PipelineSettings:
         jiggle_fraction: how far from a colliding start a free one is looked for (share of the joint's range).
         start_state_collision_depth: a start that collides deeper than this is refused at once [m].
         start_state_contact_tolerance: depth of a held body's contact tolerated at the start [m].
-        motion_step: distance of collision checks on the returned motion [rad or m].
+        motion_step: distance of checks along a motion [rad or m]; collisions of the returned one are looked for at
+            `finest_step`.
         blend_deviation: most distance a rounded corner keeps from the corner [rad or m].
         start_state_max_dt: longest way back from a start out of bounds to the bounds [s].
         default_workspace_bounds: edge of the cube a request's workspace is where it gives none [m].
@@ -77,6 +80,11 @@ class PipelineSettings:
     robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
     seeded_iterations: int = 2000
+
+    @property
+    def finest_step(self) -> float:
+        """Distance of states looked at before a motion is returned [rad or m]: bodies that graze touch but briefly."""
+        return self.motion_step / PARTS_OF_MOTION_STEP
 
     def default_planner(self, group: str) -> str:
         """Returns the planner of requests that name none; empty where no parameter says."""

@@ -13,6 +13,7 @@ import numpy as np
 from modular_framework_planning.spatial import Array
 
 SAMPLE_PERIOD_S = 0.001  # of a controller
+STRAIGHT = 1.0e-5  # [rad or m]; a curve that leaves its chord by less counts as straight
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,9 +73,25 @@ class Trajectory:
                            np.diff(self.times) * np.maximum(np.abs(self.velocities[:-1]).max(axis=1),
                                                             np.abs(self.velocities[1:]).max(axis=1)))
         counts = np.maximum(1, np.ceil(reach / step)).astype(int)
-        pieces = [np.linspace(low, high, count, endpoint=False)
-                  for low, high, count in zip(self.times[:-1], self.times[1:], counts, strict=True)]
-        return np.vstack([self.at(np.concatenate(pieces))[0], self.positions[-1:]])
+        places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        times = np.repeat(self.times[:-1], counts) + places * np.repeat(np.diff(self.times) / counts, counts)
+        return np.vstack([self.at(times)[0], self.positions[-1:]])
+
+    def chords(self, first: int = 0) -> list[Array]:
+        """Returns polylines of points, from number `first` on, between which the curve leaves the straight way.
+
+        A controller that does without velocities goes straight from point to point.
+        """
+        spans, ways = np.diff(self.times), np.diff(self.positions, axis=0)
+        lengths = np.maximum((ways**2).sum(axis=1), 1e-30)
+        is_bent = np.zeros(len(spans), dtype=bool)
+        for share in (1.0 / 3.0, 2.0 / 3.0):
+            offsets = self.at(self.times[:-1] + share * spans)[0] - self.positions[:-1]
+            along = ((offsets * ways).sum(axis=1) / lengths)[:, None] * ways
+            is_bent |= np.abs(offsets - along).max(axis=1, initial=0.0) > STRAIGHT
+        bent = first + np.flatnonzero(is_bent[first:])
+        runs = np.split(bent, np.flatnonzero(np.diff(bent) > 1) + 1) if len(bent) else []
+        return [self.positions[run[0]:run[-1] + 2] for run in runs]
 
     def slowed(self, factor: float) -> Trajectory:
         """Returns the same curve run `factor` times slower; its times are whole nanoseconds, as messages carry them."""

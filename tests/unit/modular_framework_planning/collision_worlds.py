@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Worlds of every kind of shape around the robot, which holds an object; verdicts on random states in them."""
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+import trimesh
+from independent_checker import IndependentChecker, Part, mesh_geometry
+
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Shape, Sphere
+
+TIP = "wrist_3_link"
+NEAR = 0.002  # [m]; nearer than that a free state may be refused
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """How many states were looked at, and what was said of them."""
+
+    states: int = 0
+    free: int = 0
+    touching_called_free: int = 0
+    refused_though_apart: int = 0
+    refused_near: int = 0
+
+    def __add__(self, other: Verdicts) -> Verdicts:
+        return Verdicts(*(one + two for one, two in zip(astuple(self), astuple(other), strict=True)))
+
+
+def shape_of(kind: int, size: np.ndarray) -> tuple[Shape, object, float]:
+    """A shape, the same as Coal's geometry built apart, and its radius about the origin."""
+    x, y, z = size.tolist()
+    if kind == 0:
+        return Box(x, y, z), coal.Box(x, y, z), float(np.linalg.norm(size)) / 2
+    if kind == 1:
+        return Cylinder(z, x / 2), coal.Cylinder(x / 2, z), float(np.hypot(x, z)) / 2
+    if kind == 2:
+        return Sphere(x / 2), coal.Sphere(x / 2), x / 2
+    if kind == 3:
+        return Cone(z, x / 2), coal.Cone(x / 2, z), float(np.hypot(x, z)) / 2
+    mesh = trimesh.creation.annulus(r_min=x / 3, r_max=x / 2, height=z)
+    vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+    return Mesh(vertices, faces), mesh_geometry(vertices, faces), float(np.linalg.norm(vertices, axis=1).max())
+
+
+def random_pose(rng: np.random.Generator) -> pin.SE3:
+    angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.3, 0.9)
+    turn = pin.Quaternion(*(lambda q: q / np.linalg.norm(q))(rng.normal(size=4))).toRotationMatrix()
+    return pin.SE3(turn, np.array([distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.8, 1.8)]))
+
+
+def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Generator, held: int) -> PlanningScene:
+    """Ten shapes of all kinds around the robot and one held object, told to both checkers."""
+    scene, world = empty_scene(model), []
+    for number in range(10):
+        shape, geometry, radius = shape_of(number % 5, rng.uniform(0.17, 0.3, 3))  # nothing fits inside a link
+        pose = random_pose(rng)
+        scene = scene.with_object(CollisionObject(f"thing{number}", pose, ((shape, pin.SE3.Identity()),)))
+        world.append((f"thing{number}", geometry, radius, pose.homogeneous))
+    second.set_world(world)
+    shape, geometry, radius = shape_of(held, np.array([0.17, 0.17, 0.2]))
+    pose = pin.SE3(np.eye(3), np.array([0.0, 0.25, 0.05]))
+    touch = frozenset(link for link in model.document.links if model.has_link(link)
+                      and ("wrist_3" in link or "ee" in link or "ezgripper" in link or "tool" in link))
+    body = CollisionObject("held", pose, ((shape, pin.SE3.Identity()),))
+    scene = scene.with_attached(AttachedObject(body, TIP, touch))
+    robot_parts = [number for number, part in enumerate(second.parts) if part.link]
+    things = [number for number, part in enumerate(second.parts) if not part.link]
+    second.parts.append(Part("held", TIP, pose.homogeneous, geometry, radius))
+    number = len(second.parts) - 1
+    second._pairs += [(other, number) for other in things]
+    second._pairs += [(other, number) for other in robot_parts if second.parts[other].link not in touch | {TIP}]
+    return scene
+
+
+def smallest_distance(second: IndependentChecker, values: dict[str, float]) -> float:
+    links = second.link_poses(values)
+    poses = [links[part.link] @ part.pose for part in second.parts]
+    best = np.inf
+    for i, j in second._pairs:
+        first, other = (coal.Transform3s(poses[k][:3, :3], poses[k][:3, 3]) for k in (i, j))
+        best = min(best, coal.distance(second.parts[i].geometry, first, second.parts[j].geometry, other,
+                                       coal.DistanceRequest(), coal.DistanceResult()))
+    return float(best)
+
+
+def random_state(model: RobotModel, rng: np.random.Generator) -> np.ndarray:
+    return model.with_mimics(rng.uniform(np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)))
+
+
+def verdict(ours: CollisionChecker, second: IndependentChecker, positions: np.ndarray) -> Verdicts:
+    """What both checkers say of one state."""
+    values = dict(zip(ours.model.joint_names, positions.tolist(), strict=True))
+    free, touching = ours.is_free(positions), bool(second.collisions(values))
+    refused = not free and not touching
+    near = refused and smallest_distance(second, values) <= NEAR
+    return Verdicts(1, free, free and touching, refused and not near, near)
+
+
+def compare_verdicts(model: RobotModel, second: IndependentChecker, rng: np.random.Generator, states: int,
+                     held: int) -> Verdicts:
+    """Compares random states in a random world; `held` is the kind of the held object."""
+    ours = CollisionChecker(world_with(model, second, rng, held))
+    return sum((verdict(ours, second, random_state(model, rng)) for _ in range(states)), Verdicts())
