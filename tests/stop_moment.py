@@ -52,6 +52,7 @@ class Stop:
         rest_s: From the signal to the first message after which no joint of the arm moved any more [s].
         last_speed: Fastest joint of the arm in the last message of the joints [rad/s].
         launch_s: From the signal to the end of the launch [s].
+        slow: What roslaunch said about nodes that did not end when they were asked to.
         left: Processes of the launch that were there after it, as command lines.
     """
 
@@ -63,6 +64,7 @@ class Stop:
     rest_s: float
     last_speed: float
     launch_s: float
+    slow: tuple[str, ...]
     left: tuple[str, ...]
 
     def faults(self) -> list[str]:
@@ -72,6 +74,7 @@ class Stop:
             ("'preempted'" not in self.outcome, f"it says '{self.outcome}'"),
             (self.last_speed > AT_REST_RAD_S, f"the arm was last seen moving at {self.last_speed:.3f} rad/s"),
             (self.rest_s > STOPPED_WITHIN_S, f"the arm stood after {self.rest_s:.2f} s"),
+            (bool(self.slow), f"nodes had to be ended by force: {', '.join(self.slow)}"),
             (bool(self.left), f"these processes were left: {', '.join(self.left)}")) if wrong]
 
     def figures(self) -> dict[str, Any]:
@@ -120,7 +123,7 @@ def _stop(moment_s: float, log: str, pressed: float, last_word_s: float, launch_
     running = [line.split("'")[5] for line in log.splitlines() if "state machine goes from" in line]
     return Stop(round(moment_s, 3), running[-1] if running else "the first", _speed_at(samples, 0.0),
                 round(last_word_s, 3), last_word.strip(), round(moving[-1] if moving else 0.0, 3), samples[-1][1],
-                round(launch_s, 3), left)
+                round(launch_s, 3), tuple(line.strip() for line in log.splitlines() if "escalating to" in line), left)
 
 
 def _speed_at(samples: list[tuple[float, float]], time_s: float) -> float:
