@@ -10,7 +10,7 @@ from motion_properties import examine
 
 from modular_framework_planning.urdf_document import package_resolver
 
-SHARE = {"ompl": 8, "ptp": 30, "lin": 30, "stomp": 5}
+SHARE = {"ompl": 8, "ptp": 16, "lin": 30, "stomp": 5}
 
 
 @pytest.mark.parametrize("kind", SHARE)
