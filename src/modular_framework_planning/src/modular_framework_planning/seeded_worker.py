@@ -130,7 +130,7 @@ def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> Any:
 
 
 def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
-    """Loads compiled loops and meshes once, for all children, the meshes with a short straight motion of every group among obstacles."""
+    """Loads compiled loops and, with a short straight motion of every group, meshes once for all children."""
     compile_all()
     far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
     scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
