@@ -2,11 +2,16 @@
 """Timed motions keep the limits along the whole curve a controller runs, follow their path and are nearly fastest."""
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from modular_framework_planning.blended_path import BlendedPath
 from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.last_check import LastCheck
+from modular_framework_planning.planner_interface import PlannedPath
+from modular_framework_planning.planning_request import PipelineSettings
 from modular_framework_planning.time_parameterization import WINDOW_S, parameterize
 from modular_framework_planning.trajectory import Trajectory
 
@@ -122,3 +127,34 @@ def test_dense_curve_has_no_gap_wider_than_asked() -> None:
     curve = motion.curve(0.004)
     assert np.abs(np.diff(curve, axis=0)).max() < 1.2 * 0.004
     assert np.array_equal(curve[0], motion.positions[0]) and np.array_equal(curve[-1], motion.positions[-1])
+
+
+def test_chords_are_told_where_the_curve_leaves_them_and_nowhere_else() -> None:
+    straight = parameterize(JOINTS[:2], np.array([[0.0, 0.0], [1.0, 0.5]]), np.zeros(0), VELOCITY[:2], ACCELERATION[:2])
+    assert straight.chords() == []
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    motion = parameterize(JOINTS[:2], corner, np.array([0.3]), VELOCITY[:2], ACCELERATION[:2])
+    (chord,) = motion.chords()
+    assert (np.abs(chord - [1.0, 0.0]).max(axis=1) < 0.35).all() and len(chord) > 3
+    rows = [int(np.flatnonzero((motion.positions == row).all(axis=1))[0]) for row in chord]
+    assert rows == list(range(rows[0], rows[0] + len(rows))), "points in a row"
+    assert len(motion.chords(first=rows[2])[0]) == len(chord) - 2
+
+
+def test_last_check_sees_a_contact_half_a_milliradian_long() -> None:
+    def first_collision(line: np.ndarray, step: float) -> np.ndarray | None:
+        for start, end in zip(line[:-1], line[1:], strict=True):
+            count = int(np.ceil(np.abs(end - start).max() / step))
+            for share in np.linspace(0.0, 1.0, count + 1):
+                values = start + share * (end - start)
+                if 0.5 < values[0] < 0.5005:
+                    return values
+        return None
+
+    motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
+    checker = SimpleNamespace(contacts=lambda positions, include_fixed: [])
+    problem = SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=checker, motion=SimpleNamespace(
+        first_collision=first_collision, whole=lambda values: values))
+    assert "0.00025 rad steps" in LastCheck().fault(problem, PlannedPath(motion.positions, motion))
+    problem.motion.first_collision = lambda line, step: None
+    assert LastCheck().fault(problem, PlannedPath(motion.positions, motion)) == ""
