@@ -237,13 +237,27 @@ def _place(found: SceneObject) -> str:
 
 
 def main() -> int:
-    """Runs the node ``top_down_grasp_generator``; returns 1 when something it needs is missing."""
+    """Runs the node ``top_down_grasp_generator``; returns 1 when something it needs is missing.
+
+    The work has a thread of its own: a signal that met the main thread inside a call to the master would wait for that
+    call's lock, which only the interrupted main thread could give back.
+    """
     rospy.init_node("top_down_grasp_generator")
-    generator = TopDownGraspGenerator()
+    codes: list[int] = []
+    threading.Thread(target=_work, args=(codes,), daemon=True, name="top-down grasps").start()
+    rospy.spin()
+    return codes[0] if codes else 0
+
+
+def _work(codes: list[int]) -> None:
+    """Generates until ROS shuts down; leaves the exit code in the list and ends the node."""
     try:
+        generator = TopDownGraspGenerator()
         generator.connect()
-    except NoGraspError as error:
-        rospy.logfatal("top_down_grasp_generator: %s", error)
-        return 1
-    generator.watch()
-    return 0
+        generator.watch()
+    except Exception as error:  # whatever it is must end the node, which would stay without doing anything
+        if not rospy.is_shutdown():
+            codes.append(1)
+            rospy.logfatal("top_down_grasp_generator: %s", error, exc_info=not isinstance(error, NoGraspError))
+    finally:
+        rospy.signal_shutdown("the generator has ended")
