@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state to begin with: copy it, name the file after your class (open_door.py: class OpenDoor) and change it.
+"""A state to begin with: copy it, name the file after your class (open_door.py: OpenDoor) and change it.
 
 A task finds it by ``states_directory:=<its folder>`` and ``source: my_state``. Its test, test_my_state.py, is beside it.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Answers "does this state or this motion collide?": compiled bounds first, Coal's exact check where they are undecided.
+"""Answers "does this state or this motion collide?": compiled bounds first, Coal's exact check of what they leave open.
 
 A state is called free only where every pair of bodies was proved apart, or where Coal says so.
 """

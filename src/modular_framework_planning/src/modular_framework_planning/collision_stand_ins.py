@@ -162,7 +162,7 @@ def _is_closed(triangles: Array) -> bool:
 
 def _box_triangles(x: float, y: float, z: float) -> Array:
     result = []
-    for axis, half in enumerate((x, y, z)):
+    for axis in range(3):
         for sign in (-1.0, 1.0):
             corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
             face = np.insert(corners, axis, sign, axis=1) * (x, y, z)
@@ -176,7 +176,8 @@ def _prism_triangles(below: float, above: float, half: float) -> Array:
     rim = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / SIDES)
     result = []
     for here, there in zip(rim[:-1], rim[1:], strict=True):
-        a, b, c, d = ([*(point * radius), z] for z, radius in ((-half, below), (half, above)) for point in (here, there))
+        a, b, c, d = ([*(point * radius), z] for z, radius in ((-half, below), (half, above))
+                      for point in (here, there))
         result += [[a, b, [0, 0, -half]], [a, b, d], [a, d, c]]
         if above > 0.0:
             result.append([c, d, [0, 0, half]])

@@ -74,8 +74,8 @@ def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple
     for group in groups:
         result.append(_joined(spheres, boxes, links, roots[place:place + len(group)]))
         place += len(group)
-    return Surfaces(np.array(spheres).reshape(-1, 4), np.array(boxes).reshape(-1, 15), np.array(links, dtype=np.int32).reshape(-1, 2),
-                    surfaces.triangles), tuple(result)
+    return Surfaces(np.array(spheres).reshape(-1, 4), np.array(boxes).reshape(-1, 15),
+                    np.array(links, dtype=np.int32).reshape(-1, 2), surfaces.triangles), tuple(result)
 
 
 def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots: Sequence[int]) -> int:

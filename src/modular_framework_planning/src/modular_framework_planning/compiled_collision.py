@@ -128,7 +128,8 @@ def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no
     if world.kinds[second] != SURFACE:
         size = world.sizes[second]
         status, bound = surface_to_solid(surface.spheres, surface.boxes, surface.links, surface.triangles,
-                                         world.roots[first], relative, world.kinds[second], size[0], size[1], size[2], margin, limit)
+                                         world.roots[first], relative, world.kinds[second], size[0], size[1], size[2],
+                                         margin, limit)
     else:
         other = world.scene if world.scenic[second] else world.robot
         status, bound = surface_to_surface(
@@ -383,7 +384,7 @@ def check_path(world, states, first, undecided):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _within(later, earlier, change, share):  # type: ignore[no-untyped-def]
-    for joint in range(len(change)):
+    for joint in range(len(change)):  # noqa: SIM110 - numba compiles no generator
         if later[joint] - earlier[joint] > share * change[joint]:
             return False
     return True

@@ -95,7 +95,7 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
         depth -= 1
         work += 1
         t = pieces[depth]
-        if (kind == BOX or kind == CYLINDER) and _span_bound(kind, p0, p1, p2, t) - margin >= limit:
+        if kind in (BOX, CYLINDER) and _span_bound(kind, p0, p1, p2, t) - margin >= limit:
             continue
         cx, cy, cz = (t[0] + t[3] + t[6]) / 3.0, (t[1] + t[4] + t[7]) / 3.0, (t[2] + t[5] + t[8]) / 3.0
         radius = 0.0
@@ -121,7 +121,7 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
 @njit(cache=True, nogil=True)
 def _box_to_solid(box, pose, kind, p0, p1, p2):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of a tree's box from a solid, along the faces' normals of the boxes around both."""
-    if kind == PLANE or kind == HALF_SPACE:
+    if kind in (PLANE, HALF_SPACE):
         return -np.inf
     hx = p0
     hy = p1 if kind == BOX else p0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-
 from numba import njit
 
 CENTRING_STEPS = 12
@@ -157,7 +156,8 @@ def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
     longest, ax, ay, az = 0.0, 0.0, 0.0, 0.0
     for member in members:
         for place in range(0, 9, 3):
-            x, y, z = triangles[member, place] - mx, triangles[member, place + 1] - my, triangles[member, place + 2] - mz
+            x, y = triangles[member, place] - mx, triangles[member, place + 1] - my
+            z = triangles[member, place + 2] - mz
             height = x * nx + y * ny + z * nz
             x, y, z = x - height * nx, y - height * ny, z - height * nz
             if x * x + y * y + z * z > longest:

@@ -10,6 +10,9 @@ import ompl.geometric as og
 from modular_framework_planning.errors import ErrorCode, PlanningError
 
 DEFAULT_RANGE = 0.5  # [rad or m]; a fifth of the space, OMPL's own choice, makes edges so long that few are free
+# RRTConnect without a range of its own first takes long steps, which cross open space in a few; where that does not
+# lead to a path soon, steps of the default range find narrow ways.
+LONG_RANGE, LONG_RANGE_ITERATIONS = 1.0, 150
 
 
 def _flag(value: object) -> bool:
@@ -116,12 +119,21 @@ def _unreadable(key: str, read: Callable[[object], Any], value: object) -> list[
     return []
 
 
-def make_planner(planner_id: str, settings: Mapping[str, object], information: Any) -> Any:
+def stages(planner_id: str, settings: Mapping[str, object]) -> tuple[tuple[float, int | None], ...]:
+    """Returns (default range [rad or m], most iterations or None) of each search to make, one after the other."""
+    if planner_id != "RRTConnect" or str(settings.get("range", "")).strip() not in ("", "0", "0.0"):
+        return ((DEFAULT_RANGE, None),)
+    return (LONG_RANGE, LONG_RANGE_ITERATIONS), (DEFAULT_RANGE, None)
+
+
+def make_planner(planner_id: str, settings: Mapping[str, object], information: Any,
+                 default_range: float = DEFAULT_RANGE) -> Any:
     """Makes an OMPL planner with its settings.
 
     Args:
         planner_id: key of PLANNERS.
         settings: by ompl_planning.yaml's keys; an empty value, and range 0, keep the default.
+        default_range: range where the settings give none [rad or m].
         information: OMPL's SpaceInformation.
 
     Raises:
@@ -130,7 +142,7 @@ def make_planner(planner_id: str, settings: Mapping[str, object], information: A
     kind, known = PLANNERS[planner_id]
     planner = kind(information)
     if "range" in known:
-        planner.setRange(DEFAULT_RANGE)
+        planner.setRange(default_range)
     for key, value in settings.items():
         if key not in known or not str(value).strip():
             continue

@@ -12,7 +12,15 @@ import ompl.util as ou
 
 from modular_framework_planning.constrained_search import ConstrainedSearch, constraints_are_tight
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.ompl_planners import ANYTIME, PLANNERS, THREADED, make_planner, parameter_faults
+from modular_framework_planning.ompl_planners import (
+    ANYTIME,
+    DEFAULT_RANGE,
+    PLANNERS,
+    THREADED,
+    make_planner,
+    parameter_faults,
+    stages,
+)
 from modular_framework_planning.ompl_projection import projection_evaluator
 from modular_framework_planning.path_shortening import path_length
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
@@ -56,11 +64,14 @@ class OmplPlanner:
                                 "cannot repeat a plan; choose another planner or do not set a seed")
         paths, states = [], 0
         for _ in range(max(1, problem.request.attempts)):
-            search = _Search(problem, goals, step)
-            path = search.run()
-            states += search.states
-            if path is not None:
-                paths.append(path)
+            for reach, limit in stages(problem.planner_id, problem.planner_parameters):
+                search = _Search(problem, goals, step, reach, limit)
+                path = search.run()
+                states += search.states
+                if path is not None:
+                    paths.append(path)
+                if path is not None or problem.interrupted():
+                    break
             if problem.interrupted():
                 break
         if not paths:
@@ -103,8 +114,11 @@ class _EdgeValidator(ob.MotionValidator):
 class _Search:
     """One run of one planner."""
 
-    def __init__(self, problem: PlanningProblem, goals: Array, step: float) -> None:
+    def __init__(self, problem: PlanningProblem, goals: Array, step: float, default_range: float = DEFAULT_RANGE,
+                 limit: int | None = None) -> None:
+        """Args: what to plan; where to; distance of checks on edges; range and most iterations where not set."""
         self._problem, self._goals, self._step = problem, goals, step
+        self._range, self._limit = default_range, limit
         self._count = len(problem.group.joints)
         self._condition: Any = None
         self._iterations = 0
@@ -128,7 +142,7 @@ class _Search:
         for values in self._goals:
             goal.addState(self._state(information, values))
         definition.setGoal(goal)
-        planner = make_planner(problem.planner_id, problem.planner_parameters, information)
+        planner = make_planner(problem.planner_id, problem.planner_parameters, information, self._range)
         text = str(problem.planner_parameters.get("projection_evaluator") or "")
         projection = None
         if text and hasattr(planner, "setProjectionEvaluator"):
@@ -165,15 +179,17 @@ class _Search:
         problem = self._problem
         if problem.planner_id in THREADED:
             return ob.timedPlannerTerminationCondition(max(1e-3, problem.deadline_s - time.monotonic()))
-        if not problem.repeatable:
+        limit = self._limit
+        if limit is None and problem.repeatable and problem.planner_id in ANYTIME:
+            limit = problem.settings.seeded_iterations
+        if limit is None:
             return ob.PlannerTerminationCondition(problem.interrupted)
-        limit = problem.settings.seeded_iterations if problem.planner_id in ANYTIME else None
 
         def stop() -> bool:
             self._iterations += 1
             if problem.interrupted():
                 return True
-            return limit is not None and self._iterations > limit
+            return self._iterations > limit
 
         return ob.PlannerTerminationCondition(stop)
 

@@ -253,6 +253,6 @@ def _shortened(problem: PlanningProblem, path: Array) -> Array:
     fine = min(problem.step, FINE_STEPS * problem.settings.motion_step)
 
     def edge(first: Array, second: Array) -> bool:
-        return problem.edge_is_valid(first, second) and problem.edge_is_valid(first, second, fine)
+        return problem.edge_is_valid(first, second, fine)
 
     return shorten(path, edge, limit, problem.rng)
