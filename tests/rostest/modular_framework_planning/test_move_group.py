@@ -23,7 +23,6 @@ from moveit_msgs.msg import (
     MoveGroupAction,
     MoveGroupGoal,
     MoveItErrorCodes,
-    OrientationConstraint,
     PlanningScene,
     PlanningSceneComponents,
     PositionIKRequest,
