@@ -70,5 +70,6 @@ def _violation(problem: PlanningProblem, samples: Array) -> str:
     for number, values in enumerate(samples):
         whole = problem.motion.whole(values)
         if not problem.constraints.satisfied(whole):
-            return f"sample {number} of {len(samples)} violates a path constraint: {problem.constraints.describe(whole)}"
+            return (f"sample {number} of {len(samples)} violates a path constraint: "
+                    f"{problem.constraints.describe(whole)}")
     return ""

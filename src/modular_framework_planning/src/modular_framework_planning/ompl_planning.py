@@ -157,7 +157,7 @@ class _Search:
         finally:
             self._condition = None
             validator.release()
-            if hasattr(projection, "release"):
+            if projection is not None and hasattr(projection, "release"):
                 projection.release()
             information.setStateValidityChecker(lambda state: False)
 
