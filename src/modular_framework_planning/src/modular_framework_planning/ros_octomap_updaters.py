@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from abc import ABC, abstractmethod
 from collections import deque
 from typing import Any
 
@@ -25,7 +26,7 @@ from modular_framework_planning.sight_mask import depth_mask_of, mask_of
 FLOAT_POINT = np.dtype("<f4")
 
 
-class _Updater:
+class _Updater(ABC):
     """Takes messages as they come and works on them in a thread of its own; when it is late, the oldest are dropped."""
 
     def __init__(self, settings: SensorSettings, monitor: OctomapMonitor, waiting: int) -> None:
@@ -68,8 +69,9 @@ class _Updater:
                 except rospy.ROSException as error:  # the node is going down
                     rospy.logdebug("octomap: %s", error)
 
+    @abstractmethod
     def _look(self, message: Any) -> None:
-        raise NotImplementedError
+        """Brings one message into the map."""
 
 
 class PointCloudUpdater(_Updater):
