@@ -34,14 +34,22 @@ SEVEN_JOINT_SRDF = """<robot name="seven">
 <group name="arm"><chain base_link="base" tip_link="flange"/></group></robot>"""
 
 
-def _turn_z(angle: float) -> np.ndarray:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return np.array([[cosine, -sine, 0, 0], [sine, cosine, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
+def _turn(angles: np.ndarray, first: int, second: int) -> np.ndarray:
+    """Turns in the plane of two axes, one for each angle: shape (..., 4, 4)."""
+    matrices = np.zeros((*np.shape(angles), 4, 4))
+    matrices[...] = np.eye(4)
+    matrices[..., first, first] = matrices[..., second, second] = np.cos(angles)
+    matrices[..., second, first] = np.sin(angles)
+    matrices[..., first, second] = -matrices[..., second, first]
+    return matrices
+
+
+def _turn_z(angles: np.ndarray | float) -> np.ndarray:
+    return _turn(np.asarray(angles), 0, 1)
 
 
 def _turn_x(angle: float) -> np.ndarray:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return np.array([[1, 0, 0, 0], [0, cosine, -sine, 0], [0, sine, cosine, 0], [0, 0, 0, 1]], dtype=float)
+    return _turn(np.asarray(angle), 1, 2)
 
 
 def _shift(x: float, y: float, z: float) -> np.ndarray:
@@ -51,24 +59,29 @@ def _shift(x: float, y: float, z: float) -> np.ndarray:
 
 
 def ur5_tool(values: np.ndarray) -> np.ndarray:
-    """Pose of tool0 in base_link, shape (4, 4); the DH base is turned by half a turn against base_link."""
+    """Poses of tool0 in base_link, shape (..., 4, 4), for joint values of shape (..., 6).
+
+    The DH base is turned by half a turn against base_link.
+    """
     pose = _turn_z(math.pi)
-    for angle, d, a, alpha in zip(values, UR5_D, UR5_A, UR5_ALPHA, strict=True):
-        pose = pose @ _turn_z(angle) @ _shift(a, 0.0, d) @ _turn_x(alpha)
+    for angles, d, a, alpha in zip(np.moveaxis(values, -1, 0), UR5_D, UR5_A, UR5_ALPHA, strict=True):
+        pose = pose @ _turn_z(angles) @ (_shift(a, 0.0, d) @ _turn_x(alpha))
     return pose
 
 
 def seven_joint_flange(values: np.ndarray) -> np.ndarray:
-    """Pose of the flange in the base, shape (4, 4)."""
+    """Poses of the flange in the base, shape (..., 4, 4), for joint values of shape (..., 7)."""
     pose = np.eye(4)
-    for angle, (at, turn, _) in zip(values, SEVEN_JOINTS, strict=True):
-        pose = pose @ _shift(*at) @ _turn_x(turn) @ _turn_z(angle)
+    for angles, (at, turn, _) in zip(np.moveaxis(values, -1, 0), SEVEN_JOINTS, strict=True):
+        pose = pose @ (_shift(*at) @ _turn_x(turn)) @ _turn_z(angles)
     return pose @ _shift(0.0, 0.0, FLANGE)
 
 
-def pose_gap(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
-    """Distance [m] and angle [rad] between two poses, exact for small angles."""
-    turned = first[:3, :3].T @ second[:3, :3]
-    axis = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
-    return (float(np.linalg.norm(first[:3, 3] - second[:3, 3])),
-            math.atan2(0.5 * float(np.linalg.norm(axis)), 0.5 * (float(np.trace(turned)) - 1.0)))
+def pose_gap(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances [m] and angles [rad] between poses of shape (..., 4, 4), exact for small angles."""
+    turned = np.swapaxes(first[..., :3, :3], -1, -2) @ second[..., :3, :3]
+    axis = np.stack([turned[..., 2, 1] - turned[..., 1, 2], turned[..., 0, 2] - turned[..., 2, 0],
+                     turned[..., 1, 0] - turned[..., 0, 1]], axis=-1)
+    trace = np.trace(turned, axis1=-2, axis2=-1)
+    return (np.linalg.norm(first[..., :3, 3] - second[..., :3, 3], axis=-1),
+            np.arctan2(0.5 * np.linalg.norm(axis, axis=-1), 0.5 * (trace - 1.0)))
