@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A Universal Robots controller in software, for everything that talks to one, with faults on command.
+
+It listens where a controller does: RTDE (30004), scripts (30001, 30002, 30003), dashboard (29999). The program that
+ur-rtde uploads is recognised and its effect carried out (ur_control_script.py). The arm is a UR5. Faults and the log of
+the commanded path are ordered at the command port (command_port.py); `help` there lists the orders.
+"""
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import IO
+
+from modular_framework_drivers.emulators.command_port import CommandPort
+from modular_framework_drivers.emulators.ur_control_script import ProgramReceiver
+from modular_framework_drivers.emulators.ur_controller import HOME, MODELS, UrController
+from modular_framework_drivers.emulators.ur_dashboard import BANNER, DashboardReceiver
+from modular_framework_drivers.emulators.ur_links import LinkFaults, Links, Session
+from modular_framework_drivers.emulators.ur_motion import JOINTS
+from modular_framework_drivers.emulators.ur_rtde_server import RtdeServer, RtdeSession
+
+LOGGER = logging.getLogger("rosout.ur_emulator")
+RTDE_PORT, SCRIPT_PORTS, DASHBOARD_PORT, COMMAND_PORT = 30004, (30001, 30002, 30003), 29999, 29901
+_MAX_CATCH_UP = 25   # cycles; after a longer hold-up the clock of the controller is set to now
+
+
+class UrEmulator:
+    """Controller, ports and faults.
+
+    Args:
+        address: where to listen.
+        model: name of a model in MODELS.
+        positions: joint positions at the beginning [rad].
+        unlock_delay_s: time after a protective stop before it can be unlocked [s].
+        command_port: TCP port for orders; 0 for any.
+    """
+
+    def __init__(self, address: str = "127.0.0.1", model: str = "UR5", positions: Sequence[float] = HOME,
+                 unlock_delay_s: float = 5.0, command_port: int = COMMAND_PORT) -> None:
+        if model not in MODELS or len(positions) != JOINTS:
+            raise ValueError(f"emulator of a UR arm: got model {model!r} and {len(positions)} joint positions; "
+                             f"expected one of {', '.join(MODELS)} and {JOINTS} positions")
+        self.controller = UrController(MODELS[model], positions, unlock_delay_s)
+        self._rtde = RtdeServer(self.controller)
+        ports: dict[int, Callable[[], Session]] = {RTDE_PORT: self._rtde_session, DASHBOARD_PORT: self._dashboard}
+        ports.update({port: self._script_session for port in SCRIPT_PORTS})
+        self._links = Links(address, ports)
+        self._lock = threading.Lock()
+        self._stopping = threading.Event()
+        self._log: IO[str] | None = None
+        self.commands: dict[str, Callable[..., str | None]] = {
+            name.replace("order_", ""): self._locked(getattr(self, name)) for name in dir(self)
+            if name.startswith("order_")}
+        self._port = CommandPort(self.commands, command_port, address)
+
+    def connect(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: a port is taken; the text names it.
+        """
+        self._links.connect()
+        self._port.connect()
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        period_s = self.controller.period_s
+        next_s = time.monotonic() + period_s
+        while not self._stopping.is_set():
+            ready = self._links.wait(min(next_s - time.monotonic(), 0.1))
+            with self._lock:
+                now_s = time.monotonic()
+                self._links.serve(ready, now_s)
+                if now_s >= next_s:
+                    self.controller.cycle()
+                    self._links.cycle(now_s)
+                    next_s += period_s
+                    if now_s - next_s > _MAX_CATCH_UP * period_s:
+                        next_s = now_s + period_s
+            if ready and self._links.faults.frozen:   # what is ready stays unread: do not spin on it
+                time.sleep(max(0.0, next_s - time.monotonic()))
+
+    def stop(self) -> None:
+        """Make `run` return."""
+        self._stopping.set()
+
+    def close(self) -> None:
+        """Close all ports and the log; may be called twice."""
+        self._port.close()
+        with self._lock:
+            self._links.close()
+            self._end_log()
+
+    def _locked(self, order: Callable[..., str | None]) -> Callable[..., str | None]:
+        def run(*arguments: object, **keywords: object) -> str | None:
+            with self._lock:
+                return order(*arguments, **keywords)
+
+        run.__doc__ = order.__doc__
+        run.__wrapped__ = order  # type: ignore[attr-defined]
+        return run
+
+    def _rtde_session(self) -> Session:
+        session = RtdeSession(self._rtde)
+        return Session(session.receive, session.cycle, session.close)
+
+    def _script_session(self) -> Session:
+        receiver = ProgramReceiver(self.controller)
+
+        def receive(data: bytes) -> bytes:
+            receiver.receive(data)
+            return b""
+
+        return Session(receive)
+
+    def _dashboard(self) -> Session:
+        return Session(DashboardReceiver(self.controller).receive, greeting=BANNER.encode())
+
+    def order_cut(self) -> None:
+        """Close all connections and refuse new ones, until `restore`."""
+        self._links.close()
+
+    def order_freeze(self) -> None:
+        """Let nothing through though connections stay open (half-open sockets), until `restore`."""
+        self._links.faults.frozen = True
+
+    def order_delay(self, seconds: float) -> None:
+        """Send everything late by this much [s]."""
+        if seconds < 0.0:
+            raise ValueError(f"seconds={seconds}: expected a number of at least 0")
+        self._links.faults.delay_s = float(seconds)
+
+    def order_lose(self, every: int) -> None:
+        """Lose each `every`-th data package; 0 for none."""
+        if every < 0:
+            raise ValueError(f"every={every}: expected a whole number of at least 0")
+        self._links.faults.lose_every = int(every)
+
+    def order_garbage(self, count: int = 64) -> None:
+        """Send this many random bytes between the data packages."""
+        self._links.send_to_all(os.urandom(int(count)), time.monotonic())
+
+    def order_restore(self) -> None:
+        """End all faults of the network."""
+        self._links.faults = LinkFaults()
+        self._links.connect()
+
+    def order_protective_stop(self) -> None:
+        """Stop as for a collision."""
+        self.controller.protective_stop()
+
+    def order_unlock(self) -> str:
+        """Unlock the protective stop, as a person at the robot does."""
+        return "unlocked" if self.controller.unlock() else "too early"
+
+    def order_emergency_stop(self) -> None:
+        """Press the red button."""
+        self.controller.emergency_stop()
+
+    def order_release_emergency_stop(self) -> None:
+        """Pull the red button; the arm must be powered on and its brakes released afterwards."""
+        self.controller.release_emergency_stop()
+
+    def order_power_on(self) -> None:
+        """Power the arm and release its brakes."""
+        self.controller.brake_release()
+
+    def order_slider(self, value: float) -> None:
+        """Set the speed slider, from 0 to 1."""
+        if not 0.0 <= value <= 1.0:
+            raise ValueError(f"value={value}: expected a number from 0 to 1")
+        self.controller.speed_slider = float(value)
+
+    def order_pause(self) -> str:
+        """Pause the program."""
+        return "paused" if self.controller.pause() else "nothing plays"
+
+    def order_play(self) -> str:
+        """Go on with the paused program."""
+        return "plays" if self.controller.play() else "nothing is paused"
+
+    def order_stop_program(self) -> None:
+        """End the program, as a person at the robot does."""
+        self.controller.stop_program()
+
+    def order_wrench(self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0,
+                     tz: float = 0.0) -> None:
+        """Set the measured wrench [N, Nm]."""
+        self.controller.wrench = (float(fx), float(fy), float(fz), float(tx), float(ty), float(tz))
+
+    def order_state(self) -> str:
+        """Modes, slider, connections, payload and joint positions."""
+        controller = self.controller
+        return (f"robot_mode={controller.robot_mode.name} safety_mode={controller.safety_mode.name} "
+                f"runtime_state={controller.runtime_state.name} slider={controller.speed_slider:g} "
+                f"connections={self._links.connections} payload_kg={controller.payload_kg:g} "
+                f"q={','.join(f'{position:.6f}' for position in controller.motion.positions)}")
+
+    def order_log(self, path: str) -> None:
+        """Write every commanded position to this file: wall time [s], controller time [s], commanded q, actual q."""
+        self._end_log()
+        self._log = open(path, "w", encoding="utf-8")
+        self._log.write("wall_s,controller_s," + ",".join(f"{kind}_{joint}" for kind in ("command", "actual")
+                                                           for joint in range(JOINTS)) + "\n")
+        self.controller.on_command = self._write_log
+
+    def order_end_log(self) -> None:
+        """Finish the file of `log`."""
+        self._end_log()
+
+    def _write_log(self, time_s: float, command: Sequence[float], actual: Sequence[float]) -> None:
+        if self._log is not None:
+            numbers = ",".join(f"{value:.9f}" for value in (*command, *actual))
+            self._log.write(f"{time.time():.6f},{time_s:.6f},{numbers}\n")
+
+    def _end_log(self) -> None:
+        self.controller.on_command = None
+        log, self._log = self._log, None
+        if log is not None:
+            log.close()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run an emulator without ROS; returns the exit code."""
+    parser = argparse.ArgumentParser(description="A Universal Robots controller in software.")
+    parser.add_argument("--address", default="127.0.0.1", help="where to listen")
+    parser.add_argument("--model", default="UR5", choices=sorted(MODELS))
+    parser.add_argument("--unlock-delay", type=float, default=5.0, help="of a protective stop [s]")
+    parser.add_argument("--command-port", type=int, default=COMMAND_PORT)
+    parser.add_argument("--positions", type=float, nargs=JOINTS, default=HOME, help="of the joints [rad]")
+    options = parser.parse_args(arguments)
+    logging.basicConfig(level=logging.INFO)
+    emulator = UrEmulator(options.address, options.model, options.positions, options.unlock_delay,
+                          options.command_port)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: emulator.stop())
+    try:
+        emulator.connect()
+    except OSError as error:
+        LOGGER.error("%s", error)
+        return 1
+    print("ready", flush=True)
+    emulator.run()
+    emulator.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The network side of the emulated controller: ports, connections, and what can go wrong with them."""
+from __future__ import annotations
+
+import logging
+import selectors
+import socket
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+LOGGER = logging.getLogger("rosout.ur_emulator")
+_MAX_WAITING = 2_000   # packages that may wait for a client that does not read
+
+
+@dataclass(slots=True)
+class LinkFaults:
+    """What is wrong with the network at the moment.
+
+    Attributes:
+        frozen: nothing gets through in either direction, though all connections stay open.
+        delay_s: how late everything the controller sends arrives [s].
+        lose_every: of the data packages each one of this number is lost; 0 for none.
+    """
+
+    frozen: bool = False
+    delay_s: float = 0.0
+    lose_every: int = 0
+
+
+class Session:
+    """What a port does with one connection; the methods may raise ValueError to have it closed.
+
+    Args:
+        receive: answers what has arrived.
+        cycle: what to send in each cycle.
+        close: called when the connection is gone.
+        greeting: sent at once.
+    """
+
+    def __init__(self, receive: Callable[[bytes], bytes], cycle: Callable[[], bytes] | None = None,
+                 close: Callable[[], None] | None = None, greeting: bytes = b"") -> None:
+        self.receive = receive
+        self.cycle = cycle
+        self.close = close
+        self.greeting = greeting
+
+
+class _Connection:
+    """One connection, with the bytes that wait to be sent and when."""
+
+    __slots__ = ("socket", "session", "waiting", "packages")
+
+    def __init__(self, connection: socket.socket, session: Session) -> None:
+        self.socket = connection
+        self.session = session
+        self.waiting: deque[tuple[float, bytes]] = deque()
+        self.packages = 0
+
+
+class Links:
+    """All ports and connections of the controller; everything runs on the caller's thread and never blocks.
+
+    Args:
+        address: where to listen.
+        ports: makes the session of a new connection, by port.
+    """
+
+    def __init__(self, address: str, ports: Mapping[int, Callable[[], Session]]) -> None:
+        self.faults = LinkFaults()
+        self._address = address
+        self._ports = dict(ports)
+        self._selector = selectors.DefaultSelector()
+        self._listeners: list[socket.socket] = []
+        self._connections: list[_Connection] = []
+
+    def connect(self) -> None:
+        """Listen at all ports; nothing happens when that is already so.
+
+        Raises:
+            OSError: a port is taken; the text names it.
+        """
+        if self._listeners:
+            return
+        for port, make_session in self._ports.items():
+            listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.setblocking(False)
+            self._listeners.append(listener)
+            try:
+                listener.bind((self._address, port))
+            except OSError as error:
+                self.close()
+                raise OSError(error.errno, f"port {self._address}:{port}: {error.strerror}; does another emulator run "
+                                           "there? Choose another address, for example 127.0.0.2") from error
+            listener.listen()
+            self._selector.register(listener, selectors.EVENT_READ, make_session)
+
+    def close(self) -> None:
+        """Close all connections and ports; may be called twice."""
+        for connection in list(self._connections):
+            self._drop(connection)
+        while self._listeners:
+            listener = self._listeners.pop()
+            if listener in self._selector.get_map():
+                self._selector.unregister(listener)
+            listener.close()
+
+    def wait(self, timeout_s: float) -> list[selectors.SelectorKey]:
+        """What has something to read, after at most `timeout_s` [s]."""
+        return [key for key, _ in self._selector.select(max(0.0, timeout_s))]
+
+    def serve(self, ready: list[selectors.SelectorKey], now_s: float) -> None:
+        """Take in what has arrived."""
+        if self.faults.frozen:
+            return
+        for key in ready:
+            if isinstance(key.data, _Connection):
+                self._read(key.data, now_s)
+            elif key.fileobj in self._listeners:
+                self._accept(key, now_s)
+
+    def cycle(self, now_s: float) -> None:
+        """Send what each session has for this cycle, and what is due of what waits."""
+        for connection in list(self._connections):
+            if connection.session.cycle is not None:
+                package = connection.session.cycle()
+                if package:
+                    connection.packages += 1
+                    lost = self.faults.lose_every and connection.packages % self.faults.lose_every == 0
+                    if not lost:
+                        self._queue(connection, package, now_s)
+            self._flush(connection, now_s)
+
+    def send_to_all(self, data: bytes, now_s: float) -> None:
+        """Send bytes on every connection that gets data packages."""
+        for connection in list(self._connections):
+            if connection.session.cycle is not None:
+                self._queue(connection, data, now_s)
+                self._flush(connection, now_s)
+
+    @property
+    def connections(self) -> int:
+        """How many connections are open."""
+        return len(self._connections)
+
+    def _accept(self, key: selectors.SelectorKey, now_s: float) -> None:
+        accepted, _ = key.fileobj.accept()  # type: ignore[union-attr]
+        accepted.setblocking(False)
+        accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection = _Connection(accepted, key.data())
+        self._connections.append(connection)
+        self._selector.register(accepted, selectors.EVENT_READ, connection)
+        if connection.session.greeting:
+            self._queue(connection, connection.session.greeting, now_s)
+            self._flush(connection, now_s)
+
+    def _read(self, connection: _Connection, now_s: float) -> None:
+        try:
+            data = connection.socket.recv(65536)
+            reply = connection.session.receive(data) if data else b""
+        except BlockingIOError:
+            return
+        except ValueError as error:
+            LOGGER.warning("a connection is closed: %s", error)
+            self._drop(connection)
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(connection)
+        elif reply:
+            self._queue(connection, reply, now_s)
+            self._flush(connection, now_s)
+
+    def _queue(self, connection: _Connection, data: bytes, now_s: float) -> None:
+        if len(connection.waiting) < _MAX_WAITING:
+            connection.waiting.append((now_s + self.faults.delay_s, data))
+
+    def _flush(self, connection: _Connection, now_s: float) -> None:
+        while connection.waiting and not self.faults.frozen and connection.waiting[0][0] <= now_s:
+            due_s, data = connection.waiting.popleft()
+            try:
+                sent = connection.socket.send(data)
+            except BlockingIOError:
+                sent = 0
+            except OSError:
+                self._drop(connection)
+                return
+            if sent < len(data):
+                connection.waiting.appendleft((due_s, data[sent:]))
+                return
+
+    def _drop(self, connection: _Connection) -> None:
+        if connection not in self._connections:
+            return
+        self._connections.remove(connection)
+        self._selector.unregister(connection.socket)
+        connection.socket.close()
+        if connection.session.close is not None:
+            connection.session.close()

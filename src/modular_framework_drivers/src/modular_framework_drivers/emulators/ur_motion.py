@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How the joints of the emulated arm move: they follow what the program wants within a UR5's speed and acceleration."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+JOINTS = 6
+MAX_VELOCITY = math.pi         # of every joint of a UR5 [rad/s]
+MAX_ACCELERATION = 40.0        # what URScript allows of a joint [rad/s^2]
+MAX_SERVO_ERROR = 0.5          # further behind its servo target the controller stops the arm [rad]
+_ARRIVED = 1e-5                # a move ends this near its target [rad], as slow as this [rad/s]
+
+# Denavit-Hartenberg parameters of the UR5 as its maker publishes them: (a [m], d [m], alpha [rad]) per joint.
+_UR5_LINKS = ((0.0, 0.089159, math.pi / 2), (-0.425, 0.0, 0.0), (-0.39225, 0.0, 0.0),
+              (0.0, 0.10915, math.pi / 2), (0.0, 0.09465, -math.pi / 2), (0.0, 0.0823, 0.0))
+
+
+class Drive(Enum):
+    """What the joints are told to do."""
+
+    HOLD = "hold"
+    SERVO = "servo"
+    SPEED = "speed"
+    MOVE = "move"
+    STOP = "stop"
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One motion.
+
+    Attributes:
+        drive: its kind.
+        target: joint positions (SERVO, MOVE) [rad] or velocities (SPEED) [rad/s].
+        velocity: top speed (MOVE) [rad/s].
+        acceleration: of SPEED, MOVE and STOP [rad/s^2].
+        lookahead_s: time constant with which SERVO follows [s].
+    """
+
+    drive: Drive
+    target: tuple[float, ...] = (0.0,) * JOINTS
+    velocity: float = MAX_VELOCITY
+    acceleration: float = MAX_ACCELERATION
+    lookahead_s: float = 0.1
+
+
+class ArmMotion:
+    """Positions and velocities of the joints.
+
+    Args:
+        positions: where they are at the beginning [rad].
+    """
+
+    def __init__(self, positions: Sequence[float]) -> None:
+        self.positions = list(positions)
+        self.velocities = [0.0] * JOINTS
+        self.order = Order(Drive.HOLD)
+
+    def tell(self, order: Order) -> None:
+        """Replace what the joints are doing."""
+        self.order = order
+
+    @property
+    def servo_error(self) -> float:
+        """How far the joint that is most behind is from its servo target [rad]; 0 when there is none."""
+        if self.order.drive is not Drive.SERVO:
+            return 0.0
+        return max(abs(goal - position) for goal, position in zip(self.order.target, self.positions, strict=True))
+
+    @property
+    def finished(self) -> bool:
+        """Whether a MOVE has arrived or a STOP has come to rest."""
+        at_rest = max(map(abs, self.velocities)) <= _ARRIVED
+        if self.order.drive is Drive.MOVE:
+            return at_rest and all(abs(goal - position) <= _ARRIVED
+                                   for goal, position in zip(self.order.target, self.positions, strict=True))
+        return at_rest
+
+    def step(self, dt_s: float, speed_fraction: float) -> None:
+        """Move on by `dt_s` [s]; `speed_fraction` in [0, 1] scales every speed, as the speed slider does."""
+        order = self.order
+        wanted = self._wanted_velocities(order, dt_s)
+        limit = order.acceleration if order.drive in (Drive.SPEED, Drive.MOVE, Drive.STOP) else MAX_ACCELERATION
+        change = min(limit, MAX_ACCELERATION) * dt_s
+        top = MAX_VELOCITY * speed_fraction
+        for joint, velocity in enumerate(self.velocities):
+            goal = min(max(wanted[joint], -top), top)
+            velocity += min(max(goal - velocity, -change), change)
+            self.velocities[joint] = velocity
+            self.positions[joint] += velocity * dt_s
+
+    def _wanted_velocities(self, order: Order, dt_s: float) -> Sequence[float]:
+        match order.drive:
+            case Drive.HOLD | Drive.STOP:
+                return (0.0,) * JOINTS
+            case Drive.SPEED:
+                return order.target
+            case Drive.SERVO:
+                return self._towards(order.target, order.lookahead_s, MAX_ACCELERATION, [MAX_VELOCITY] * JOINTS)
+            case Drive.MOVE:
+                errors = [abs(goal - position) for goal, position in zip(order.target, self.positions, strict=True)]
+                longest = max(max(errors), 1e-12)
+                tops = [order.velocity * error / longest for error in errors]
+                return self._towards(order.target, dt_s, order.acceleration, tops)
+
+    def _towards(self, target: Sequence[float], time_constant_s: float, acceleration: float,
+                 tops: Sequence[float]) -> list[float]:
+        """Velocities that bring the joints to the target without running past it."""
+        velocities = []
+        for goal, position, top in zip(target, self.positions, tops, strict=True):
+            error = goal - position
+            speed = min(abs(error) / time_constant_s, math.sqrt(2.0 * acceleration * abs(error)) * 0.8, top)
+            velocities.append(math.copysign(speed, error))
+        return velocities
+
+
+def flange_pose(positions: Sequence[float]) -> tuple[float, ...]:
+    """Pose of a UR5's flange in its base: position [m], then the rotation vector [rad]."""
+    rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    origin = [0.0, 0.0, 0.0]
+    for theta, (a, d, alpha) in zip(positions, _UR5_LINKS, strict=True):
+        ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+        offset = (a * ct, a * st, d)
+        link = ((ct, -st * ca, st * sa), (st, ct * ca, -ct * sa), (0.0, sa, ca))
+        origin = [origin[row] + sum(rotation[row][k] * offset[k] for k in range(3)) for row in range(3)]
+        rotation = [[sum(rotation[row][k] * link[k][column] for k in range(3)) for column in range(3)]
+                    for row in range(3)]
+    return (*origin, *_rotation_vector(rotation))
+
+
+def _rotation_vector(rotation: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    cosine = min(max((rotation[0][0] + rotation[1][1] + rotation[2][2] - 1.0) / 2.0, -1.0), 1.0)
+    angle = math.acos(cosine)
+    axis = (rotation[2][1] - rotation[1][2], rotation[0][2] - rotation[2][0], rotation[1][0] - rotation[0][1])
+    if angle < 1e-9:
+        return (0.0, 0.0, 0.0)
+    if math.pi - angle < 1e-6:   # half a turn: the axis is in the symmetric part
+        column = max(range(3), key=lambda index: rotation[index][index])
+        vector = [rotation[row][column] + (1.0 if row == column else 0.0) for row in range(3)]
+        length = math.sqrt(sum(value * value for value in vector))
+        return tuple(angle * value / length for value in vector)
+    return tuple(angle * value / (2.0 * math.sin(angle)) for value in axis)

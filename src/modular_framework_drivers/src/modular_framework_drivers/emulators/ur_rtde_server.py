@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The controller's side of the real-time data exchange (RTDE), protocol version 2, for one client.
+
+Packages are a length of two bytes, a type of one and a payload, big-endian; a client sets up recipes (lists of
+variables), and data packages hold the values of a recipe after its number.
+"""
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from modular_framework_drivers.emulators.ur_controller import REGISTERS, UrController
+from modular_framework_drivers.emulators.ur_motion import flange_pose
+
+_PROTOCOL, _VERSION, _DATA = ord("V"), ord("v"), ord("U")
+_OUTPUTS, _INPUTS, _START, _PAUSE = ord("O"), ord("I"), ord("S"), ord("P")
+_HEADER = struct.Struct(">HB")
+_FORMATS = {"DOUBLE": "d", "INT32": "i", "UINT32": "I", "UINT64": "Q", "UINT8": "B", "BOOL": "?",
+            "VECTOR3D": "3d", "VECTOR6D": "6d", "VECTOR6INT32": "6i"}
+Value = float | Sequence[float]
+
+
+class RtdeProtocolError(ValueError):
+    """A client sent what is no RTDE; its connection is to be closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A variable of RTDE.
+
+    Attributes:
+        type_name: as in the answers to set-ups.
+        get: its value, for outputs.
+        set: takes a value, for inputs.
+    """
+
+    type_name: str
+    get: Callable[[], Value] | None = None
+    set: Callable[[Value], None] | None = None
+
+
+def output_variables(controller: UrController) -> dict[str, Variable]:
+    """The variables a client can ask for, by name."""
+    motion, zeros6, zeros3 = controller.motion, (0.0,) * 6, (0.0,) * 3
+
+    def temperatures() -> Value:
+        return (30.0,) * 6
+
+    values: dict[str, tuple[str, Callable[[], Value]]] = {
+        "timestamp": ("DOUBLE", lambda: controller.time_s),
+        "actual_execution_time": ("DOUBLE", lambda: 0.0002),
+        "target_q": ("VECTOR6D", lambda: controller.target_positions),
+        "target_qd": ("VECTOR6D", lambda: motion.velocities),
+        "actual_q": ("VECTOR6D", lambda: motion.positions),
+        "actual_qd": ("VECTOR6D", lambda: motion.velocities),
+        "actual_TCP_pose": ("VECTOR6D", lambda: flange_pose(motion.positions)),
+        "target_TCP_pose": ("VECTOR6D", lambda: flange_pose(controller.target_positions)),
+        "actual_TCP_force": ("VECTOR6D", lambda: controller.wrench),
+        "ft_raw_wrench": ("VECTOR6D", lambda: controller.wrench),
+        "joint_temperatures": ("VECTOR6D", temperatures),
+        "actual_joint_voltage": ("VECTOR6D", lambda: (48.0,) * 6),
+        "actual_tool_accelerometer": ("VECTOR3D", lambda: (0.0, 0.0, -9.81)),
+        "payload": ("DOUBLE", lambda: controller.payload_kg),
+        "payload_cog": ("VECTOR3D", lambda: controller.payload_centre_m),
+        "robot_mode": ("INT32", lambda: controller.robot_mode),
+        "safety_mode": ("INT32", lambda: controller.safety_mode),
+        "joint_mode": ("VECTOR6INT32", lambda: (253,) * 6),
+        "runtime_state": ("UINT32", lambda: controller.runtime_state),
+        "robot_status_bits": ("UINT32", lambda: controller.robot_status_bits),
+        "safety_status_bits": ("UINT32", lambda: controller.safety_status_bits),
+        "speed_scaling": ("DOUBLE", lambda: controller.speed_scaling),
+        "target_speed_fraction": ("DOUBLE", lambda: controller.speed_slider),
+        "actual_main_voltage": ("DOUBLE", lambda: 48.0),
+        "actual_robot_voltage": ("DOUBLE", lambda: 48.0),
+        "actual_digital_input_bits": ("UINT64", lambda: 0),
+        "actual_digital_output_bits": ("UINT64", lambda: controller.digital_outputs),
+        "elbow_position": ("VECTOR3D", lambda: zeros3),
+        "elbow_velocity": ("VECTOR3D", lambda: zeros3),
+    }
+    for name in ("target_qdd", "target_current", "target_moment", "actual_current", "joint_control_output",
+                 "actual_TCP_speed", "target_TCP_speed", "payload_inertia", "actual_current_as_torque"):
+        values[name] = ("VECTOR6D", lambda: zeros6)
+    for name in ("actual_momentum", "actual_robot_current", "standard_analog_input0", "standard_analog_input1",
+                 "standard_analog_output0", "standard_analog_output1"):
+        values[name] = ("DOUBLE", lambda: 0.0)
+    for index in range(REGISTERS):
+        values[f"output_int_register_{index}"] = ("INT32", _getter(controller.outputs.ints, index))
+        values[f"output_double_register_{index}"] = ("DOUBLE", _getter(controller.outputs.doubles, index))
+    return {name: Variable(type_name, get=get) for name, (type_name, get) in values.items()}
+
+
+def input_variables(controller: UrController) -> dict[str, Variable]:
+    """The variables a client can set, by name."""
+
+    def set_slider(value: Value) -> None:
+        controller.speed_slider = min(max(float(value), 0.0), 1.0)  # type: ignore[arg-type]
+
+    def ignore(value: Value) -> None:
+        del value
+
+    variables = {"speed_slider_fraction": Variable("DOUBLE", set=set_slider),
+                 "speed_slider_mask": Variable("UINT32", set=ignore),
+                 "external_force_torque": Variable("VECTOR6D", set=ignore)}
+    for kind in ("standard", "configurable", "tool"):
+        for suffix in ("_digital_output_mask", "_digital_output"):
+            variables[kind + suffix] = Variable("UINT8", set=ignore)
+    for suffix, type_name in (("mask", "UINT8"), ("type", "UINT8"), ("0", "DOUBLE"), ("1", "DOUBLE")):
+        variables[f"standard_analog_output_{suffix}"] = Variable(type_name, set=ignore)
+    for index in range(REGISTERS):
+        variables[f"input_int_register_{index}"] = Variable("INT32", set=_setter(controller.inputs.ints, index))
+        variables[f"input_double_register_{index}"] = Variable("DOUBLE",
+                                                               set=_setter(controller.inputs.doubles, index))
+    return variables
+
+
+def _getter(values: Sequence[float], index: int) -> Callable[[], Value]:
+    return lambda: values[index]
+
+
+def _setter(values: list[float], index: int) -> Callable[[Value], None]:
+    def set_value(value: Value) -> None:
+        values[index] = value  # type: ignore[call-overload]
+
+    return set_value
+
+
+class Recipe:
+    """The variables of one data package.
+
+    Args:
+        number: of the recipe.
+        variables: in the order of the package.
+    """
+
+    def __init__(self, number: int, variables: Sequence[Variable]) -> None:
+        self._variables = tuple(variables)
+        self._codec = struct.Struct(">" + "".join(_FORMATS[variable.type_name] for variable in variables))
+        self._header = struct.pack(">HBB", 4 + self._codec.size, _DATA, number)
+
+    def package(self) -> bytes:
+        """The data package with the values of now."""
+        values: list[float] = []
+        for variable in self._variables:
+            value = variable.get() if variable.get is not None else 0.0
+            if isinstance(value, (list, tuple)):
+                values += value
+            else:
+                values.append(value)  # type: ignore[arg-type]
+        return self._header + self._codec.pack(*values)
+
+    def take(self, payload: bytes) -> None:
+        """Set the variables to the values of a package (without its header and number).
+
+        Raises:
+            RtdeProtocolError: it is of another length.
+        """
+        if len(payload) != self._codec.size:
+            raise RtdeProtocolError(f"data package of {len(payload)} bytes; its recipe has {self._codec.size}")
+        values = self._codec.unpack(payload)
+        start = 0
+        for variable in self._variables:
+            count = int(_FORMATS[variable.type_name][:-1] or 1)
+            if variable.set is not None:
+                variable.set(values[start] if count == 1 else values[start:start + count])
+            start += count
+
+
+class RtdeServer:
+    """What all clients share: the variables, and who sets which.
+
+    Args:
+        controller: whose variables they are.
+    """
+
+    def __init__(self, controller: UrController) -> None:
+        self.controller = controller
+        self.outputs = output_variables(controller)
+        self.inputs = input_variables(controller)
+        self.owners: dict[str, RtdeSession] = {}
+
+
+class RtdeSession:
+    """One client.
+
+    Args:
+        server: what it is a client of.
+    """
+
+    def __init__(self, server: RtdeServer) -> None:
+        self._server = server
+        self._buffer = b""
+        self._inputs: dict[int, Recipe] = {}
+        self._output: Recipe | None = None
+        self._every = 1
+        self._cycles = 0
+        self._started = False
+        self._answers: dict[int, Callable[[bytes], bytes]] = {
+            _PROTOCOL: lambda payload: b"\x01" if payload[-1:] == b"\x02" else b"\x00",
+            _VERSION: lambda _: struct.pack(">4I", *server.controller.model.version),
+            _OUTPUTS: self._set_up_outputs,
+            _INPUTS: self._set_up_inputs,
+            _START: lambda _: self._start(True),
+            _PAUSE: lambda _: self._start(False),
+        }
+
+    def receive(self, data: bytes) -> bytes:
+        """What to answer to what has arrived.
+
+        Raises:
+            RtdeProtocolError: it is no RTDE.
+        """
+        self._buffer += data
+        replies = b""
+        while len(self._buffer) >= _HEADER.size:
+            size, kind = _HEADER.unpack_from(self._buffer)
+            if size < _HEADER.size or (kind not in self._answers and kind != _DATA):
+                raise RtdeProtocolError(f"package of type {kind} and length {size}")
+            if len(self._buffer) < size:
+                break
+            payload, self._buffer = self._buffer[_HEADER.size:size], self._buffer[size:]
+            if kind == _DATA:
+                self._take(payload)
+                continue
+            reply = self._answers[kind](payload)
+            replies += _HEADER.pack(_HEADER.size + len(reply), kind) + reply
+        return replies
+
+    def cycle(self) -> bytes:
+        """The data package of this cycle; empty when the client wants none."""
+        if not self._started or self._output is None:
+            return b""
+        self._cycles += 1
+        return self._output.package() if self._cycles % self._every == 0 else b""
+
+    def close(self) -> None:
+        """Give back the inputs this client set."""
+        for name in [name for name, owner in self._server.owners.items() if owner is self]:
+            del self._server.owners[name]
+
+    def _take(self, payload: bytes) -> None:
+        recipe = self._inputs.get(payload[0]) if payload else None
+        if recipe is None:
+            raise RtdeProtocolError(f"data package of the unknown recipe {payload[:1].hex() or 'none'}")
+        recipe.take(payload[1:])
+
+    def _set_up_outputs(self, payload: bytes) -> bytes:
+        if len(payload) < 8:
+            raise RtdeProtocolError("set-up of outputs without a frequency")
+        (frequency,) = struct.unpack_from(">d", payload)
+        own = self._server.controller.model.frequency
+        self._every = max(1, round(own / frequency)) if frequency > 0.0 else 1
+        names = _names(payload[8:])
+        found = [self._server.outputs.get(name) for name in names]
+        if all(variable is not None for variable in found):
+            self._output = Recipe(1, [variable for variable in found if variable is not None])
+        return b"\x01" + ",".join(variable.type_name if variable else "NOT_FOUND" for variable in found).encode()
+
+    def _set_up_inputs(self, payload: bytes) -> bytes:
+        number = len(self._inputs) + 1
+        names = _names(payload)
+        types = [self._input_type(name) for name in names]
+        if "NOT_FOUND" in types or "IN_USE" in types:
+            return b"\x00" + ",".join(types).encode()
+        for name in names:
+            self._server.owners[name] = self
+        self._inputs[number] = Recipe(number, [self._server.inputs[name] for name in names])
+        return bytes([number]) + ",".join(types).encode()
+
+    def _input_type(self, name: str) -> str:
+        if name not in self._server.inputs:
+            return "NOT_FOUND"
+        if self._server.owners.get(name, self) is not self:
+            return "IN_USE"
+        return self._server.inputs[name].type_name
+
+    def _start(self, started: bool) -> bytes:
+        self._started = started and self._output is not None
+        return b"\x01" if self._started is started else b"\x00"
+
+
+def _names(text: bytes) -> list[str]:
+    return [name for name in text.decode("ascii", errors="replace").split(",") if name]
