@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What hangs on the shaft of an emulated gripper servo: motor, fingers with their two stops, and perhaps an object.
+
+A simple model, enough for what a driver sees: speed follows the motor's duty with one time constant, friction eats a
+share of the duty, and whatever the fingers press on pushes back like a spring.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
+from modular_framework_drivers.ezgripper import mx64
+from modular_framework_drivers.ezgripper.mx64 import ServoErrors
+
+STEP_S = 0.002
+
+
+@dataclass(frozen=True, slots=True)
+class FingerModel:
+    """Numbers of the model.
+
+    Attributes:
+        closed_ticks: shaft angle at which the pads meet [ticks], any turn.
+        travel_ticks: from there to the stop of the open fingers [ticks].
+        top_speed: without load at full duty [ticks/s]; an MX-64 at 12 V turns 63 times a minute.
+        time_constant_s: of the speed [s].
+        torque_mode_gain: how much faster the same word makes it without load in torque control mode, where the motor's
+            current is held and its voltage rises with its speed.
+        friction: duty that only just does not move anything, in [0, 1].
+        stiffness: of stops and objects: duty a tick of pressing in takes [1/tick].
+        overload_share: duty that is an overload when it lasts, in [0, 1].
+        overload_s: how long it lasts until then [s].
+        room_temperature: [deg C].
+        heating: at full duty without motion [K/s].
+        cooling: share of the excess over the room lost [1/s].
+    """
+
+    closed_ticks: float = -150.0
+    travel_ticks: float = 2560.0
+    top_speed: float = 63.0 / 60.0 * 4096.0
+    time_constant_s: float = 0.04
+    torque_mode_gain: float = 3.0
+    friction: float = 0.03
+    stiffness: float = 0.01
+    overload_share: float = 0.7
+    overload_s: float = 2.0
+    room_temperature: float = 30.0
+    heating: float = 0.5
+    cooling: float = 0.01
+
+
+class Finger:
+    """The moving part behind one servo; `advance` lets time pass and writes what the servo measures.
+
+    Args:
+        servo: whose registers command it.
+        model: numbers of the model.
+        opening: where it stands at first, counted from the closed fingers [ticks].
+    """
+
+    def __init__(self, servo: DynamixelServo, model: FingerModel | None = None, opening: float = 400.0) -> None:
+        self.servo, self.model = servo, model or FingerModel()
+        self.angle = self.model.closed_ticks + opening
+        self.speed = 0.0
+        self.temperature = self.model.room_temperature
+        self.object_opening: float | None = None
+        self._duty = 0.0
+        self._overloaded_s = 0.0
+        self._left_s = 0.0
+        self._publish()
+
+    @property
+    def opening(self) -> float:
+        """How far the fingers are open, from the closed stop [ticks]."""
+        return self.angle - self.model.closed_ticks
+
+    def advance(self, duration_s: float) -> None:
+        """Let time [s] pass, in steps that the stiff contacts need."""
+        self._left_s += duration_s
+        while self._left_s >= STEP_S:
+            self._left_s -= STEP_S
+            self._step(STEP_S)
+        self._publish()
+
+    def power_cycle(self) -> None:
+        """The servo forgets how often its shaft has turned: the encoder knows one turn only."""
+        turns = math.floor(self.angle / mx64.TICKS_PER_TURN) * mx64.TICKS_PER_TURN
+        self.angle -= turns
+        self.model = replace(self.model, closed_ticks=self.model.closed_ticks - turns)
+        self.servo.power_cycle()
+
+    def _step(self, period_s: float) -> None:
+        model = self.model
+        self._duty = self._wanted_duty()
+        pushed = self._duty - self._resistance()
+        free = math.copysign(max(0.0, abs(pushed) - model.friction), pushed)
+        gain = model.torque_mode_gain if self.servo.get(mx64.TORQUE_CONTROL_MODE) else 1.0
+        wanted = max(-1.0, min(1.0, free * gain)) * model.top_speed
+        self.speed += (wanted - self.speed) * min(1.0, period_s / model.time_constant_s)
+        self.angle += self.speed * period_s
+        self._heat(period_s)
+
+    def _wanted_duty(self) -> float:
+        """Duty of the motor, counter-clockwise (opening) positive."""
+        servo = self.servo
+        limit = servo.get(mx64.TORQUE_LIMIT) / mx64.TORQUE_MAX
+        if not servo.get(mx64.TORQUE_ENABLE):
+            return 0.0
+        if servo.get(mx64.TORQUE_CONTROL_MODE):
+            wanted = mx64.directed(servo.get(mx64.GOAL_TORQUE)) / mx64.TORQUE_MAX
+        else:
+            error = mx64.signed(servo.get(mx64.GOAL_POSITION)) - self.angle
+            wanted = servo.get(mx64.P_GAIN) / 8.0 * error / mx64.TORQUE_MAX
+        return max(-limit, min(limit, wanted))
+
+    def _resistance(self) -> float:
+        """Duty that stops and object take up, positive against opening."""
+        model, opening = self.model, self.opening
+        lower = 0.0 if self.object_opening is None else max(0.0, self.object_opening)
+        return model.stiffness * (min(0.0, opening - lower) + max(0.0, opening - model.travel_ticks))
+
+    def _heat(self, period_s: float) -> None:
+        model = self.model
+        excess = self.temperature - model.room_temperature
+        self.temperature += (model.heating * self._duty ** 2 - model.cooling * excess) * period_s
+        pressing = abs(self._duty) > model.overload_share and abs(self.speed) < 0.05 * model.top_speed
+        in_torque_mode = bool(self.servo.get(mx64.TORQUE_CONTROL_MODE))
+        self._overloaded_s = self._overloaded_s + period_s if pressing and not in_torque_mode else 0.0
+        if self._overloaded_s > model.overload_s:
+            self.servo.shut_down(ServoErrors.OVERLOAD)
+        if self.temperature > self.servo.get(mx64.TEMPERATURE_LIMIT):
+            self.servo.shut_down(ServoErrors.OVERHEATING)
+        else:
+            self.servo.errors &= ~ServoErrors.OVERHEATING
+
+    def _publish(self) -> None:
+        servo = self.servo
+        position = round(self.angle)
+        servo.set(mx64.PRESENT_POSITION, position if servo.multi_turn else position % mx64.TICKS_PER_TURN)
+        servo.set(mx64.PRESENT_SPEED, mx64.direction_word(round(self.speed / mx64.SPEED_UNIT_TICKS_S)))
+        servo.set(mx64.PRESENT_LOAD, mx64.direction_word(round(self._duty * mx64.TORQUE_MAX)))
+        servo.set(mx64.PRESENT_TEMPERATURE, round(self.temperature))
+        servo.set(mx64.MOVING, abs(self.speed) > mx64.SPEED_UNIT_TICKS_S)

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A Dynamixel MX-64 as it looks from its serial line: packets of protocol 1.0, and the table of registers behind them.
+
+What turns the shaft is elsewhere (`dynamixel_finger`); the servo reads its goals and is told what it measures.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from modular_framework_drivers.ezgripper import mx64
+from modular_framework_drivers.ezgripper.mx64 import Register, ServoErrors, from_bytes
+
+PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, SYNC_WRITE, BULK_READ = 1, 2, 3, 4, 5, 6, 0x83, 0x92
+BROADCAST = 0xFE
+HEADER = b"\xff\xff"
+TABLE_SIZE = 74
+POSITION_RANGE = 28672
+FACTORY = {
+    mx64.MODEL_NUMBER: mx64.MODEL_NUMBER_MX64, mx64.FIRMWARE_VERSION: 41, mx64.SERVO_ID: 1, mx64.BAUD_RATE: 34,
+    mx64.RETURN_DELAY_TIME: 250, mx64.CCW_ANGLE_LIMIT: 4095, mx64.TEMPERATURE_LIMIT: 80, mx64.MIN_VOLTAGE_LIMIT: 60,
+    mx64.MAX_VOLTAGE_LIMIT: 240, mx64.MAX_TORQUE: 1023, mx64.STATUS_RETURN_LEVEL: 2, mx64.ALARM_LED: 36,
+    mx64.SHUTDOWN: 36, mx64.RESOLUTION_DIVIDER: 1, mx64.P_GAIN: 32, mx64.TORQUE_LIMIT: 1023,
+    mx64.PRESENT_VOLTAGE: 120, mx64.PRESENT_TEMPERATURE: 30, mx64.CURRENT: 2048,
+}
+EEPROM_END = 24
+READ_ONLY = {0, 1, 2, *range(36, 47), 50, 51}
+LARGEST = {
+    mx64.SERVO_ID: 252, mx64.BAUD_RATE: 252, mx64.RETURN_DELAY_TIME: 254, mx64.CW_ANGLE_LIMIT: 4095,
+    mx64.CCW_ANGLE_LIMIT: 4095, mx64.MAX_TORQUE: 1023, mx64.STATUS_RETURN_LEVEL: 2, mx64.ALARM_LED: 127,
+    mx64.SHUTDOWN: 127, mx64.RESOLUTION_DIVIDER: 4, mx64.TORQUE_ENABLE: 1, mx64.P_GAIN: 254, mx64.MOVING_SPEED: 2047,
+    mx64.TORQUE_LIMIT: 1023, mx64.LOCK: 1, mx64.TORQUE_CONTROL_MODE: 1, mx64.GOAL_TORQUE: 2047,
+    mx64.GOAL_ACCELERATION: 254,
+}
+
+
+def checksum(body: bytes | Iterable[int]) -> int:
+    """The last byte of a packet: the inverted sum of everything between header and it."""
+    return ~sum(body) & 0xFF
+
+
+def packet(servo_id: int, kind: int, parameters: bytes = b"") -> bytes:
+    """A whole packet; `kind` is the instruction, or the error byte of a status packet."""
+    body = bytes([servo_id, len(parameters) + 2, kind]) + parameters
+    return HEADER + body + bytes([checksum(body)])
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """An instruction as it came over the line."""
+
+    servo_id: int
+    kind: int
+    parameters: bytes
+    intact: bool
+
+
+class PacketReader:
+    """Finds packets in a stream of bytes."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def clear(self) -> None:
+        """Forget what has come so far."""
+        self._buffer.clear()
+
+    def feed(self, data: bytes) -> Iterator[Instruction]:
+        """Take bytes; yields the packets that are complete."""
+        self._buffer += data
+        while True:
+            start = self._buffer.find(HEADER)
+            if start < 0:
+                del self._buffer[:max(0, len(self._buffer) - 1)]
+                return
+            del self._buffer[:start]
+            if len(self._buffer) < 4:
+                return
+            servo_id, length = self._buffer[2], self._buffer[3]
+            if servo_id == 0xFF or length < 2:
+                del self._buffer[0]
+                continue
+            if len(self._buffer) < length + 4:
+                return
+            body, check = bytes(self._buffer[2:length + 3]), self._buffer[length + 3]
+            del self._buffer[:length + 4]
+            yield Instruction(servo_id, body[2], body[3:], checksum(body) == check)
+
+
+class DynamixelServo:
+    """One servo: its registers, and its answers.
+
+    Args:
+        servo_id: its number on the line.
+        baudrate_word: word of its baud rate register.
+    """
+
+    def __init__(self, servo_id: int = 1, baudrate_word: int = 34) -> None:
+        self._table = bytearray(TABLE_SIZE)
+        self._registered: bytes | None = None
+        self.errors = ServoErrors.NONE
+        self._reset()
+        self.set(mx64.SERVO_ID, servo_id)
+        self.set(mx64.BAUD_RATE, baudrate_word)
+
+    def _reset(self) -> None:
+        self._table[:] = bytes(TABLE_SIZE)
+        for register, value in FACTORY.items():
+            self.set(register, value)
+
+    @property
+    def servo_id(self) -> int:
+        """Its number on the line."""
+        return self.get(mx64.SERVO_ID)
+
+    @property
+    def baudrate(self) -> float:
+        """Its baud rate [bit/s], by the manual's formula."""
+        word = self.get(mx64.BAUD_RATE)
+        return {250: 2.25e6, 251: 2.5e6, 252: 3e6}.get(word, 2e6 / (word + 1))
+
+    @property
+    def multi_turn(self) -> bool:
+        """Whether positions go on beyond one turn."""
+        return self.get(mx64.CW_ANGLE_LIMIT) == self.get(mx64.CCW_ANGLE_LIMIT) == mx64.MULTI_TURN_LIMIT
+
+    def get(self, register: Register) -> int:
+        """Word of a register, unsigned."""
+        return from_bytes(self._table[register.address:register.address + register.size])
+
+    def set(self, register: Register, value: int) -> None:
+        """Set a register from inside; no rule applies."""
+        data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
+        self._table[register.address:register.address + register.size] = data
+
+    def power_cycle(self) -> None:
+        """Power went and came: what is not in the EEPROM is as at first."""
+        eeprom = bytes(self._table[:EEPROM_END])
+        self._reset()
+        self._table[:EEPROM_END] = eeprom
+        self.set(mx64.TORQUE_LIMIT, self.get(mx64.MAX_TORQUE))
+        self.errors, self._registered = ServoErrors.NONE, None
+
+    def shut_down(self, errors: ServoErrors) -> None:
+        """An error of the motor; when the shutdown register says so, the torque limit becomes 0."""
+        self.errors |= errors
+        if errors & self.get(mx64.SHUTDOWN):
+            self.set(mx64.TORQUE_LIMIT, 0)
+
+    def handle(self, instruction: Instruction) -> bytes:
+        """Carry out an instruction addressed to this servo or to all; returns the status packet, b"" for none."""
+        if not instruction.intact:
+            return self._status(ServoErrors.CHECKSUM)
+        answer, errors = self._carry_out(instruction.kind, instruction.parameters)
+        if instruction.servo_id == BROADCAST or not self._answers(instruction.kind):
+            return b""
+        return self._status(errors, answer)
+
+    def _carry_out(self, kind: int, data: bytes) -> tuple[bytes, ServoErrors]:
+        if kind == PING:
+            return b"", ServoErrors.NONE
+        if kind == READ:
+            if len(data) != 2 or sum(data) > TABLE_SIZE:
+                return b"", ServoErrors.RANGE
+            return bytes(self._table[data[0]:data[0] + data[1]]), ServoErrors.NONE
+        if kind == WRITE:
+            return b"", self._write(data) if len(data) > 1 else ServoErrors.RANGE
+        if kind == REG_WRITE:
+            self._registered = data
+            self.set(mx64.REGISTERED, 1)
+            return b"", ServoErrors.NONE
+        if kind == ACTION and self._registered is not None:
+            data, self._registered = self._registered, None
+            self.set(mx64.REGISTERED, 0)
+            return b"", self._write(data) if len(data) > 1 else ServoErrors.RANGE
+        if kind == FACTORY_RESET:
+            self._reset()
+            return b"", ServoErrors.NONE
+        return b"", ServoErrors.INSTRUCTION
+
+    def sync_write(self, parameters: bytes) -> None:
+        """Take this servo's part of a SYNC WRITE."""
+        address, size = parameters[0], parameters[1]
+        for start in range(2, len(parameters) - size, size + 1):
+            if parameters[start] == self.servo_id:
+                self._write(bytes([address]) + parameters[start + 1:start + 1 + size])
+
+    def _answers(self, kind: int) -> bool:
+        level = self.get(mx64.STATUS_RETURN_LEVEL)
+        return kind == PING or level == 2 or (level == 1 and kind == READ)
+
+    def _status(self, errors: ServoErrors, data: bytes = b"") -> bytes:
+        return packet(self.servo_id, int(errors | self.errors), data)
+
+    def _write(self, parameters: bytes) -> ServoErrors:
+        """Write bytes, parameters[0] being the address; all or nothing."""
+        address, data = parameters[0], parameters[1:]
+        places = range(address, address + len(data))
+        if places.stop > TABLE_SIZE or READ_ONLY & set(places):
+            return ServoErrors.RANGE
+        if places.start < EEPROM_END and self.get(mx64.LOCK):
+            return ServoErrors.RANGE
+        before = bytes(self._table)
+        self._table[places.start:places.stop] = data
+        errors = self._faults(frozenset(places))
+        if errors:
+            self._table[:] = before
+        elif mx64.TORQUE_LIMIT.address in places and self.get(mx64.TORQUE_LIMIT):
+            self.errors &= ~ServoErrors.OVERLOAD
+        elif mx64.GOAL_POSITION.address in places and not self.get(mx64.TORQUE_CONTROL_MODE):
+            self.set(mx64.TORQUE_ENABLE, 1)
+        return errors
+
+    def _faults(self, places: frozenset[int]) -> ServoErrors:
+        """What is wrong with the words written at `places`."""
+        errors = ServoErrors.NONE
+        for register, largest in LARGEST.items():
+            if register.address in places and self.get(register) > largest:
+                errors |= ServoErrors.RANGE
+        if mx64.GOAL_POSITION.address in places and not self._goal_allowed():
+            errors |= ServoErrors.ANGLE_LIMIT
+        return errors
+
+    def _goal_allowed(self) -> bool:
+        goal = self.get(mx64.GOAL_POSITION)
+        if self.multi_turn:
+            return abs(mx64.signed(goal)) <= POSITION_RANGE
+        low, high = self.get(mx64.CW_ANGLE_LIMIT), self.get(mx64.CCW_ANGLE_LIMIT)
+        return low <= goal <= high or low == high == 0
+
+
+def answer_bus(servos: Iterable[DynamixelServo], instruction: Instruction) -> bytes:
+    """What the servos of one line answer to an instruction, one after the other."""
+    listed = list(servos)
+    if instruction.kind == SYNC_WRITE and instruction.servo_id == BROADCAST:
+        if instruction.intact and len(instruction.parameters) > 2:
+            for servo in listed:
+                servo.sync_write(instruction.parameters)
+        return b""
+    if instruction.kind == BULK_READ and instruction.servo_id == BROADCAST:
+        return b"".join(_bulk_answers(listed, instruction))
+    asked = [servo for servo in listed if instruction.servo_id in (servo.servo_id, BROADCAST)]
+    return b"".join([servo.handle(instruction) for servo in asked])
+
+
+def _bulk_answers(servos: list[DynamixelServo], instruction: Instruction) -> Iterator[bytes]:
+    wanted = instruction.parameters[1:]
+    for start in range(0, len(wanted) - 2, 3):
+        size, servo_id, address = wanted[start:start + 3]
+        for servo in servos:
+            if servo.servo_id == servo_id:
+                yield servo.handle(Instruction(servo_id, READ, bytes([address, size]), instruction.intact))
