@@ -15,7 +15,7 @@ from modular_framework_control.hardware_interface import (
 )
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
 from modular_framework_control.plugins import ROBOT_HW_BASE, PluginError, PluginIndex
-from modular_framework_control.robot_hw import RobotHW, SwitchState
+from modular_framework_control.robot_hw import HardwareFault, RobotHW, SwitchState
 
 LOGGER = logging.getLogger("rosout.combined_robot_hw")
 
@@ -65,6 +65,7 @@ class CombinedRobotHW(RobotHW):
         super().__init__()
         self._make = make if make is not None else robot_hw_of_type
         self._parts: list[HardwarePart] = []
+        self._raised: dict[tuple[str, str], str] = {}
 
     @property
     def parts(self) -> tuple[HardwarePart, ...]:
@@ -74,12 +75,37 @@ class CombinedRobotHW(RobotHW):
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         try:
             names = read_hardware_list(robot_hw_nh)
-            self._parts = [self._make_part(name, root_nh, robot_hw_nh.child(name)) for name in names]
+            for name in names:
+                self._parts.append(self._make_part(name, root_nh, robot_hw_nh.child(name)))
             self._combine_interfaces()
         except (ParameterError, HardwareInterfaceError) as error:
             LOGGER.error("%s", error)
+            self.close()
             return False
         return True
+
+    def close(self) -> None:
+        for part in reversed(self._parts):
+            try:
+                part.hardware.close()
+            except Exception as error:  # a user's hardware may raise anything; the others must be closed all the same
+                LOGGER.exception("hardware '%s': close() raised %s: %s", part.name, type(error).__name__, error)
+
+    def faults(self) -> Sequence[HardwareFault]:
+        if self._raised:
+            return [*self._raised_faults(), *self._told_faults()]
+        return self._told_faults()
+
+    def _raised_faults(self) -> Iterator[HardwareFault]:
+        for part in self._parts:
+            for what in ("read", "write"):
+                if (part.name, what) in self._raised:
+                    yield HardwareFault(f"hardware '{part.name}': {self._raised[part.name, what]}",
+                                        part.hardware.commanded_joints)
+
+    def _told_faults(self) -> list[HardwareFault]:
+        return [HardwareFault(f"hardware '{part.name}': {fault.reason}", fault.joints)
+                for part in self._parts for fault in part.hardware.faults()]
 
     def _make_part(self, name: str, root_nh: NodeHandle, part_nh: NodeHandle) -> HardwarePart:
         where = f"entry '{name}' of robot_hardware"
@@ -112,11 +138,22 @@ class CombinedRobotHW(RobotHW):
 
     def read(self, time_s: float, period_s: float) -> None:
         for part in self._parts:
-            part.hardware.read(time_s, period_s)
+            self._cycle(part, "read", part.hardware.read, time_s, period_s)
 
     def write(self, time_s: float, period_s: float) -> None:
         for part in self._parts:
-            part.hardware.write(time_s, period_s)
+            self._cycle(part, "write", part.hardware.write, time_s, period_s)
+
+    def _cycle(self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float,
+               period_s: float) -> None:
+        """Read or write one part; that it raised is a fault of this part until the same step succeeds again."""
+        try:
+            step(time_s, period_s)
+        except Exception as error:  # a user's hardware may raise anything; the others must go on
+            self._raised[part.name, what] = f"{what}() raised {type(error).__name__}: {error}"
+        else:
+            if self._raised:
+                self._raised.pop((part.name, what), None)
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         everything = list(controllers)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from modular_framework_control.hardware_interface import HardwareInterface
 from modular_framework_control.node_handle import NodeHandle
+from modular_framework_control.robot_hw import RobotHW
 
 
 class ControllerError(Exception):
@@ -22,9 +23,12 @@ class Controller:
 
     Attributes:
         interface_class: the hardware interface this controller works on.
+        robot_hw: the hardware, set before `init`, for who needs another interface besides; what is asked of any of its
+            interfaces in `init` is claimed for this controller.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]]
+    robot_hw: RobotHW = RobotHW()
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         """Get the joint handles and read the parameters.
@@ -53,6 +57,19 @@ class Controller:
 
     def stopping(self, time_s: float) -> None:
         """Called once after the last update before a stop."""
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        """Called once when hardware whose joints this controller commands cannot follow: end goals, hold, refuse new ones.
+
+        `update` goes on being called. A controller that is started meanwhile is told before its first update.
+
+        Args:
+            time_s: time of this cycle [s].
+            reason: for whoever waits for a result.
+        """
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        """Called once when the hardware can follow again; it may stand elsewhere: hold it where it is measured."""
 
     def failed(self, time_s: float, reason: str) -> None:
         """Called in place of `stopping` when this controller raised; `reason` is for whoever waits for a result."""

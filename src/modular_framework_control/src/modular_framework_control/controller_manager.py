@@ -26,7 +26,7 @@ from modular_framework_control.controller_switch import (
 from modular_framework_control.controller_types import BASE_CLASS, ControllerTypes
 from modular_framework_control.hardware_interface import ControllerInfo, InterfaceResources
 from modular_framework_control.node_handle import NodeHandle, join_names
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.robot_hw import HardwareFault, RobotHW
 
 Detach = Callable[[], None]
 Attach = Callable[[str, Controller], Detach]
@@ -81,6 +81,7 @@ class ControllerManager:
         self._loaded: tuple[LoadedController, ...] = ()
         self._detach: dict[str, Detach] = {}
         self._last_time_s = float("-inf")
+        self._fault_text = ""
 
     # ---- control loop ----
 
@@ -95,6 +96,7 @@ class ControllerManager:
         """
         reset = reset_controllers or time_s < self._last_time_s
         self._last_time_s = time_s
+        faults = self._hardware_faults()
         begun_s = self._clock()
         late_s = begun_s + period_s if period_s > 0.0 else math.inf
         for entry in self._loaded:
@@ -103,6 +105,10 @@ class ControllerManager:
             if reset:
                 entry.stop(time_s)
                 if entry.start(time_s):
+                    continue
+            if faults or entry.fault:
+                entry.tell_fault(time_s, faults)
+                if not entry.running:
                     continue
             try:
                 entry.controller.update(time_s, period_s)
@@ -113,6 +119,22 @@ class ControllerManager:
             begun_s = ended_s
         if self._pending is not None:
             self._step_switch(time_s)
+
+    def _hardware_faults(self) -> Sequence[HardwareFault]:
+        """What the hardware suffers from; the log tells when that changes."""
+        try:
+            faults = self._robot_hw.faults()
+        except Exception as error:  # a user's hardware may raise anything; what cannot tell is not to be trusted
+            faults = (HardwareFault(f"fault() raised {type(error).__name__}: {error}",
+                                    self._robot_hw.commanded_joints),)
+        if faults or self._fault_text:
+            text = "; ".join(fault.reason for fault in faults)
+            if text and text != self._fault_text:
+                LOGGER.error("hardware fault: %s; controllers of its joints hold and refuse goals until it is over", text)
+            elif not text:
+                LOGGER.info("the hardware follows again (it did not for: %s)", self._fault_text)
+            self._fault_text = text
+        return faults
 
     def _step_switch(self, time_s: float) -> None:
         if not self._slot_lock.acquire(blocking=False):
@@ -158,14 +180,18 @@ class ControllerManager:
 
     def _init_controller(self, name: str, controller: Controller,
                          controller_nh: NodeHandle) -> tuple[InterfaceResources, ...]:
-        try:
-            interface = self._robot_hw.get(controller.interface_class)
+        for interface in self._robot_hw.interfaces:
             interface.take_claims()
-            if controller.init(interface, self._root_nh, controller_nh) is not True:
+        try:
+            main = self._robot_hw.get(controller.interface_class)
+            controller.robot_hw = self._robot_hw
+            if controller.init(main, self._root_nh, controller_nh) is not True:
                 raise ControllerError("init() returned False")
         except Exception as error:  # a user's controller may raise anything
             raise ControllerError(f"cannot load controller '{name}': {error}") from error
-        return (InterfaceResources(interface.type_name, interface.take_claims()),)
+        taken = [(interface, interface.take_claims()) for interface in self._robot_hw.interfaces]
+        return tuple(InterfaceResources(interface.type_name, claims) for interface, claims in taken
+                     if claims or interface is main)
 
     def unload_controller(self, name: str) -> None:
         """Forget a controller that is not running.

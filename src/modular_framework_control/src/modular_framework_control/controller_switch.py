@@ -11,7 +11,7 @@ from enum import Enum, IntEnum
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_statistics import UpdateStatistics
 from modular_framework_control.hardware_interface import ControllerInfo
-from modular_framework_control.robot_hw import RobotHW, SwitchState
+from modular_framework_control.robot_hw import HardwareFault, RobotHW, SwitchState
 
 # Below rospy's logger "rosout", so that messages also reach /rosout when rospy runs; plain logging otherwise.
 LOGGER = logging.getLogger("rosout.controller_manager")
@@ -34,13 +34,24 @@ class Strictness(IntEnum):
 
 @dataclass(slots=True)
 class LoadedController:
-    """A controller and what the manager knows of it; `state` is written by the control loop only."""
+    """A controller and what the manager knows of it; `state` and `fault` are written by the control loop only.
+
+    Attributes:
+        failure: why the manager stopped it; "" when it did not.
+        fault: the hardware's fault it was told last; "" when it knows of none.
+        joints: the joints it claims, whatever the interface.
+    """
 
     info: ControllerInfo
     controller: Controller
     state: ControllerState = ControllerState.INITIALIZED
     failure: str = ""
+    fault: str = ""
     statistics: UpdateStatistics = field(default_factory=UpdateStatistics)
+    joints: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.joints = frozenset(name for claim in self.info.claimed_resources for name in claim.resources)
 
     @property
     def name(self) -> str:
@@ -56,7 +67,7 @@ class LoadedController:
             self.controller.starting(time_s)
         except Exception as error:  # a user's controller may raise anything; the loop must go on
             return self.fail(time_s, f"starting() raised {type(error).__name__}: {error}")
-        self.failure = ""
+        self.failure = self.fault = ""
         self.statistics.reset()
         self.state = ControllerState.RUNNING
         return ""
@@ -69,6 +80,21 @@ class LoadedController:
         except Exception as error:
             self.failure = f"stopping() raised {type(error).__name__}: {error}"
             LOGGER.exception("controller '%s': %s", self.name, self.failure)
+
+    def tell_fault(self, time_s: float, faults: Sequence[HardwareFault]) -> None:
+        """Tell it what the hardware of its joints suffers from, when that is news to it."""
+        reason = "; ".join(fault.reason for fault in faults if not fault.joints.isdisjoint(self.joints))
+        if reason == self.fault:
+            return
+        self.fault = reason
+        told = "on_hardware_fault()" if reason else "on_hardware_recovered()"
+        try:
+            if reason:
+                self.controller.on_hardware_fault(time_s, reason)
+            else:
+                self.controller.on_hardware_recovered(time_s)
+        except Exception as error:  # a user's controller may raise anything; the loop must go on
+            self.fail(time_s, f"{told} raised {type(error).__name__}: {error}")
 
     def fail(self, time_s: float, reason: str) -> str:
         """Stop it because it raised; call from the except block. Returns `reason`."""

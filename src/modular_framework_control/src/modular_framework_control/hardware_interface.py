@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint handles and the interfaces that hand them out: what a controller may see and command of a robot.
+"""The interfaces that hand out handles: what a controller may see and command of a robot.
 
 The words are those of ros_control. A `RobotHW` makes one handle per joint and keeps it; controllers ask an interface
 for the handle by name, once, and afterwards read and write plain attributes. Interfaces that command a joint note who
@@ -8,75 +8,32 @@ asked (a *claim*), so that two controllers never command the same joint through 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, Protocol, TypeVar
+
+from modular_framework_control.handles import (
+    ForceTorqueSensorHandle,
+    ImuSensorHandle,
+    JointHandle,
+    JointStateHandle,
+    PosVelAccJointHandle,
+    PosVelJointHandle,
+    SpeedScalingHandle,
+)
 
 
 class HardwareInterfaceError(Exception):
     """A resource of the hardware was asked for that it does not have, or was registered twice."""
 
 
-class JointStateHandle:
-    """Measured state of one joint; the `RobotHW` writes it in `read()`, everybody else reads it.
-
-    Attributes:
-        name: joint name as in the robot description.
-        position: [rad] or [m].
-        velocity: [rad/s] or [m/s].
-        effort: [Nm] or [N].
-    """
-
-    __slots__ = ("name", "position", "velocity", "effort")
-
-    def __init__(self, name: str, position: float = 0.0, velocity: float = 0.0, effort: float = 0.0) -> None:
-        self.name = name
-        self.position = position
-        self.velocity = velocity
-        self.effort = effort
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.name!r}, position={self.position:.6g})"
-
-
-class JointHandle:
-    """A joint that can be commanded: the measured state seen through `state`, and one command beside it.
-
-    Attributes:
-        state: the handle registered with the JointStateInterface (shared, not copied).
-        command: in the unit of the interface: position [rad|m], velocity [rad/s|m/s] or effort [Nm|N].
-        max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
-            Only hardware that says so (`supports_max_effort`) heeds it.
-        supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
-    """
-
-    __slots__ = ("state", "command", "max_effort", "supports_max_effort")
-
-    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
-        self.state = state
-        self.command = command
-        self.max_effort = 0.0
-        self.supports_max_effort = supports_max_effort
+class _Named(Protocol):
+    """What every handle has."""
 
     @property
     def name(self) -> str:
-        return self.state.name
-
-    @property
-    def position(self) -> float:
-        return self.state.position
-
-    @property
-    def velocity(self) -> float:
-        return self.state.velocity
-
-    @property
-    def effort(self) -> float:
-        return self.state.effort
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.name!r}, command={self.command:.6g})"
+        """Name under which it is found."""
 
 
-HandleT = TypeVar("HandleT", JointStateHandle, JointHandle)
+HandleT = TypeVar("HandleT", bound=_Named)
 
 
 class HardwareInterface(Generic[HandleT]):
@@ -85,10 +42,12 @@ class HardwareInterface(Generic[HandleT]):
     Attributes:
         type_name: the name written in URDF transmissions and in `ControllerState.claimed_resources`.
         claims_resources: whether getting a handle claims its joint.
+        noun: what a handle is of, in messages.
     """
 
     type_name: ClassVar[str] = "hardware_interface/HardwareInterface"
     claims_resources: ClassVar[bool] = False
+    noun: ClassVar[str] = "joint"
 
     def __init__(self) -> None:
         self._handles: dict[str, HandleT] = {}
@@ -101,8 +60,8 @@ class HardwareInterface(Generic[HandleT]):
             HardwareInterfaceError: a handle of that name is already registered.
         """
         if handle.name in self._handles:
-            raise HardwareInterfaceError(f"{self.type_name}: joint '{handle.name}' is registered twice; "
-                                         "register each joint once per interface")
+            raise HardwareInterfaceError(f"{self.type_name}: {self.noun} '{handle.name}' is registered twice; "
+                                         f"register each {self.noun} once per interface")
         self._handles[handle.name] = handle
         return handle
 
@@ -116,7 +75,7 @@ class HardwareInterface(Generic[HandleT]):
             handle = self._handles[name]
         except KeyError:
             known = ", ".join(sorted(self._handles)) or "none"
-            raise HardwareInterfaceError(f"{self.type_name}: no joint '{name}'; it has: {known}") from None
+            raise HardwareInterfaceError(f"{self.type_name}: no {self.noun} '{name}'; it has: {known}") from None
         if self.claims_resources:
             self._claims.add(name)
         return handle
@@ -145,9 +104,14 @@ class JointStateInterface(HardwareInterface[JointStateHandle]):
 
 
 class _JointCommandInterface(HardwareInterface[JointHandle]):
-    """Handles with a command; a joint belongs to one running controller at a time."""
+    """Handles with a command; a joint belongs to one running controller at a time.
+
+    Attributes:
+        handle_class: class of its handles.
+    """
 
     claims_resources = True
+    handle_class: ClassVar[type[JointHandle]] = JointHandle
 
 
 class PositionJointInterface(_JointCommandInterface):
@@ -168,12 +132,49 @@ class EffortJointInterface(_JointCommandInterface):
     type_name = "hardware_interface/EffortJointInterface"
 
 
-AnyInterface = JointStateInterface | PositionJointInterface | VelocityJointInterface | EffortJointInterface
+class PosVelJointInterface(_JointCommandInterface):
+    """Joints commanded by position [rad|m] and velocity [rad/s|m/s]."""
 
+    type_name = "hardware_interface/PosVelJointInterface"
+    handle_class = PosVelJointHandle
+
+
+class PosVelAccJointInterface(_JointCommandInterface):
+    """Joints commanded by position [rad|m], velocity [rad/s|m/s] and acceleration [rad/s^2|m/s^2]."""
+
+    type_name = "hardware_interface/PosVelAccJointInterface"
+    handle_class = PosVelAccJointHandle
+
+
+class SpeedScalingInterface(HardwareInterface[SpeedScalingHandle]):
+    """How fast robots let themselves be moved; read by controllers that slow their clocks accordingly."""
+
+    type_name = "scaled_controllers/SpeedScalingInterface"
+    noun = "speed scaling"
+
+
+class ForceTorqueSensorInterface(HardwareInterface[ForceTorqueSensorHandle]):
+    """Force-torque sensors."""
+
+    type_name = "hardware_interface/ForceTorqueSensorInterface"
+    noun = "sensor"
+
+
+class ImuSensorInterface(HardwareInterface[ImuSensorHandle]):
+    """Inertial measurement units."""
+
+    type_name = "hardware_interface/ImuSensorInterface"
+    noun = "sensor"
+
+
+CommandInterface = (PositionJointInterface | VelocityJointInterface | EffortJointInterface | PosVelJointInterface
+                    | PosVelAccJointInterface)
+AnyInterface = JointStateInterface | CommandInterface
+
+COMMAND_INTERFACES: tuple[type[CommandInterface], ...] = (
+    PositionJointInterface, VelocityJointInterface, EffortJointInterface, PosVelJointInterface, PosVelAccJointInterface)
 INTERFACES_BY_NAME: dict[str, type[AnyInterface]] = {
-    interface.type_name: interface
-    for interface in (JointStateInterface, PositionJointInterface, VelocityJointInterface, EffortJointInterface)
-}
+    interface.type_name: interface for interface in (JointStateInterface, *COMMAND_INTERFACES)}
 
 
 def interface_from_name(type_name: str) -> type[AnyInterface]:
@@ -204,3 +205,13 @@ class ControllerInfo:
     name: str
     type: str
     claimed_resources: tuple[InterfaceResources, ...]
+
+
+__all__ = [
+    "COMMAND_INTERFACES", "INTERFACES_BY_NAME", "AnyInterface", "CommandInterface", "ControllerInfo",
+    "EffortJointInterface", "ForceTorqueSensorHandle", "ForceTorqueSensorInterface", "HandleT", "HardwareInterface",
+    "HardwareInterfaceError", "ImuSensorHandle", "ImuSensorInterface", "InterfaceResources", "JointHandle",
+    "JointStateHandle", "JointStateInterface", "PosVelAccJointHandle", "PosVelAccJointInterface", "PosVelJointHandle",
+    "PosVelJointInterface", "PositionJointInterface", "SpeedScalingHandle", "SpeedScalingInterface",
+    "VelocityJointInterface", "interface_from_name",
+]

@@ -8,6 +8,7 @@ that fills the joint states and `write` that sends the commands. Whoever owns th
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, TypeVar, cast
 
@@ -16,6 +17,8 @@ from modular_framework_control.hardware_interface import (
     HardwareInterface,
     HardwareInterfaceError,
     InterfaceResources,
+    SpeedScalingHandle,
+    SpeedScalingInterface,
 )
 from modular_framework_control.node_handle import NodeHandle
 
@@ -30,6 +33,19 @@ class SwitchState(Enum):
     ERROR = "error"
 
 
+@dataclass(frozen=True, slots=True)
+class HardwareFault:
+    """Why some joints cannot be moved just now.
+
+    Attributes:
+        reason: for a human: "protective stop", "link to 10.0.0.2 lost".
+        joints: the joints it is about.
+    """
+
+    reason: str
+    joints: frozenset[str]
+
+
 class RobotHW:
     """Base of all robot hardware; as it stands it has no joints.
 
@@ -37,8 +53,8 @@ class RobotHW:
         announces_ready: whether this hardware itself says True on its `topic_to_wait_for`; when not, whoever runs it
             says so on its behalf once its loop runs.
 
-    `init`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `do_switch` and
-    `switch_result` run in the control loop and must neither block nor raise for an expected condition.
+    `init`, `close`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `fault`,
+    `do_switch` and `switch_result` run in the control loop and must neither block nor raise for an expected condition.
     """
 
     announces_ready: ClassVar[bool] = False
@@ -75,10 +91,15 @@ class RobotHW:
         Raises:
             HardwareInterfaceError: this hardware has none; the message lists those it has.
         """
-        if interface_class not in self._interfaces:
+        interface = self.find(interface_class)
+        if interface is None:
             known = ", ".join(self.interface_names) or "none"
             raise HardwareInterfaceError(f"{type(self).__name__} has no {interface_class.type_name}; it has: {known}")
-        return cast(InterfaceT, self._interfaces[interface_class])
+        return interface
+
+    def find(self, interface_class: type[InterfaceT]) -> InterfaceT | None:
+        """The registered interface of that class, or None."""
+        return cast("InterfaceT | None", self._interfaces.get(interface_class))
 
     @property
     def interfaces(self) -> list[HardwareInterface[Any]]:
@@ -95,6 +116,28 @@ class RobotHW:
 
     def write(self, time_s: float, period_s: float) -> None:
         """Send the commands of the joint handles; `period_s` [s] is the time since the last call."""
+
+    def close(self) -> None:
+        """Disconnect, and end what `init` began, once the control loop has ended. May be called twice."""
+
+    def fault(self) -> str:
+        """Why this hardware cannot follow commands just now (a lost link, a protective stop); "" when it can.
+
+        Asked in every cycle, after `read`. The manager tells those controllers that command its joints: their goals end
+        with this reason, and they hold until it is "" again.
+        """
+        return ""
+
+    def faults(self) -> Sequence[HardwareFault]:
+        """The fault with the joints it is about; hardware made of several pieces tells those of each piece."""
+        reason = self.fault()
+        return (HardwareFault(reason, self.commanded_joints),) if reason else ()
+
+    @property
+    def commanded_joints(self) -> frozenset[str]:
+        """Names of the joints that controllers can command."""
+        return frozenset(name for interface in self._interfaces.values() if interface.claims_resources
+                         for name in interface.names)
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         """Why these controllers may not run together; "" when they may.
@@ -127,4 +170,11 @@ class RobotHW:
         return SwitchState.DONE
 
 
-__all__ = ["ControllerInfo", "InterfaceResources", "RobotHW", "SwitchState"]
+def speed_scaling_handles(robot_hw: RobotHW, joints: Iterable[str]) -> tuple[SpeedScalingHandle, ...]:
+    """The handles that tell how fast any of these joints lets itself be moved; none when nothing scales its speed."""
+    interface = robot_hw.find(SpeedScalingInterface)
+    wanted = set(joints)
+    return () if interface is None else tuple(h for h in interface.handles if not wanted.isdisjoint(h.joints))
+
+
+__all__ = ["ControllerInfo", "HardwareFault", "InterfaceResources", "RobotHW", "SwitchState", "speed_scaling_handles"]
