@@ -151,7 +151,7 @@ def test_a_goal_violation_is_aborted_after_goal_time(arm: actionlib.SimpleAction
 @pytest.mark.parametrize(("message", "code", "words"), [
     (goal((0.5, [0.0, 0.0]), names=["shoulder", "wrist"]), -2, "unknown joint 'wrist'"),
     (goal((0.5, [0.0]), names=["shoulder"]), -2, "joints missing: elbow"),
-    (goal((0.5, [0.0, math.nan])), -1, "not a finite number"),
+    (goal((0.5, [0.0, math.nan])), -1, "position of joint 'elbow' (index 1) is nan; expected a finite number"),
     (goal((0.5, [0.0])), -1, "has 1 positions; expected 2"),
     (goal((0.5, [0.0, 0.0]), (0.4, [0.0, 0.0])), -1, "must increase strictly"),
     (goal((0.0, [0.0, 0.0])), -1, "past"),

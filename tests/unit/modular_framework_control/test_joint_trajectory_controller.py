@@ -155,7 +155,8 @@ def test_a_joint_that_still_moves_has_not_reached_its_goal(start: Callable[..., 
     (("a", "b"), [(1.0, (0.0, 0.0))], {}, -2, "joints missing: c (allow_partial_joints_goal is false)"),
     (("a", "b", "b"), [(1.0, ZEROS)], {}, -2, "joint 'b' is named twice"),
     ((), [], {}, -2, "joints missing: a, b, c"),
-    (("a", "b", "c"), [(1.0, (0.0, math.nan, 0.0))], {}, -1, "not a finite number"),
+    (("a", "b", "c"), [(1.0, (0.0, math.nan, 0.0))], {}, -1,
+     "point 0: position of joint 'b' (index 1) is nan; expected a finite number"),
     (("a", "b", "c"), [(1.0, (0.0,))], {}, -1, "has 1 positions; expected 3"),
     (("a", "b", "c"), [(1.0, ZEROS), (1.0, ZEROS)], {}, -1, "must increase strictly"),
     (("a", "b", "c"), [(1.0, ZEROS)], {"goal_tolerance": {"x": JointTolerance(1.0)}}, -1, "names joint 'x'"),
@@ -309,7 +310,7 @@ def test_a_stopped_controller_ends_its_goals_and_takes_no_other(loop: Any) -> No
 def test_nothing_is_desired_before_the_first_start(make_loop: Callable[..., Any]) -> None:
     loop = make_loop(parameters())
     loop.manager.load_controller("arm")
-    with pytest.raises(ControllerError, match="has not been started"):
+    with pytest.raises(ControllerError, match="the controller is not running"):
         loop.controllers["arm"].desired_at(0.0)
 
 

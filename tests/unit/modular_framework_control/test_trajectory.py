@@ -16,10 +16,10 @@ from modular_framework_control.trajectory import (
     Spline,
     Track,
     TrajectoryPoint,
-    check_points,
     splice,
     stop_ramp,
 )
+from modular_framework_control.trajectory_check import check_points
 
 RNG = np.random.default_rng(7)
 NAMES = ("a", "b", "c")
@@ -133,11 +133,26 @@ def test_a_track_without_some_joints_keeps_the_others() -> None:
 def test_all_faults_of_a_trajectory_are_listed() -> None:
     trajectory = JointTrajectory(("a", "b"), (
         TrajectoryPoint(-0.1, (0.0, math.nan)), TrajectoryPoint(1.0, (0.0,)),
-        TrajectoryPoint(1.0, (0.0, 0.0), (1.0,)), TrajectoryPoint(2.0, (0.0, 0.0), (), (1.0, math.inf))), math.inf)
+        TrajectoryPoint(1.0, (0.0, 0.0), (1.0,)), TrajectoryPoint(2.0, (), (), (1.0, -math.inf))), math.inf)
     with pytest.raises(InvalidTrajectoryError) as caught:
         check_points(trajectory)
-    for words in ("point 0: positions contain", "time_from_start -0.1 s is negative", "point 1: has 1 positions",
-                  "point 2: has 1 velocities; expected 2 or none",
-                  "point 2: time_from_start 1 s does not come after 1 s",
-                  "point 3: accelerations contain", "point 3: has accelerations but no velocities", "header stamp"):
+    for words in ("point 0: position of joint 'b' (index 1) is nan; expected a finite number",
+                  "point 0: time_from_start is -0.1 s; expected at least 0", "point 1: has 1 positions; expected 2",
+                  "point 2: has 1 velocities; expected 2 or none", "point 3: has 0 positions; expected 2",
+                  "point 2: time_from_start 1 s does not come after 1 s of point 1",
+                  "point 3: acceleration of joint 'b' (index 1) is -inf", "header stamp is inf"):
         assert words in str(caught.value)
+
+
+def test_of_very_many_faults_the_first_are_told_and_the_others_counted() -> None:
+    trajectory = JointTrajectory(("a",), tuple(TrajectoryPoint(i + 1.0, (math.nan,)) for i in range(1000)))
+    with pytest.raises(InvalidTrajectoryError, match="point 7: .* and 992 more$"):
+        check_points(trajectory)
+
+
+def test_values_so_large_that_the_curve_would_not_be_finite_are_refused() -> None:
+    with pytest.raises(InvalidTrajectoryError, match=r"position of joint 'a' \(index 0\) is 2e\+09; expected"):
+        check_points(JointTrajectory(("a",), (TrajectoryPoint(1.0, (2e9,)),)))
+    largest = Spline(JointTrajectory(("a",), (TrajectoryPoint(0.0, (1e9,), (1e9,), (1e9,)),
+                                              TrajectoryPoint(1e-9, (-1e9,), (-1e9,), (-1e9,)))))
+    assert np.isfinite(largest.coefficients).all()

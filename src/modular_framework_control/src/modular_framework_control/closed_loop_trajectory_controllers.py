@@ -16,7 +16,8 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
     """Commands `velocity_ff * desired velocity + PID(position error, velocity error)` per joint.
 
     Parameters, besides those of every trajectory controller: `gains/<joint>/{p, i, d, i_clamp, i_clamp_min,
-    i_clamp_max, antiwindup}`; `velocity_ff/<joint>` 0. The command is 0 while the controller does not run.
+    i_clamp_max, antiwindup}`; `velocity_ff/<joint>` 0. The command is 0 while the controller does not run, and while
+    the hardware has a fault.
     """
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -26,22 +27,17 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
         self._velocity_ff = [read_number(forward, name, 0.0, None) for name in self.joint_names]
         return True
 
-    def starting(self, time_s: float) -> None:
-        super().starting(time_s)
-        for pid in self._pids:
-            pid.reset()
-        self._command_nothing()
-
     def stopping(self, time_s: float) -> None:
-        self._command_nothing()
+        self._command_rest()
         super().stopping(time_s)
 
     def failed(self, time_s: float, reason: str) -> None:
-        self._command_nothing()
+        self._command_rest()
         super().failed(time_s, reason)
 
-    def _command_nothing(self) -> None:
-        for handle in self._handles:
+    def _command_rest(self) -> None:
+        for handle, pid in zip(self._handles, self._pids, strict=True):
+            pid.reset()
             handle.command = 0.0
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:

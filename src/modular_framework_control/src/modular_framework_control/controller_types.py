@@ -13,11 +13,17 @@ BASE_CLASS = CONTROLLER_BASE
 _PACKAGE = "modular_framework_control"
 _JOINT_COMMAND = f"{_PACKAGE}.joint_command_controllers"
 _CLOSED_LOOP = f"{_PACKAGE}.closed_loop_trajectory_controllers"
+_POS_VEL = f"{_PACKAGE}.position_velocity_trajectory_controllers"
 BUILT_IN_TYPES: dict[str, str] = {
     "joint_state_controller/JointStateController": f"{_PACKAGE}.joint_state_controller:JointStateController",
     "position_controllers/JointTrajectoryController":
         f"{_PACKAGE}.joint_trajectory_controller:JointTrajectoryController",
+    "position_controllers/ScaledJointTrajectoryController":
+        f"{_PACKAGE}.joint_trajectory_controller:JointTrajectoryController",
+    "pos_vel_controllers/JointTrajectoryController": f"{_POS_VEL}:PosVelJointTrajectoryController",
+    "pos_vel_acc_controllers/JointTrajectoryController": f"{_POS_VEL}:PosVelAccJointTrajectoryController",
     "velocity_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:VelocityJointTrajectoryController",
+    "velocity_controllers/ScaledJointTrajectoryController": f"{_CLOSED_LOOP}:VelocityJointTrajectoryController",
     "effort_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:EffortJointTrajectoryController",
     "position_controllers/GripperActionController": f"{_PACKAGE}.gripper_action_controller:GripperActionController",
     "effort_controllers/GripperActionController":

@@ -62,6 +62,7 @@ def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Seque
     message.desired = _point(snapshot.desired)
     message.actual = _point(snapshot.actual)
     message.error = _point(snapshot.error)
+    message.desired.time_from_start = message.actual.time_from_start = genpy.Duration.from_sec(snapshot.elapsed_s)
     return message
 
 

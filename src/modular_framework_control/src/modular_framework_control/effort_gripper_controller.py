@@ -15,7 +15,7 @@ class EffortGripperActionController(GripperActionController):
 
     Parameters, besides those of every gripper controller: `gains/<joint>/{p, i, d, i_clamp, ...}`. The effort is at
     most the goal's `max_effort`, or the parameter's when the goal gives none; without both only the hardware bounds it.
-    It is 0 while the controller does not run.
+    It is 0 while the controller does not run, and while the hardware has a fault.
     """
 
     interface_class = EffortJointInterface
@@ -39,6 +39,10 @@ class EffortGripperActionController(GripperActionController):
 
     def _apply(self, period_s: float) -> None:
         handle = self._handle
+        if self._fault:
+            self._pid.reset()
+            handle.command = 0.0
+            return
         effort = self._pid.command(self._command - handle.position, -handle.velocity, period_s)
         if self._max_effort > 0.0:
             effort = min(max(effort, -self._max_effort), self._max_effort)

@@ -57,6 +57,8 @@ class GripperActionController(Controller):
     for `stall_timeout`: the mean velocity over that time, rather than the velocity of one cycle, so that the trembling
     of a contact does not hide a stall. The time counts from the beginning of the goal at the earliest.
 
+    While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason.
+
     Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, used for
     goals that give none, 0 = the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
     1.0; `action_monitor_rate` [1/s] 20.
@@ -74,6 +76,7 @@ class GripperActionController(Controller):
         self._running = False
         self._command = 0.0
         self._max_effort = 0.0
+        self._fault = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         names = read_names(controller_nh, "joint")
@@ -117,8 +120,8 @@ class GripperActionController(Controller):
 
     def starting(self, time_s: float) -> None:
         self._reject_waiting("the goal was sent while the controller was being stopped")
+        self._active, self._fault = None, ""
         self._hold()
-        self._active = None
         self._apply(0.0)
         self._running = True
 
@@ -127,6 +130,14 @@ class GripperActionController(Controller):
 
     def failed(self, time_s: float, reason: str) -> None:
         self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._fault = f"hardware fault: {reason}"
+        self._finish(GoalStatus.ABORTED, self._state(False, False), self._fault)
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._fault = ""
+        self._hold()
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
@@ -142,11 +153,15 @@ class GripperActionController(Controller):
     def update(self, time_s: float, period_s: float) -> None:
         while self._mailbox:
             order = self._mailbox.popleft()
-            if isinstance(order, _Order):
+            if isinstance(order, _Order) and self._fault:
+                order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), self._fault)
+            elif isinstance(order, _Order):
                 self._take_up(order, time_s)
             elif self._active is not None and self._active.ticket is order:
                 self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
                 self._hold()
+        if self._fault:
+            self._hold()
         self._apply(period_s)
         if self._active is not None:
             self._check(self._active, time_s)

@@ -24,6 +24,8 @@ from modular_framework_control.pid import Pid, read_pid
 class JointCommandController(Controller):
     """Base: commands arrive from any thread as a whole and are in force from the next cycle on.
 
+    While the hardware has a fault the joints are kept where they are, and commands are refused with its reason.
+
     Parameters, below the controller's name: `joints`, or `joint` for controllers of one.
 
     Attributes:
@@ -37,6 +39,7 @@ class JointCommandController(Controller):
         self.joint_names: list[str] = []
         self._handles: list[JointHandle] = []
         self._wanted: tuple[float, ...] = ()
+        self._fault = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         key = "joint" if self.single else "joints"
@@ -54,22 +57,43 @@ class JointCommandController(Controller):
             values: one number a joint, in the unit of what is controlled.
 
         Raises:
-            ControllerError: not as many as joints, or not finite; the command before stays in force.
+            ControllerError: not as many as joints, not finite, or the hardware has a fault; what was in force stays.
         """
+        if self._fault:
+            raise ControllerError(self._fault)
         if len(values) != len(self.joint_names) or not all(map(math.isfinite, values)):
             raise ControllerError(f"got {list(values)!r}; expected {len(self.joint_names)} finite numbers, for: "
                                   f"{', '.join(self.joint_names)}")
         self._wanted = tuple(values)
 
     def starting(self, time_s: float) -> None:
+        self._fault = ""
+        self._rest()
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._fault = f"hardware fault: {reason}"
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._rest()
+        self._fault = ""
+
+    def update(self, time_s: float, period_s: float) -> None:
+        if self._fault:
+            self._rest()
+        else:
+            self._command(period_s)
+
+    def _rest(self) -> None:
+        """Keep the joints where they are."""
         self._wanted = self._resting()
-        self.update(time_s, 0.0)
+        self._command(0.0)
 
     def _resting(self) -> tuple[float, ...]:
         """What keeps the joints where they are."""
         return (0.0,) * len(self._handles)
 
-    def update(self, time_s: float, period_s: float) -> None:
+    def _command(self, period_s: float) -> None:
+        """Command the joints what is wanted; `period_s` [s] is the time since the last call, 0 at a start."""
         for handle, value in zip(self._handles, self._wanted, strict=True):
             handle.command = value
 
@@ -130,10 +154,10 @@ class _WithGains(_Zeroing):
         self._pids: list[Pid] = [read_pid(controller_nh.child(name)) for name in where]
         return True
 
-    def starting(self, time_s: float) -> None:
+    def _rest(self) -> None:
         for pid in self._pids:
             pid.reset()
-        super().starting(time_s)
+        super()._rest()
 
 
 class _PositionByGains(_WithGains):
@@ -149,7 +173,7 @@ class _PositionByGains(_WithGains):
     def _resting(self) -> tuple[float, ...]:
         return tuple(handle.position for handle in self._handles)
 
-    def update(self, time_s: float, period_s: float) -> None:
+    def _command(self, period_s: float) -> None:
         for handle, value, limits, pid in zip(self._handles, self._wanted, self._limits, self._pids, strict=True):
             if limits.continuous:
                 error = math.remainder(value - handle.position, 2.0 * math.pi)
@@ -185,11 +209,11 @@ class EffortJointVelocityController(_WithGains):
         super().__init__()
         self._last_error = math.nan
 
-    def starting(self, time_s: float) -> None:
+    def _rest(self) -> None:
         self._last_error = math.nan
-        super().starting(time_s)
+        super()._rest()
 
-    def update(self, time_s: float, period_s: float) -> None:
+    def _command(self, period_s: float) -> None:
         error = self._wanted[0] - self._handles[0].velocity
         known = period_s > 0.0 and math.isfinite(self._last_error)
         rate = (error - self._last_error) / period_s if known else 0.0

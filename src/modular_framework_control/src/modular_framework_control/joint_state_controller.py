@@ -9,7 +9,7 @@ from typing import Any
 
 from modular_framework_control.controller import Controller
 from modular_framework_control.hardware_interface import JointStateHandle, JointStateInterface
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_number
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
 
 
@@ -19,7 +19,7 @@ class JointStateSnapshot:
 
     Attributes:
         time_s: time of the cycle [s].
-        names: joint names, sorted; extra joints last.
+        names: joint names; extra joints last.
         positions: [rad|m].
         velocities: [rad/s|m/s].
         efforts: [Nm|N].
@@ -35,8 +35,9 @@ class JointStateSnapshot:
 class JointStateController(Controller):
     """joint_state_controller/JointStateController.
 
-    Parameters, below the controller's name: `publish_rate` [1/s] 50; `extra_joints`: list of {name, position,
-    velocity, effort} reported as constants unless the hardware has a joint of that name.
+    Parameters, below the controller's name: `publish_rate` [1/s] 50; `joints`: which ones, in which order, all of them
+    by name when not given; `extra_joints`: list of {name, position, velocity, effort} reported as constants unless the
+    hardware has a joint of that name.
 
     Attributes:
         on_state: called in the control loop at `publish_rate`; must not block.
@@ -51,7 +52,8 @@ class JointStateController(Controller):
         self._next_s = -math.inf
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
-        self._handles = [hw.get_handle(name) for name in sorted(hw.names)]
+        names = read_names(controller_nh, "joints") if controller_nh.has_param("joints") else sorted(hw.names)
+        self._handles = [hw.get_handle(name) for name in names]
         self._period_s = period_of(read_number(controller_nh, "publish_rate", 50.0))
         self._extra = [joint for joint in _extra_joints(controller_nh) if joint.name not in hw.names]
         self._names = [handle.name for handle in (*self._handles, *self._extra)]
@@ -75,13 +77,16 @@ def _extra_joints(controller_nh: NodeHandle) -> list[JointStateHandle]:
     if not isinstance(entries, list):
         raise ParameterError(f"parameter {where}: got {entries!r}; expected a list of mappings with name, position, "
                              "velocity, effort")
-    joints = []
+    joints: dict[str, JointStateHandle] = {}
     for number, entry in enumerate(entries):
-        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
+        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
             raise ParameterError(f"parameter {where}: entry {number} is {entry!r}; expected a mapping with a name")
-        try:
-            values = [float(entry.get(key, 0.0)) for key in ("position", "velocity", "effort")]
-        except (TypeError, ValueError) as error:
-            raise ParameterError(f"parameter {where}: entry {number} ('{entry['name']}'): {error}") from error
-        joints.append(JointStateHandle(entry["name"], *values))
-    return joints
+        name = entry["name"]
+        if name in joints:
+            raise ParameterError(f"parameter {where}: entry {number} names joint '{name}' again; name each joint once")
+        values = [entry.get(key, 0.0) for key in ("position", "velocity", "effort")]
+        if any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values):
+            raise ParameterError(f"parameter {where}: entry {number} ('{name}'): position, velocity, effort are "
+                                 f"{values}; expected finite numbers")
+        joints[name] = JointStateHandle(name, *map(float, values))
+    return list(joints.values())

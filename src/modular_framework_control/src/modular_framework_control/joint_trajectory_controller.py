@@ -2,7 +2,8 @@
 """Makes joints follow trajectories, with tolerances, under the parameters of ros_controllers' trajectory controller.
 
 Goals, commands and cancellations arrive from any thread in a mailbox that `update` empties; whatever depends on time is
-decided in `update`, by the time given there.
+decided in `update`, by the time given there. A trajectory is followed by a clock of its own, which slows down and
+stands still with the robot.
 """
 from __future__ import annotations
 
@@ -17,21 +18,24 @@ import numpy as np
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_switch import LOGGER
 from modular_framework_control.goal_ticket import GoalStatus
-from modular_framework_control.hardware_interface import HardwareInterface, JointHandle, PositionJointInterface
+from modular_framework_control.hardware_interface import HardwareInterface, PositionJointInterface
 from modular_framework_control.joint_limits import limits_from_urdf
 from modular_framework_control.node_handle import NodeHandle, read_bool, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
+from modular_framework_control.robot_hw import speed_scaling_handles
 from modular_framework_control.trajectory import (
+    ACCELERATION,
     POSITION,
     SHORTEST_SEGMENT_S,
+    VELOCITY,
     Array,
     InvalidTrajectoryError,
     Spline,
-    Track,
-    check_points,
     splice,
     stop_ramp,
 )
+from modular_framework_control.trajectory_check import check_points, joint_faults
+from modular_framework_control.trajectory_clock import TrajectoryClock
 from modular_framework_control.trajectory_goal import (
     GoalRejectedError,
     TrajectoryErrorCode,
@@ -39,6 +43,7 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
+from modular_framework_control.trajectory_plan import TrajectoryPlan
 from modular_framework_control.trajectory_tolerances import (
     Tolerances,
     read_tolerances,
@@ -58,20 +63,14 @@ class _Order:
     ticket: TrajectoryTicket | None
 
 
-@dataclass(frozen=True, slots=True)
-class _Stage:
-    """The tracks in force from `from_s` on."""
-
-    from_s: float
-    tracks: tuple[Track, ...]
-
-
 class JointTrajectoryController(Controller):
     """position_controllers/JointTrajectoryController.
 
     Parameters, below the controller's name: `joints`; `constraints/{goal_time [s] 0.0, stopped_velocity_tolerance
     [rad/s] 0.01, <joint>/{trajectory, goal} [rad] 0 = not checked}`; `stop_trajectory_duration` [s] 0.0;
     `state_publish_rate` [1/s] 50; `action_monitor_rate` [1/s] 20; `allow_partial_joints_goal` false.
+
+    While the hardware has a fault the joints are held where they are measured, and goals are refused with its reason.
 
     Attributes:
         joint_names: the joints, in the order of all arrays.
@@ -85,15 +84,14 @@ class JointTrajectoryController(Controller):
         self.joint_names: list[str] = []
         self.on_state: Callable[[TrajectorySnapshot], None] | None = None
         self.on_feedback: Callable[[TrajectoryTicket, TrajectorySnapshot], None] | None = None
-        self._handles: list[JointHandle] = []
+        self._handles: list[Any] = []
         self._mailbox: deque[_Order | TrajectoryTicket] = deque()
         self._running = False
-        self._stages: tuple[_Stage, ...] = ()
         self._active: _Order | None = None
-        self._end_s = 0.0
-        self._time_s = 0.0
+        self._fault = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        self._namespace = controller_nh.namespace
         self.joint_names = read_names(controller_nh, "joints")
         self._handles = [hw.get_handle(name) for name in self.joint_names]
         self._tolerances = read_tolerances(controller_nh, self.joint_names)
@@ -105,6 +103,8 @@ class JointTrajectoryController(Controller):
         limits = limits_from_urdf(description) if isinstance(description, str) else {}
         self._continuous = np.array([name in limits and limits[name].continuous for name in self.joint_names])
         self._any_continuous = bool(self._continuous.any())
+        self._clock = TrajectoryClock(speed_scaling_handles(self.robot_hw, self.joint_names))
+        self._plan = TrajectoryPlan(len(self.joint_names))
         self._actual = np.zeros((2, len(self.joint_names)))
         return True
 
@@ -123,7 +123,10 @@ class JointTrajectoryController(Controller):
             everything = tuple(range(len(self.joint_names)))
             self._mailbox.append(_Order(everything, 0.0, None, self._tolerances, None))
             return
-        joints = self._indices(trajectory.joint_names)
+        faults = joint_faults(trajectory.joint_names, self.joint_names, self._allow_partial)
+        if faults:
+            raise GoalRejectedError(TrajectoryErrorCode.INVALID_JOINTS, faults)
+        joints = tuple(self.joint_names.index(name) for name in trajectory.joint_names)
         try:
             check_points(trajectory)
             if math.isnan(goal.goal_time_tolerance_s):
@@ -135,43 +138,34 @@ class JointTrajectoryController(Controller):
         spline = Spline(trajectory) if trajectory.points else None
         self._mailbox.append(_Order(joints, trajectory.stamp_s, spline, tolerances, ticket))
 
-    def _indices(self, names: tuple[str, ...]) -> tuple[int, ...]:
-        faults = [f"unknown joint '{name}'" for name in names if name not in self.joint_names]
-        faults += [f"joint '{name}' is named twice" for name in sorted(set(names)) if names.count(name) > 1]
-        missing = [name for name in self.joint_names if name not in names]
-        if missing and not (self._allow_partial and names):
-            faults.append(f"joints missing: {', '.join(missing)} (allow_partial_joints_goal is "
-                          f"{str(self._allow_partial).lower()})")
-        if faults:
-            raise GoalRejectedError(TrajectoryErrorCode.INVALID_JOINTS,
-                                    f"{'; '.join(faults)}; joints of the controller: {', '.join(self.joint_names)}")
-        return tuple(self.joint_names.index(name) for name in names)
-
     def cancel(self, ticket: TrajectoryTicket) -> None:
         """Ask the control loop to stop following the goal of `ticket`."""
         self._mailbox.append(ticket)
 
     def desired_at(self, time_s: float) -> Array:
-        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints).
+        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), as if a slowed robot went on at
+        full speed.
 
         Raises:
-            ControllerError: the controller has not been started.
+            ControllerError: the controller does not run, or the motion that far back is forgotten.
         """
-        stages = self._stages
-        if not stages:
-            raise ControllerError("the controller has not been started; nothing is desired yet")
-        return self._sample(stages, time_s)
+        if not self._running:
+            raise ControllerError("the controller is not running; nothing is desired")
+        asked_s, known_from_s = self._clock.at(time_s), self._plan.known_from_s
+        if known_from_s is None or asked_s < known_from_s:
+            raise ControllerError(f"got {time_s:.9g} s, which is before the motion under way began; ask for times from "
+                                  f"{time_s - asked_s + (known_from_s or 0.0):.9g} s on")
+        return self._plan.sample(asked_s)
 
     # ---- control loop ----
 
     def starting(self, time_s: float) -> None:
         self._reject_waiting("the goal was sent while the controller was being stopped")
-        self._read_actual()
-        everything = tuple(range(len(self.joint_names)))
-        self._stages = (_Stage(time_s, (Track.hold(everything, self._actual[POSITION], time_s),)),)
-        self._active = None
-        self._time_s = time_s
+        self._active, self._fault = None, ""
+        self._clock.start(time_s)
         self._next_state_s = self._next_feedback_s = time_s
+        self._read_actual()
+        self._rest()
         self._running = True
 
     def stopping(self, time_s: float) -> None:
@@ -181,6 +175,16 @@ class JointTrajectoryController(Controller):
     def failed(self, time_s: float, reason: str) -> None:
         del time_s
         self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._fault = f"hardware fault: {reason}"
+        self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL, self._fault)
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._fault = ""
+        self._clock.advance(time_s)
+        self._read_actual()
+        self._rest()
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
@@ -194,27 +198,25 @@ class JointTrajectoryController(Controller):
                 order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
 
     def update(self, time_s: float, period_s: float) -> None:
-        self._time_s = time_s
-        while self._mailbox:
-            order = self._mailbox.popleft()
-            if isinstance(order, _Order):
-                self._take_up(order, time_s)
-            elif self._active is not None and self._active.ticket is order:
-                self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
-                self._stop(time_s)
-        stages = self._stages
-        if len(stages) > 1 and time_s >= stages[1].from_s:
-            stages = self._stages = tuple(stage for i, stage in enumerate(stages)
-                                          if i + 1 == len(stages) or stages[i + 1].from_s > time_s)
-        desired = self._sample(stages, time_s)
+        self._clock.advance(time_s)
         self._read_actual()
+        self._work_off_mailbox()
+        if self._fault:
+            self._rest()
+        now_s, rate = self._clock.now_s, self._clock.rate
+        self._plan.forget_before(now_s)
+        desired = self._plan.sample(now_s)
+        if rate != 1.0:
+            desired[VELOCITY] *= rate
+            desired[ACCELERATION] *= rate * rate
         error = desired[:2] - self._actual
         if self._any_continuous:
             turned = error[POSITION, self._continuous]
             error[POSITION, self._continuous] = turned - 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
-        self._command(desired, error, period_s)
+        if not self._fault:
+            self._command(desired, error, period_s)
         if self._active is not None:
-            self._check(self._active, time_s, error)
+            self._check(self._active, now_s, error)
         self._report(time_s, desired, error)
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
@@ -223,53 +225,70 @@ class JointTrajectoryController(Controller):
         for handle, position in zip(self._handles, desired[POSITION].tolist(), strict=True):
             handle.command = position
 
+    def _command_rest(self) -> None:
+        """Command what keeps the joints where they are measured."""
+        for handle in self._handles:
+            handle.command = handle.position
+
     def _read_actual(self) -> None:
         states = [handle.state for handle in self._handles]
         self._actual[0] = [state.position for state in states]
         self._actual[1] = [state.velocity for state in states]
 
-    def _sample(self, stages: tuple[_Stage, ...], time_s: float) -> Array:
-        stage = stages[0]
-        for later in stages[1:]:
-            if later.from_s <= time_s:
-                stage = later
-        if len(stage.tracks) == 1 and stage.tracks[0].joints == list(range(len(self.joint_names))):
-            return stage.tracks[0].sample(time_s)
-        state = np.zeros((3, len(self.joint_names)))
-        for track in stage.tracks:
-            state[:, track.joints] = track.sample(time_s)
-        return state
+    def _rest(self) -> None:
+        self._plan.hold(self._actual[POSITION], self._clock.now_s)
+        self._command_rest()
 
-    def _take_up(self, order: _Order, time_s: float) -> None:
-        """Begin to follow a goal: replaces the goal before it, and its motion from the start of the new one on."""
+    def _work_off_mailbox(self) -> None:
+        while self._mailbox:
+            order = self._mailbox.popleft()
+            if isinstance(order, _Order):
+                refusal = self._fault or self._take_up(order)
+                if refusal:
+                    self._refuse(order, refusal)
+            elif self._active is not None and self._active.ticket is order:
+                self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
+                self._stop()
+
+    def _take_up(self, order: _Order) -> str:
+        """Begin to follow a goal: it replaces the goal before it, and its motion from the start of the new one on.
+
+        Returns:
+            Why it cannot be followed, or "".
+        """
         if order.spline is None:
             self._replace_active(order)
-            self._stop(time_s)
-            return
-        origin_s = order.stamp_s if order.stamp_s > 0.0 else time_s
+            self._stop()
+            return ""
+        now_s = self._clock.now_s
+        origin_s = self._clock.at(order.stamp_s) if order.stamp_s > 0.0 else now_s
         end_s = origin_s + float(order.spline.times_s[-1])
-        if end_s <= time_s + SHORTEST_SEGMENT_S:
-            text = (f"all points lie in the past: the last one was due {time_s - end_s:.6g} s before the goal was "
-                    f"taken up at {time_s:.6g} s; give a later header stamp or time_from_start")
-            if order.ticket is None:
-                LOGGER.warning("trajectory command ignored: %s", text)
-            else:
-                order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
-            return
-        splice_s = max(time_s, origin_s)
+        if end_s <= now_s + SHORTEST_SEGMENT_S:
+            return (f"all {len(order.spline.times_s)} points lie in the past: the last one was due "
+                    f"{now_s - end_s:.6g} s before the goal was taken up; give a later header stamp or time_from_start")
+        splice_s = max(now_s, origin_s)
         if end_s <= splice_s + SHORTEST_SEGMENT_S:
-            splice_s = time_s
+            splice_s = now_s
+        self._warn_of_late_points(order, splice_s - origin_s)
         joints = list(order.joints)
-        track = splice(order.spline, joints, origin_s, splice_s, self.desired_at(splice_s)[:, joints],
+        track = splice(order.spline, joints, origin_s, splice_s, self._plan.sample(splice_s)[:, joints],
                        self._continuous[joints].tolist())
         self._replace_active(order)
-        self._put_stage(splice_s, track)
+        self._plan.follow(track, splice_s)
+        return ""
 
-    def _put_stage(self, from_s: float, track: Track) -> None:
-        earlier = tuple(stage for stage in self._stages if stage.from_s < from_s) or self._stages[:1]
-        others = (old.without(track.joints) for old in earlier[-1].tracks)
-        self._stages = (*earlier, _Stage(from_s, (*(other for other in others if other is not None), track)))
-        self._end_s = track.end_s
+    def _warn_of_late_points(self, order: _Order, late_s: float) -> None:
+        times_s = order.spline.times_s if order.spline is not None else np.zeros(0)
+        late = int(np.searchsorted(times_s, late_s, side="right"))
+        if late > 1 or (late == 1 and late_s > 0.0):
+            LOGGER.warning("%s: the first %d of %d points are left out, they lie in the past; the next one is due in "
+                           "%.3f s", self._namespace, late, len(times_s), times_s[late] - late_s)
+
+    def _refuse(self, order: _Order, reason: str) -> None:
+        if order.ticket is None:
+            LOGGER.warning("%s/command ignored: %s", self._namespace, reason)
+        else:
+            order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, reason)
 
     def _replace_active(self, order: _Order) -> None:
         self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "preempted by a new goal")
@@ -277,27 +296,28 @@ class JointTrajectoryController(Controller):
             self._active = order
             order.ticket.activate()
 
-    def _stop(self, time_s: float) -> None:
-        everything = range(len(self.joint_names))
-        state = self.desired_at(time_s)
-        self._put_stage(time_s, stop_ramp(everything, state, time_s, self._stop_duration_s))
+    def _stop(self) -> None:
+        """Come to rest; a slowed robot, which has less speed to lose, in as much less of its trajectory's time."""
+        now_s = self._clock.now_s
+        self._plan.follow(stop_ramp(range(len(self.joint_names)), self._plan.sample(now_s), now_s,
+                                    self._stop_duration_s * self._clock.rate), now_s)
 
-    def _check(self, order: _Order, time_s: float, error: Array) -> None:
-        tolerances = order.tolerances
-        if time_s < self._end_s:
+    def _check(self, order: _Order, now_s: float, error: Array) -> None:
+        tolerances, late_s = order.tolerances, now_s - self._plan.end_s
+        if late_s < 0.0:
             outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""
             if outside:
                 self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
                              f"path tolerance violated: {outside}")
-                self._stop(time_s)
+                self._stop()
             return
         outside = violations(error, tolerances.goal, self.joint_names)
         if not outside:
             self._finish(GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL, "goal reached")
-        elif time_s >= self._end_s + tolerances.goal_time_s:
+        elif late_s >= tolerances.goal_time_s:
             self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
-                         f"goal tolerance violated {time_s - self._end_s:.6g} s after the end of the trajectory "
-                         f"(goal_time {tolerances.goal_time_s:.6g} s): {outside}")
+                         f"goal tolerance violated {late_s:.6g} s after the end of the trajectory (goal_time "
+                         f"{tolerances.goal_time_s:.6g} s): {outside}")
 
     def _finish(self, status: GoalStatus, code: TrajectoryErrorCode, text: str) -> None:
         order, self._active = self._active, None
@@ -309,7 +329,8 @@ class JointTrajectoryController(Controller):
         feedback_due = self._active is not None and self.on_feedback is not None and time_s >= self._next_feedback_s
         if not state_due and not feedback_due:
             return
-        snapshot = TrajectorySnapshot(time_s, desired, self._actual.copy(), error)
+        elapsed_s = self._plan.elapsed_s(self._clock.now_s)
+        snapshot = TrajectorySnapshot(time_s, desired, self._actual.copy(), error, elapsed_s)
         if state_due and self.on_state is not None:
             self._next_state_s = next_due(self._next_state_s, self._state_period_s, time_s)
             self.on_state(snapshot)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint trajectories: what a sender may ask for, checked, and the piecewise polynomials that connect the points.
+"""Joint trajectories and the piecewise polynomials that connect their points.
 
 Between two points the curve is linear, cubic or quintic, by what both of them give: positions; positions and
 velocities; positions, velocities and accelerations. The coefficients follow from the boundary conditions of each
@@ -57,72 +57,33 @@ class JointTrajectory:
     stamp_s: float = 0.0
 
 
-def check_points(trajectory: JointTrajectory) -> None:
-    """Check sizes, numbers and times of a trajectory.
-
-    Raises:
-        InvalidTrajectoryError: lists all faults.
-    """
-    faults: list[str] = []
-    last_s = -math.inf
-    for number, point in enumerate(trajectory.points):
-        faults += [f"point {number}: {fault}" for fault in _faults_of(point, len(trajectory.joint_names))]
-        if not point.time_s > last_s:
-            faults.append(f"point {number}: time_from_start {point.time_s:.9g} s does not come after "
-                          f"{last_s:.9g} s of the point before it; times must increase strictly")
-        last_s = point.time_s
-    if trajectory.points and trajectory.points[0].time_s < 0.0:
-        faults.append(f"point 0: time_from_start {trajectory.points[0].time_s} s is negative")
-    if not math.isfinite(trajectory.stamp_s):
-        faults.append(f"header stamp {trajectory.stamp_s} is not a time")
-    if faults:
-        raise InvalidTrajectoryError("; ".join(faults))
-
-
-def _faults_of(point: TrajectoryPoint, joints: int) -> list[str]:
-    faults = []
-    for name, values, optional in (("positions", point.positions, False), ("velocities", point.velocities, True),
-                                   ("accelerations", point.accelerations, True)):
-        if len(values) != joints and not (optional and not values):
-            faults.append(f"has {len(values)} {name}; expected {joints}{' or none' if optional else ''}")
-        if not all(map(math.isfinite, values)):
-            faults.append(f"{name} contain a value that is not a finite number: {list(values)}")
-    if point.accelerations and not point.velocities:
-        faults.append("has accelerations but no velocities; give both or only positions")
-    return faults
-
-
-def segment_coefficients(start: Array, end: Array, duration_s: float, order: int) -> Array:
-    """Polynomial coefficients, lowest power first, of one segment for all joints.
+def segment_coefficients(start: Array, end: Array, duration_s: Array | float, order: int) -> Array:
+    """Polynomial coefficients, lowest power first, of one segment, or of several at once, for all joints.
 
     Args:
-        start: state (position, velocity, acceleration) at its beginning, shape (3, joints).
-        end: state at its end, shape (3, joints).
-        duration_s: length [s], positive.
+        start: state (position, velocity, acceleration) at its beginning, shape (..., 3, joints).
+        end: state at its end, shape (..., 3, joints).
+        duration_s: length [s], positive; for several segments of shape (..., 1).
         order: 1, 3 or 5: how many boundary conditions are used.
 
     Returns:
-        Coefficients of shape (6, joints).
+        Coefficients of shape (..., 6, joints).
     """
-    coefficients = np.zeros((6, start.shape[1]))
+    p0, v0, a0 = (start[..., row, :] for row in (POSITION, VELOCITY, ACCELERATION))
+    p1, v1, a1 = (end[..., row, :] for row in (POSITION, VELOCITY, ACCELERATION))
     t = duration_s
-    way = end[POSITION] - start[POSITION]
-    coefficients[0] = start[POSITION]
+    way = p1 - p0
+    none = np.zeros_like(p0)
     if order == 1:
-        coefficients[1] = way / t
-        return coefficients
-    v0, v1 = start[VELOCITY], end[VELOCITY]
-    coefficients[1] = v0
-    if order == 3:
-        coefficients[2] = (3.0 * way - t * (2.0 * v0 + v1)) / t**2
-        coefficients[3] = (t * (v0 + v1) - 2.0 * way) / t**3
-        return coefficients
-    a0, a1 = start[ACCELERATION], end[ACCELERATION]
-    coefficients[2] = 0.5 * a0
-    coefficients[3] = (20.0 * way - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3)
-    coefficients[4] = (-30.0 * way + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4)
-    coefficients[5] = (12.0 * way - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5)
-    return coefficients
+        rows = [p0, way / t, none, none, none, none]
+    elif order == 3:
+        rows = [p0, v0, (3.0 * way - t * (2.0 * v0 + v1)) / t**2, (t * (v0 + v1) - 2.0 * way) / t**3, none, none]
+    else:
+        rows = [p0, v0, 0.5 * a0,
+                (20.0 * way - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3),
+                (-30.0 * way + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4),
+                (12.0 * way - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5)]
+    return np.stack(rows, axis=-2)
 
 
 class Spline:
@@ -134,7 +95,7 @@ class Spline:
     Attributes:
         times_s: time of each point from the start [s], shape (points,).
         states: what each point gives, missing values 0, shape (points, 3, joints).
-        orders: highest order each point allows: 1, 3 or 5.
+        orders: highest order each point allows: 1, 3 or 5, shape (points,).
         coefficients: of the segment from point i to point i + 1, shape (points - 1, 6, joints).
     """
 
@@ -142,20 +103,18 @@ class Spline:
 
     def __init__(self, trajectory: JointTrajectory) -> None:
         points = trajectory.points
+        none = (0.0,) * len(trajectory.joint_names)
         self.times_s = np.array([point.time_s for point in points])
-        self.states = np.zeros((len(points), 3, len(trajectory.joint_names)))
-        self.orders = [5 if point.accelerations else 3 if point.velocities else 1 for point in points]
-        for state, point in zip(self.states, points, strict=True):
-            state[POSITION] = point.positions
-            if point.velocities:
-                state[VELOCITY] = point.velocities
-            if point.accelerations:
-                state[ACCELERATION] = point.accelerations
-        self.coefficients = np.zeros((len(points) - 1, 6, len(trajectory.joint_names)))
-        for i in range(len(points) - 1):
-            duration_s = self.times_s[i + 1] - self.times_s[i]
-            order = min(self.orders[i], self.orders[i + 1])
-            self.coefficients[i] = segment_coefficients(self.states[i], self.states[i + 1], duration_s, order)
+        self.states = np.array([(point.positions, point.velocities or none, point.accelerations or none)
+                                for point in points])
+        self.orders = np.array([1 if not point.velocities else 5 if point.accelerations else 3 for point in points])
+        self.coefficients = np.zeros((len(points) - 1, 6, len(none)))
+        durations_s = np.diff(self.times_s)[:, np.newaxis]
+        orders = np.minimum(self.orders[:-1], self.orders[1:])
+        for order in (1, 3, 5):
+            chosen = orders == order
+            self.coefficients[chosen] = segment_coefficients(self.states[:-1][chosen], self.states[1:][chosen],
+                                                             durations_s[chosen], order)
 
 
 class Track:
@@ -167,14 +126,16 @@ class Track:
         coefficients: of each segment, shape (segments, 6, joints).
         end_s: end of the last segment [s].
         end_position: where it ends, shape (joints,).
+        origin_s: time of its time_from_start 0 [s].
     """
 
-    __slots__ = ("joints", "end_s", "_starts_s", "_coefficients", "_end_position")
+    __slots__ = ("joints", "end_s", "origin_s", "_starts_s", "_coefficients", "_end_position")
 
     def __init__(self, joints: Sequence[int], starts_s: Sequence[float], coefficients: Array, end_s: float,
-                 end_position: Array) -> None:
+                 end_position: Array, origin_s: float) -> None:
         self.joints = list(joints)
         self.end_s = end_s
+        self.origin_s = origin_s
         self._starts_s = list(starts_s)
         self._coefficients = coefficients
         self._end_position = end_position
@@ -182,7 +143,7 @@ class Track:
     @classmethod
     def hold(cls, joints: Sequence[int], position: Array, time_s: float) -> Track:
         """Rest at `position`, shape (joints,), from `time_s` on."""
-        return cls(joints, [], np.zeros((0, 6, len(joints))), time_s, position.copy())
+        return cls(joints, [], np.zeros((0, 6, len(joints))), time_s, position.copy(), time_s)
 
     def sample(self, time_s: float) -> Array:
         """Position, velocity and acceleration at `time_s`, shape (3, joints)."""
@@ -206,7 +167,7 @@ class Track:
         if not kept:
             return None
         return Track([self.joints[i] for i in kept], self._starts_s, self._coefficients[:, :, kept], self.end_s,
-                     self._end_position[kept])
+                     self._end_position[kept], self.origin_s)
 
 
 def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array,
@@ -225,17 +186,28 @@ def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: flo
         continuous: which joints turn without end; they go the short way round.
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
-    turns = np.round((state[POSITION] - spline.states[first, POSITION]) / (2.0 * math.pi))
-    offset = np.where(continuous, turns * (2.0 * math.pi), 0.0)
+    offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
     coefficients = spline.coefficients[max(0, first - 1):].copy()
     coefficients[:, 0] += offset
     if not (first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset)):
         target = spline.states[first].copy()
         target[POSITION] += offset
-        bridge = segment_coefficients(state, target, origin_s + spline.times_s[first] - splice_s, spline.orders[first])
+        bridge = segment_coefficients(state, target, origin_s + float(spline.times_s[first]) - splice_s,
+                                      int(spline.orders[first]))
         coefficients = np.concatenate([bridge[np.newaxis], coefficients[1 if first > 0 else 0:]])
-    knots_s = [origin_s + float(time_s) for time_s in spline.times_s[first:]]
-    return Track(joints, [splice_s, *knots_s[:-1]], coefficients, knots_s[-1], spline.states[-1, POSITION] + offset)
+    knots_s = (origin_s + spline.times_s[first:]).tolist()
+    return Track(joints, [splice_s, *knots_s[:-1]], coefficients, knots_s[-1], spline.states[-1, POSITION] + offset,
+                 origin_s)
+
+
+def _whole_turns(position: Array, target: Array) -> Array:
+    """What is to be added to `target` so that it is the short way from `position`; half a turn goes as the numbers say.
+
+    Both of shape (joints,) [rad].
+    """
+    turns = (position - target) / (2.0 * math.pi)
+    whole = np.where(np.abs(np.abs(turns) % 1.0 - 0.5) < 1e-9, np.trunc(turns), np.round(turns))
+    return whole * (2.0 * math.pi)
 
 
 def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Array) -> bool:
@@ -257,9 +229,9 @@ def stop_ramp(joints: Sequence[int], state: Array, time_s: float, duration_s: fl
         time_s: beginning of the ramp [s].
         duration_s: length of the ramp [s].
     """
-    if duration_s <= 0.0:
+    if duration_s <= SHORTEST_SEGMENT_S:
         return Track.hold(joints, state[POSITION], time_s)
     end = np.zeros_like(state)
     end[POSITION] = state[POSITION] + 0.5 * duration_s * state[VELOCITY]
     coefficients = segment_coefficients(state, end, duration_s, 5)[np.newaxis]
-    return Track(joints, [time_s], coefficients, time_s + duration_s, end[POSITION])
+    return Track(joints, [time_s], coefficients, time_s + duration_s, end[POSITION], time_s)

@@ -59,9 +59,11 @@ class TrajectorySnapshot:
         desired: position, velocity, acceleration, shape (3, joints).
         actual: position, velocity, shape (2, joints).
         error: desired minus actual, shape (2, joints).
+        elapsed_s: how far the trajectory has come since its time_from_start 0 [s].
     """
 
     time_s: float
     desired: Array
     actual: Array
     error: Array
+    elapsed_s: float = 0.0

@@ -86,12 +86,13 @@ def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints:
     Raises:
         InvalidTrajectoryError: a tolerance for a joint that is not of the goal, or one that is not a number.
     """
-    moved = {joint_names[i] for i in joints}
-    faults = [f"{kind}_tolerance names joint '{name}', which is not in the goal"
-              for kind, given in (("path", path), ("goal", goal)) for name in given if name not in moved]
-    faults += [f"{kind}_tolerance of joint '{name}' is not a number"
-               for kind, given in (("path", path), ("goal", goal)) for name, tolerance in given.items()
-               if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)]
+    moved = [joint_names[i] for i in joints]
+    given = [(kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()]
+    faults = [f"{kind}_tolerance names joint '{name}', which is not in the goal; it moves: {', '.join(moved)}"
+              for kind, name, _ in given if name not in moved]
+    faults += [f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
+               f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the parameter's) or less (not checked)"
+               for kind, name, tolerance in given if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)]
     if faults:
         raise InvalidTrajectoryError("; ".join(faults))
     time_s = defaults.goal_time_s if goal_time_s == 0.0 else max(0.0, goal_time_s)
@@ -117,9 +118,10 @@ def violations(error: Array, tolerance: Array, joint_names: Sequence[str]) -> st
         tolerance: same shape; infinite where nothing is checked.
         joint_names: names of the joints.
     """
-    outside = ~(np.abs(error) <= tolerance) & np.isfinite(tolerance)
-    if not outside.any():
+    within = np.abs(error) <= tolerance
+    if within.all():
         return ""
+    outside = ~within & np.isfinite(tolerance)
     quantities = ("position", "velocity")
     return "; ".join(f"joint '{joint_names[i]}': {quantities[row]} error {error[row, i]:.6g}, "
                      f"tolerance {tolerance[row, i]:.6g}" for row, i in np.argwhere(outside))
