@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the messages of a manager to a YAML file and reads them back, every number to the last bit."""
+"""Writes the messages of a manager to a YAML file and reads them back, every number to the last bit.
+
+A message is one line of flow YAML that is JSON as well, as long as all its numbers are finite: a parser of JSON reads
+a plan fifty times as fast as one of YAML, which is kept for files that were written or changed by hand.
+"""
 from __future__ import annotations
 
+import io
+import json
+import math
 import os
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -50,17 +57,19 @@ def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[An
     Raises:
         MessageFileError: The file cannot be written.
     """
-    content = {"kind": kind, "named": {name: to_plain(message) for name, message in named.items()},
-               "anonymous": [to_plain(message) for message in anonymous]}
+    by_name = [f" {json.dumps(name)}: {flow_text(message)}" for name, message in named.items()]
+    waiting = [f" {flow_text(message)}" for message in anonymous]
+    text = "\n".join([f'{{"kind": {json.dumps(kind)},', '"named": {', ",\n".join(by_name), "},", '"anonymous": [',
+                      ",\n".join(waiting), "]}", ""])
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".yaml")
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            yaml.safe_dump(content, stream, sort_keys=False, allow_unicode=True)
+            stream.write(text)
         os.replace(temporary, path)
     except OSError as error:
         raise MessageFileError(f"{path} cannot be written: {error}") from error
-    return len(content["named"]) + len(content["anonymous"])
+    return len(by_name) + len(waiting)
 
 
 def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list[Any]]:
@@ -79,7 +88,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
             every message that does not is named.
     """
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        content = _parsed(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:
@@ -98,24 +107,43 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
     return named, anonymous
 
 
-def to_plain(value: Any) -> Any:
-    """Turns a message into mappings, lists and plain values."""
-    if isinstance(value, genpy.Message):
-        return {name: to_plain(getattr(value, name)) for name in value.__slots__}
-    if isinstance(value, genpy.TVal):
-        return {"secs": int(value.secs), "nsecs": int(value.nsecs)}
-    if isinstance(value, bytes):
-        return list(value)
-    if isinstance(value, list | tuple):
-        return [to_plain(item) for item in value]
-    return value.item() if hasattr(value, "item") else value
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+
+
+def flow_text(value: Any) -> str:
+    """Writes a message, or a value of one, as flow YAML."""
+    match value:
+        case genpy.Message():
+            fields = [f"{json.dumps(name)}: {flow_text(getattr(value, name))}" for name in value.__slots__]
+            return f"{{{', '.join(fields)}}}"
+        case genpy.TVal():
+            return f'{{"secs": {int(value.secs)}, "nsecs": {int(value.nsecs)}}}'
+        case float():
+            return _float_text(value)
+        case bytes() | list() | tuple():
+            return f"[{', '.join(map(flow_text, value))}]"
+        case _ if hasattr(value, "tolist"):  # of NumPy
+            return flow_text(value.tolist())
+        case _:
+            return json.dumps(value)
+
+
+def _float_text(value: float) -> str:
+    if not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0.0 else "-.inf"
+    text = float.__repr__(value)
+    return text if "." in text else text.replace("e", ".0e")  # YAML 1.1 takes 1e-07 for a word
 
 
 def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any:
     message = message_type()
     try:
         genpy.message.fill_message_args(message, [value])
-        genpy.message.check_type("", message_type._type, message)
+        message.serialize(io.BytesIO())
     except (genpy.MessageException, ValueError, TypeError, AttributeError) as error:
         faults.append(f"{where} is no {message_type._type}: {error}")
     return message

@@ -85,7 +85,7 @@ class Entry:
             EntryError: The value is no finite number.
         """
         text = self.text()
-        if isinstance(self.node, yaml.ScalarNode) and self.node.style is None:
+        if isinstance(self.node, yaml.ScalarNode) and not self.node.style:  # plain: None, or "" from libyaml
             try:
                 value = float(text)
             except ValueError:
@@ -129,7 +129,7 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         EntryError: The file cannot be read, is no YAML, or its top level is no mapping.
     """
     try:
-        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except (OSError, UnicodeDecodeError) as error:
         raise EntryError(path, 1, f"cannot be read ({error}); give the path of a readable YAML file") from error
     except yaml.MarkedYAMLError as error:
