@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The emulated controller of a UR arm as a ROS node."""
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from std_srvs.srv import Trigger, TriggerResponse
+
+from modular_framework_drivers.emulators.ur_controller import HOME
+from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT, UrEmulator
+
+
+class UrEmulatorNode:
+    """Node `ur_emulator`.
+
+    Parameters: `~address` "127.0.0.1": where it listens; `~model` UR5 [UR5, UR5e]: decides software version and rate;
+    `~positions`: of the joints at the beginning [rad], six numbers; `~unlock_delay` 5.0: time after a protective stop
+    before it can be unlocked [s]; `~command_port` 29901; `~log` "": file for the commanded path.
+
+    Services (std_srvs/Trigger): `~<order>` for every order that needs no argument; the others are given at the command
+    port only.
+    """
+
+    def __init__(self) -> None:
+        self._emulator = UrEmulator(str(rospy.get_param("~address", "127.0.0.1")),
+                                    str(rospy.get_param("~model", "UR5")),
+                                    [float(value) for value in rospy.get_param("~positions", list(HOME))],
+                                    float(rospy.get_param("~unlock_delay", 5.0)),
+                                    int(rospy.get_param("~command_port", COMMAND_PORT)))
+        self._services: list[rospy.Service] = []
+
+    def connect(self) -> None:
+        """Listen, and offer the services.
+
+        Raises:
+            OSError: a port is taken; the text names it.
+        """
+        self._emulator.connect()
+        log = str(rospy.get_param("~log", ""))
+        if log:
+            self._emulator.commands["log"](path=log)
+        for name, order in self._emulator.commands.items():
+            parameters = inspect.signature(order).parameters.values()
+            if all(parameter.default is not parameter.empty for parameter in parameters):
+                self._services.append(rospy.Service(f"~{name}", Trigger, _served(order)))
+
+    def run(self) -> None:
+        """Serve until the node is shut down."""
+        rospy.on_shutdown(self._emulator.stop)
+        self._emulator.run()
+        self._emulator.close()
+
+
+def _served(order: Callable[..., str | None]) -> Callable[[Any], TriggerResponse]:
+    def serve(request: Any) -> TriggerResponse:
+        del request
+        try:
+            return TriggerResponse(success=True, message=order() or "")
+        except (OSError, ValueError) as error:
+            return TriggerResponse(success=False, message=str(error))
+
+    return serve
+
+
+def main() -> int:
+    """Run the node; returns its exit code."""
+    rospy.init_node("ur_emulator")
+    try:
+        node = UrEmulatorNode()
+        node.connect()
+    except (OSError, ValueError, TypeError) as error:
+        rospy.logfatal("%s: %s", rospy.get_name(), error)
+        return 1
+    node.run()
+    return 0

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A process with a socket of datagrams to it; nothing here blocks but `end`."""
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+
+from modular_framework_drivers.ur.arm_messages import MESSAGE_SIZE
+
+
+class ChildProcess:
+    """A Python module run as a process of its own.
+
+    Args:
+        module: what to run; gets the first argument, the file descriptor of its socket, then the others.
+        arguments: its command line.
+    """
+
+    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+        self._socket, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.setblocking(False)
+        with other:
+            role, *rest = arguments
+            self._process = subprocess.Popen([sys.executable, "-m", module, role, str(other.fileno()), *rest],
+                                             pass_fds=[other.fileno()], stdin=subprocess.DEVNULL)
+        self.ended = False
+
+    def messages(self) -> Iterator[bytes]:
+        """What has come since the last call; sets `ended` when nothing more can come."""
+        while not self.ended:
+            try:
+                message = self._socket.recv(MESSAGE_SIZE)
+            except BlockingIOError:
+                return
+            except OSError:
+                message = b""
+            if not message:
+                self.ended = True
+                return
+            yield message
+
+    def send(self, message: bytes) -> bool:
+        """Send if the process can take it; False when it does not."""
+        try:
+            return self._socket.send(message) == len(message)
+        except OSError:
+            return False
+
+    def end(self, patience_s: float = 0.0) -> None:
+        """End the process, at once or after it had `patience_s` [s] to do so by itself; may be called twice."""
+        self.ended = True
+        self._socket.close()
+        try:
+            self._process.wait(patience_s if patience_s > 0.0 else 0.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

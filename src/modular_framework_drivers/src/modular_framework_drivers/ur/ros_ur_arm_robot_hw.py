@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The arm of Universal Robots in a ROS node: says when it is ready, and offers to resume after a fault."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import rospy
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger, TriggerResponse
+
+from modular_framework_control.node_handle import NodeHandle, join_names
+from modular_framework_drivers.ur.dashboard import DashboardError, ask_dashboard
+from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
+
+# services of the dashboard under the names of ur_robot_driver: what to ask, and how the answer begins when it was done
+DASHBOARD_SERVICES = {
+    "power_on": ("power on", "Powering on"),
+    "power_off": ("power off", "Powering off"),
+    "brake_release": ("brake release", "Brake releasing"),
+    "unlock_protective_stop": ("unlock protective stop", "Protective stop releasing"),
+    "restart_safety": ("restart safety", "Restarting safety"),
+    "close_safety_popup": ("close safety popup", "closing safety popup"),
+    "close_popup": ("close popup", "closing popup"),
+    "play": ("play", "Starting program"),
+    "pause": ("pause", "Pausing program"),
+    "stop": ("stop", "Stopped"),
+}
+_WATCH_PERIOD_S = 0.05
+
+
+class UrArmRobotHW(UrArmHardware):
+    """An arm of Universal Robots; its parameters are told at `UrArmHardware`.
+
+    Publishes `topic_to_wait_for` (std_msgs/Bool, latched) whenever it changes whether the arm follows commands. Offers,
+    below its own namespace, `resume` and `dashboard/<name>` for the names in DASHBOARD_SERVICES (std_srvs/Trigger).
+    """
+
+    announces_ready: ClassVar[bool] = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._publisher: rospy.Publisher | None = None
+        self._services: list[rospy.Service] = []
+        self._closing = threading.Event()
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        if not super().init(root_nh, robot_hw_nh):
+            return False
+        topic = robot_hw_nh.get_param("topic_to_wait_for", "")
+        if topic:
+            self._publisher = rospy.Publisher(topic, Bool, queue_size=1, latch=True)
+        self._offer(join_names(robot_hw_nh.namespace, "resume"), self._on_resume)
+        for name in DASHBOARD_SERVICES:
+            self._offer(join_names(robot_hw_nh.namespace, f"dashboard/{name}"), self._asker(name))
+        threading.Thread(target=self._watch, name="ur_ready", daemon=True).start()
+        return True
+
+    def close(self) -> None:
+        self._closing.set()
+        while self._services:
+            self._services.pop().shutdown("the arm is closed")
+        super().close()
+
+    def _offer(self, name: str, callback: Callable[[Any], TriggerResponse]) -> None:
+        self._services.append(rospy.Service(name, Trigger, callback))
+
+    def _watch(self) -> None:
+        told: bool | None = None
+        while not self._closing.wait(_WATCH_PERIOD_S):
+            ready = self.ready
+            if ready != told and self._publisher is not None:
+                self._publisher.publish(ready)
+                told = ready
+
+    def _on_resume(self, request: Any) -> TriggerResponse:
+        del request
+        trouble = self.resume()
+        return TriggerResponse(success=not trouble, message=trouble or "the arm follows commands")
+
+    def _asker(self, name: str) -> Callable[[Any], TriggerResponse]:
+        line, done = DASHBOARD_SERVICES[name]
+
+        def ask(request: Any) -> TriggerResponse:
+            del request
+            try:
+                answer = ask_dashboard(self.address, line)
+            except DashboardError as error:
+                return TriggerResponse(success=False, message=str(error))
+            return TriggerResponse(success=answer.startswith(done), message=answer)
+
+        return ask
