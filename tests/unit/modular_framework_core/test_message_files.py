@@ -10,10 +10,11 @@ import rospy
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from modular_framework_core.managers import message_files
-from modular_framework_core.managers.message_files import MessageFileError
 from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Bool, Float64, String
+
+from modular_framework_core.managers import message_files
+from modular_framework_core.managers.message_files import MessageFileError
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
