@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any
 
 import actionlib
+import numpy as np
 import rospy
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
@@ -27,8 +28,9 @@ from moveit_msgs.msg import (
     OrientationConstraint,
     PlanningScene,
     PositionConstraint,
+    RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan
+from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPositionFK
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header, String
@@ -40,6 +42,7 @@ LAUNCH = """<launch>
 </launch>"""
 GROUP = "arm_and_manipulator"
 ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
+TIP = "eg_manipulator"
 GRIPPER = "ezgripper_knuckle_palm_L1_1"
 START = [1.57, -1.57, 1.2, -1.2, -1.57, 0.0]
 DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
@@ -111,16 +114,28 @@ def add(*objects: CollisionObject) -> bool:
     return bool(call("apply_planning_scene", ApplyPlanningScene, scene).success)
 
 
+def tip_pose(values: Any, frame: str = "world", link: str = TIP) -> Pose:
+    """Where compute_fk says a link is when the arm's joints have these values."""
+    state = RobotState(joint_state=JointState(name=ARM, position=list(values)), is_diff=True)
+    answer = call("compute_fk", GetPositionFK, Header(frame_id=frame), [link], state)
+    assert answer.error_code.val == OK
+    return answer.pose_stamped[0].pose
+
+
+def vector(pose: Pose) -> np.ndarray:
+    return np.array([pose.position.x, pose.position.y, pose.position.z])
+
+
 def table() -> CollisionObject:
     return box("table", 0.0, 0.56, 0.82, (1.2, 0.8, 0.04))
 
 
 def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOWN, frame: str = "world") -> Constraints:
-    position = PositionConstraint(link_name="eg_manipulator", weight=1.0)
+    position = PositionConstraint(link_name=TIP, weight=1.0)
     position.header.frame_id = frame
     position.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [0.001])]
     position.constraint_region.primitive_poses = [Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))]
-    turn = OrientationConstraint(link_name="eg_manipulator", orientation=orientation, weight=1.0)
+    turn = OrientationConstraint(link_name=TIP, orientation=orientation, weight=1.0)
     turn.header.frame_id = frame
     return Constraints(name="goal", position_constraints=[position], orientation_constraints=[turn])
 

@@ -3,57 +3,19 @@
 from __future__ import annotations
 
 import re
-import time
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
-from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, PlanningScene, RobotState
-from moveit_msgs.srv import ApplyPlanningScene, GetCartesianPath, GetCartesianPathRequest, GetPositionFK
-from planning_wire import ARM, DOWN, GROUP, LAUNCH, OK, START, FakeArm, add, box, call, report_of
+from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, RobotState
+from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest
+from planning_wire import ARM, DOWN, GROUP, OK, START, TIP, add, box, call, report_of, tip_pose, vector
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-TIP = "eg_manipulator"
 MAX_VELOCITY, MAX_ACCELERATION = 3.2, 8.0
-
-
-@pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("compute_cartesian_path", 60.0)
-    return session
-
-
-@pytest.fixture(scope="module")
-def arm(session: Any) -> FakeArm:
-    return FakeArm()
-
-
-@pytest.fixture(autouse=True)
-def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
-    assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
-    yield
-    assert session.alive(), session.log()
-
-
-@pytest.fixture(scope="module")
-def home(session: Any, arm: FakeArm) -> Pose:
-    time.sleep(0.5)  # joint states arrive
-    return tip_pose(START)
-
-
-def tip_pose(values: Any, frame: str = "world") -> Pose:
-    state = RobotState(joint_state=JointState(name=ARM, position=list(values)), is_diff=True)
-    answer = call("compute_fk", GetPositionFK, Header(frame_id=frame), [TIP], state)
-    assert answer.error_code.val == OK
-    return answer.pose_stamped[0].pose
-
-
-def vector(pose: Pose) -> np.ndarray:
-    return np.array([pose.position.x, pose.position.y, pose.position.z])
+pytestmark = [pytest.mark.move_group(service="compute_cartesian_path"), pytest.mark.usefixtures("clean_scene")]
 
 
 def shifted(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:

@@ -2,8 +2,6 @@
 """Constraints and kinematics on the wire: goals of any mix, compute_ik, compute_fk and check_state_validity."""
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -23,36 +21,32 @@ from moveit_msgs.msg import (
     VisibilityConstraint,
 )
 from moveit_msgs.srv import ApplyPlanningScene, GetPositionFK, GetPositionIK, GetStateValidity
-from planning_wire import ARM, DOWN, GROUP, LAUNCH, OK, START, FakeArm, add, box, call, plan, report_of, request, table
+from planning_wire import (
+    ARM,
+    DOWN,
+    GROUP,
+    OK,
+    START,
+    TIP,
+    add,
+    box,
+    call,
+    plan,
+    report_of,
+    request,
+    table,
+    tip_pose,
+    vector,
+)
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import Header
 
-TIP = "eg_manipulator"
 CODES = MoveItErrorCodes
 NAN = float("nan")
 UNTURNED = Quaternion(0, 0, 0, 1)
-
-
-@pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_kinematic_path", 120.0)
-    return session
-
-
-@pytest.fixture(scope="module")
-def arm(session: Any) -> FakeArm:
-    return FakeArm()
-
-
-@pytest.fixture(autouse=True)
-def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
-    time.sleep(0.2)
-    assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
-    yield
-    assert session.alive(), session.log()
+pytestmark = pytest.mark.usefixtures("clean_scene")
 
 
 def in_box(x: float, y: float, z: float, size: tuple[float, float, float], **changes: Any) -> PositionConstraint:
@@ -72,11 +66,9 @@ def turned(x: float, y: float, z: float, **changes: Any) -> OrientationConstrain
 
 def pose_at(values: Any, link: str = TIP) -> tuple[np.ndarray, Rotation]:
     """Where compute_fk says a link is."""
-    state = RobotState(joint_state=JointState(name=ARM, position=list(values)), is_diff=True)
-    answer = call("compute_fk", GetPositionFK, Header(frame_id="world"), [link], state)
-    assert answer.error_code.val == OK
-    p, q = answer.pose_stamped[0].pose.position, answer.pose_stamped[0].pose.orientation
-    return np.array([p.x, p.y, p.z]), Rotation.from_quat([q.x, q.y, q.z, q.w])
+    pose = tip_pose(values, link=link)
+    q = pose.orientation
+    return vector(pose), Rotation.from_quat([q.x, q.y, q.z, q.w])
 
 
 def end_of(answer: Any) -> list[float]:

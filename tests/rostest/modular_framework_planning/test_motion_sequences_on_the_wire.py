@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import actionlib
@@ -21,17 +20,16 @@ from moveit_msgs.msg import (
     MoveGroupSequenceAction,
     MoveGroupSequenceGoal,
     MoveItErrorCodes,
-    PlanningScene,
     PositionConstraint,
     RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetMotionSequence, GetPositionFK, QueryPlannerInterfaces
+from moveit_msgs.srv import GetMotionSequence, QueryPlannerInterfaces
 from planning_wire import (
     ARM,
     GRIPPER,
-    LAUNCH,
     OK,
     START,
+    TIP,
     FakeArm,
     add,
     box,
@@ -40,47 +38,15 @@ from planning_wire import (
     pose_constraints,
     report_of,
     request,
+    tip_pose,
+    vector,
 )
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
-TIP, PILZ = "eg_manipulator", "pilz_industrial_motion_planner"
+PILZ = "pilz_industrial_motion_planner"
 CODES = MoveItErrorCodes
-
-
-@pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_sequence_path", 120.0)
-    return session
-
-
-@pytest.fixture(scope="module")
-def arm(session: Any) -> FakeArm:
-    return FakeArm(with_gripper=True)
-
-
-@pytest.fixture(autouse=True)
-def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
-    arm.positions.update(zip(ARM, START, strict=True))
-    time.sleep(0.2)  # ten joint states: the node has heard of the jump
-    assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
-    yield
-    assert session.alive(), session.log()
-
-
-@pytest.fixture(scope="module")
-def home(session: Any, arm: FakeArm) -> Pose:
-    return tip_pose(START)
-
-
-def tip_pose(values: Any) -> Pose:
-    state = RobotState(joint_state=JointState(name=ARM, position=list(values)), is_diff=True)
-    return call("compute_fk", GetPositionFK, Header(frame_id="world"), [TIP], state).pose_stamped[0].pose
-
-
-def vector(pose: Pose) -> np.ndarray:
-    return np.array([pose.position.x, pose.position.y, pose.position.z])
+pytestmark = [pytest.mark.move_group(service="plan_sequence_path", gripper=True),
+              pytest.mark.usefixtures("clean_scene")]
 
 
 def to(home: Pose, x: float, y: float, z: float, planner: str = "LIN", **changes: Any) -> MotionPlanRequest:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import actionlib
@@ -16,23 +15,14 @@ from moveit_msgs.msg import (
     MoveGroupAction,
     MoveGroupGoal,
     MoveItErrorCodes,
-    PlanningScene,
     RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene
-from planning_wire import ARM, LAUNCH, OK, START, FakeArm, add, box, call, joint_goal, report_of, request
+from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_of, request
 
 PAN = "shoulder_pan_joint"
 GOAL_PAN = START[0] - 1.2
 SLOW = {"max_velocity_scaling_factor": 0.1, "max_acceleration_scaling_factor": 0.5}
-
-
-@pytest.fixture(scope="module")
-def arm(ros_launch: Callable[..., Any]) -> Iterator[FakeArm]:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_kinematic_path", 60.0)
-    yield FakeArm()
-    assert session.alive(), session.log()
+pytestmark = pytest.mark.usefixtures("clean_scene")
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +30,6 @@ def client(arm: FakeArm) -> Any:
     client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
     assert client.wait_for_server(rospy.Duration(10.0))
     return client
-
-
-@pytest.fixture(autouse=True)
-def clean(arm: FakeArm) -> None:
-    arm.positions.update(zip(ARM, START, strict=True))
-    arm.cancelled.clear()
-    time.sleep(0.2)  # ten joint states: the node has heard of the jump
-    assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
 
 
 def goal(pan: float = GOAL_PAN, plan_only: bool = False, **changes: Any) -> MoveGroupGoal:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import actionlib
@@ -41,7 +41,6 @@ from planning_wire import (
     DOWN,
     GRIPPER,
     GROUP,
-    LAUNCH,
     OK,
     START,
     FakeArm,
@@ -58,27 +57,7 @@ from planning_wire import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-
-@pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_kinematic_path", 60.0)
-    return session
-
-
-@pytest.fixture(scope="module")
-def arm(session: Any) -> FakeArm:
-    return FakeArm()
-
-
-@pytest.fixture(autouse=True)
-def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
-    arm.positions.update(zip(ARM, START, strict=True))
-    time.sleep(0.2)  # ten joint states: the node has heard of the jump
-    scene = PlanningScene(is_diff=False)
-    assert call("apply_planning_scene", ApplyPlanningScene, scene).success
-    yield
-    assert session.alive(), session.log()
+pytestmark = pytest.mark.usefixtures("clean_scene")
 
 
 def test_a_plan_starts_at_the_current_state_and_ends_at_the_pose() -> None:

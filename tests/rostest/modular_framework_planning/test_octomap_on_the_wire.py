@@ -50,18 +50,7 @@ CAMERA_AT = np.array([-2.5, 0.0, 1.2])
 LOOK_ALONG_X = Quaternion(-0.5, 0.5, -0.5, 0.5)  # optical frame: z forward along the world's x, x right along -y
 FOCUS, CENTER = 525.0, (319.5, 239.5)
 WALL_X = 1.0  # world x of a wall behind the robot
-
-
-@pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any]) -> Any:
-    started = ros_launch(LAUNCH)
-    started.wait_for_service("/get_planning_scene", 180)
-    return started
-
-
-@pytest.fixture(scope="module")
-def arm(session: Any) -> FakeArm:
-    return FakeArm()
+pytestmark = pytest.mark.move_group(launch=LAUNCH, service="get_planning_scene")
 
 
 @pytest.fixture(scope="module")

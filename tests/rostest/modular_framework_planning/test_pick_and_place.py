@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import actionlib
@@ -22,11 +21,10 @@ from moveit_msgs.msg import (
     PlaceAction,
     PlaceGoal,
     PlaceLocation,
-    PlanningScene,
     PlanningSceneComponents,
     RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK
+from moveit_msgs.srv import GetPlanningScene, GetPositionFK
 from planning_wire import ARM, GRIPPER, GROUP, LAUNCH, OK, START, FakeArm, add, box, call, joint_goal, report_of, table
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -40,14 +38,7 @@ SCALING = "robot_description_planning/default_{}_scaling_factor"
 QUICK = LAUNCH.replace("</launch>", f"""  <param name="{SCALING.format('velocity')}" value="0.4"/>
   <param name="{SCALING.format('acceleration')}" value="0.4"/>
 </launch>""")
-
-
-@pytest.fixture(scope="module")
-def arm(ros_launch: Callable[..., Any]) -> Iterator[FakeArm]:
-    session = ros_launch(QUICK)
-    session.wait_for_service("plan_kinematic_path", 60.0)
-    yield FakeArm(with_gripper=True)
-    assert session.alive(), session.log()
+pytestmark = pytest.mark.move_group(launch=QUICK, gripper=True)
 
 
 @pytest.fixture(scope="module")
@@ -65,12 +56,7 @@ def place(arm: FakeArm) -> Any:
 
 
 @pytest.fixture(autouse=True)
-def fresh(arm: FakeArm) -> None:
-    arm.positions.update(zip(ARM, START, strict=True))
-    arm.positions[GRIPPER] = 0.3
-    arm.grips.clear()
-    time.sleep(0.2)  # ten joint states: the node has heard of the jump
-    assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
+def fresh(clean_scene: None) -> None:
     assert add(table(), box("block", *BLOCK, (0.03, 0.03, 0.12)))
 
 

@@ -11,6 +11,7 @@ import rospkg
 import yaml
 from urdf_parser_py.urdf import URDF
 
+from modular_framework_planning import capability_names as names
 from modular_framework_planning.ompl_planning import PLANNERS
 
 ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
@@ -153,3 +154,15 @@ def test_the_setup_assistant_would_find_robot_and_semantics(package: Path) -> No
     robot = Path(rospkg.RosPack().get_path(settings["URDF"]["package"]))
     assert (robot / settings["URDF"]["relative_path"]).is_file()
     assert (package / settings["SRDF"]["relative_path"]).is_file()
+
+
+@pytest.mark.parametrize("where_is", ["ur5_ezgripper_moveit_config/launch", "moveit_ros_visualization/config"])
+def test_rviz_shows_every_topic_of_markers_the_planner_publishes(where_is: str) -> None:
+    where, folder = where_is.split("/")
+    file = Path(rospkg.RosPack().get_path(where), folder, "moveit.rviz")
+    displays = yaml.safe_load(file.read_text())["Visualization Manager"]["Displays"]
+    shown = {display["Marker Topic"] for display in displays if display["Class"] == "rviz/MarkerArray"}
+    topics = (names.SCENE_MARKERS_TOPIC, names.OCTOMAP_MARKERS_TOPIC, names.PATH_MARKERS_TOPIC)
+    published = {topic.replace("~", "/move_group/") for topic in topics}
+    assert shown == published | {"/interactive_goal/start_ghost", "/interactive_goal/goal_ghost"}
+    assert "/interactive_goal/marker/update" in {display.get("Update Topic") for display in displays}

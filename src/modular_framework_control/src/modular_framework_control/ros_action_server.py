@@ -12,6 +12,7 @@ from actionlib.server_goal_handle import ServerGoalHandle
 
 from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
 from modular_framework_control.ros_outbox import Outbox
+from modular_framework_control.ros_telling import going_down
 
 Submit = Callable[[Any, GoalTicket[Any]], None]
 MakeResult = Callable[[GoalTicket[Any]], Any]
@@ -30,6 +31,13 @@ class SteadyActionServer(ActionServer):
             timer.shutdown()
             period = rospy.Duration(1.0 / self.status_frequency)
             self.status_timer = rospy.Timer(period, self.publish_status_async, reset=True)
+
+    def publish_status(self) -> None:
+        try:
+            super().publish_status()
+        except rospy.ROSException:
+            if not going_down():
+                raise
 
 
 class GoalRefusedError(Exception):

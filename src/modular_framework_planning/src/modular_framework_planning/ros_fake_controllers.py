@@ -12,6 +12,7 @@ import rospy
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
+from modular_framework_control.ros_telling import tell
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.controllers import ControllerSpec
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -107,7 +108,7 @@ class FakeMotion:
     def _publish(self, positions: Sequence[float]) -> None:
         message = JointState(name=self._part.trajectory.joint_names, position=list(positions))
         message.header.stamp = rospy.Time.now()
-        self._publisher.publish(message)
+        tell(self._publisher, message)
 
     def _end(self) -> None:
         self._publish(self._part.trajectory.points[-1].positions)

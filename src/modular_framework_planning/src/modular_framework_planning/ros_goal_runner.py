@@ -9,6 +9,7 @@ from typing import Any
 import rospy
 
 from modular_framework_control.ros_action_server import SteadyActionServer
+from modular_framework_control.ros_telling import going_down
 from modular_framework_planning.errors import ErrorCode
 
 PREVIOUS_GOAL_TIMEOUT_S = 10.0
@@ -67,11 +68,18 @@ class GoalRunner:
             else:
                 handle.set_aborted(result, text)
         except Exception as error:  # noqa: BLE001 - the client must get an answer whatever happens; it is logged here
-            rospy.logerr("action goal ended by an unexpected %s", type(error).__name__, exc_info=error)
-            handle.set_aborted(self._result(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")
+            self._on_fault(handle, error)
         finally:
             self._turn.release()
             self._forget(handle)
+
+    def _on_fault(self, handle: Any, error: Exception) -> None:
+        """Answers a goal that ended by an exception; when the node goes down its topics are closed, and that is all."""
+        if going_down():
+            rospy.logdebug("action goal ended while the node went down: %s", error)
+            return
+        rospy.logerr("action goal ended by an unexpected %s", type(error).__name__, exc_info=error)
+        handle.set_aborted(self._result(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")
 
     def _result(self, code: ErrorCode) -> Any:
         """Returns an empty result with a code, for a goal that was not worked on to its end."""

@@ -15,6 +15,7 @@ from moveit_msgs.msg import RobotState
 from std_msgs.msg import Empty
 from visualization_msgs.msg import Marker, MarkerArray
 
+from modular_framework_control.ros_telling import tell
 from modular_framework_planning.conversions import joint_values, pose_message
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.robot_model import JointGroup, RobotModel
@@ -124,7 +125,7 @@ class InteractiveGoal:
     def follow_robot(self) -> None:
         """Lets motions start where the robot is."""
         self._start = None
-        self._ghosts["start"].publish(MarkerArray([Marker(action=Marker.DELETEALL)]))
+        tell(self._ghosts["start"], MarkerArray([Marker(action=Marker.DELETEALL)]))
 
     def _choose_planner(self, entry: str) -> None:
         pipeline, _, planner = entry.rpartition(": ")
@@ -240,7 +241,7 @@ class InteractiveGoal:
     def _take_start(self, state: RobotState) -> None:
         positions = self._positions_of(state)
         self._start, self._trajectory = state, None
-        self._ghosts["start"].publish(_numbered([
+        tell(self._ghosts["start"], _numbered([
             Marker(action=Marker.DELETEALL), *robot_markers(self._model, positions, "start", START_COLOR)]))
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
@@ -263,7 +264,7 @@ class InteractiveGoal:
         text.pose.position.z += WORDS_ABOVE_TIP_M
         text.scale.z = 0.04
         text.color.r = text.color.g = text.color.b = text.color.a = 1.0
-        self._ghosts["goal"].publish(_numbered([*markers, text] if text.text else markers))
+        tell(self._ghosts["goal"], _numbered([*markers, text] if text.text else markers))
 
     # ---------------------------------------------------------------- states
     def _tip_pose(self) -> Pose:

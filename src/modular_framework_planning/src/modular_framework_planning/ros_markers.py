@@ -10,6 +10,7 @@ from geometry_msgs.msg import Point
 from moveit_msgs.msg import DisplayTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
+from modular_framework_control.ros_telling import tell
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.conversions import pose_message
 from modular_framework_planning.planning_request import PlanningAnswer
@@ -47,11 +48,11 @@ class MarkerPublisher:
                 markers.append(_shape_marker(shape, held.body.pose * pose, held.link, held.name, number))
                 markers[-1].frame_locked = True
                 _paint(markers[-1], scene.colors.get(held.name, ATTACHED_COLOR))
-        self._scene.publish(MarkerArray(markers))
+        tell(self._scene, MarkerArray(markers))
 
     def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
         """Publishes the planned motion: a line along which the tip goes and ghosts of the robot on its way."""
-        self._display.publish(DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
+        tell(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
         group = scene.model.group(response.group_name)
         rows = answer.trajectory.positions
         markers = [Marker(action=Marker.DELETEALL), *_tip_line(scene, group, rows, answer.start)]
@@ -62,7 +63,7 @@ class MarkerPublisher:
                                      (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15))
         for number, marker in enumerate(markers):
             marker.id = number
-        self._path.publish(MarkerArray(markers))
+        tell(self._path, MarkerArray(markers))
 
 
 def _paint(marker: Marker, color: tuple[float, float, float, float]) -> None:

@@ -10,6 +10,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from modular_framework_control.ros_telling import tell
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.conversions import pose_message
 from modular_framework_planning.planning_scene import CollisionObject, PlanningScene
@@ -34,7 +35,7 @@ class OctomapMarkers:
         markers = [Marker(action=Marker.DELETEALL)]
         markers += [_cubes(body, shape, scene.model.planning_frame) for body in (scene.octomap,) if body is not None
                     for shape, _ in body.shapes if isinstance(shape, Octree) and len(shape.centers)]
-        self._publisher.publish(MarkerArray(markers))
+        tell(self._publisher, MarkerArray(markers))
 
 
 def _cubes(body: CollisionObject, octree: Octree, frame: str) -> Marker:

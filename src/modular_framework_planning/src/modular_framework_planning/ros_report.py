@@ -9,6 +9,7 @@ from typing import Any
 import rospy
 from std_msgs.msg import String
 
+from modular_framework_control.ros_telling import tell
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.errors import ErrorCode, PlanningError
 
@@ -34,7 +35,7 @@ class Reporter:
         if code != ErrorCode.SUCCESS:
             name = ErrorCode(code).name if code in set(ErrorCode) else str(code)
             rospy.logwarn("%s failed (%s): %s", kind, name, reason)
-        self._publisher.publish(String(json.dumps(entry)))
+        tell(self._publisher, String(json.dumps(entry)))
 
     def failure(self, kind: str, error: Exception, **details: Any) -> int:
         """Reports an exception and returns the code to answer with."""

@@ -15,10 +15,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.moveit_requests import robot_state
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
-from modular_framework_states.arm_positions import worst_joint
+from modular_framework_states.arm_positions import run_to_end
 from modular_framework_states.manager_clients import ManagerError, fetch
 
-SETTLE_TIME_S = 2.0
 TIMEOUT_S = 10.0
 
 
@@ -63,21 +62,7 @@ class ExecuteTrajectory(FrameworkState):
             return self.stopped()
         if fault:
             return self.fail(f"{what} was not run: {fault}")
-        result = commander.execute_plan(RobotTrajectory(joint_trajectory=trajectory),
-                                        stop_requested=self.preempt_requested)
-        if self.preempt_requested():
-            return self.stopped()
-        if not result:
-            return self.fail(f"{what} was not run to its end: {result.reason}")
-        last = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
-        if self.wait_until(lambda: worst_joint(commander.current_joints(), last)[1] <= self._goal_tolerance,
-                           SETTLE_TIME_S):
-            return self.succeed()
-        if self.preempt_requested():
-            return self.stopped()
-        joint, away = worst_joint(commander.current_joints(), last)
-        return self.fail(f"{what} was run, but joint '{joint}' is {away:.4f} away from its last point, allowed is "
-                         f"{self._goal_tolerance}")
+        return run_to_end(self, commander, RobotTrajectory(joint_trajectory=trajectory), self._goal_tolerance, what)
 
     def _trajectory(self, userdata: Any) -> JointTrajectory:
         if "selected_trajectory" not in self.get_registered_input_keys():

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_states.arm_positions import worst_joint
+from modular_framework_states.arm_positions import run_to_end, worst_joint
 from modular_framework_states.manager_clients import ManagerError, fetch
-
-SETTLE_TIME_S = 2.0
 
 
 class Move(FrameworkState):
@@ -43,25 +41,12 @@ class Move(FrameworkState):
         trajectory = plan.joint_trajectory
         if not trajectory.points:
             return self.fail(f"plan '{self._plan_name}' has no point")
-        first, last = (dict(zip(trajectory.joint_names, trajectory.points[index].positions, strict=False))
-                       for index in (0, -1))
+        first = dict(zip(trajectory.joint_names, trajectory.points[0].positions, strict=False))
         away = worst_joint(commander.current_joints(), first)
         if away[1] > self._start_tolerance:
             return self.fail(f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
                              f"its first point, allowed is {self._start_tolerance}; plan again from the current state")
-        result = commander.execute_plan(plan, stop_requested=self.preempt_requested)
-        if self.preempt_requested():
-            return self.stopped()
-        if not result:
-            return self.fail(f"plan '{self._plan_name}' was not executed: {result.reason}")
-        if not self.wait_until(lambda: worst_joint(commander.current_joints(), last)[1] <= self._goal_tolerance,
-                               SETTLE_TIME_S):
-            if self.preempt_requested():
-                return self.stopped()
-            joint, distance = worst_joint(commander.current_joints(), last)
-            return self.fail(f"plan '{self._plan_name}' was executed, but joint '{joint}' is {distance:.4f} away from "
-                             f"its last point, allowed is {self._goal_tolerance}")
-        return self.succeed()
+        return run_to_end(self, commander, plan, self._goal_tolerance, f"plan '{self._plan_name}'")
 
     def _plan(self, userdata: Any) -> Any:
         if "selected_plan" not in self.get_registered_input_keys():

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Publishes from threads that are still at work while the node goes down, without an error nobody can use."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+
+
+def going_down() -> bool:
+    """Whether the node is being shut down: rospy closes the topics before it says so by is_shutdown()."""
+    return bool(rospy.core.is_shutdown_requested())
+
+
+def tell(publisher: rospy.Publisher, message: Any) -> None:
+    """Publishes a message; of a topic that is closed because the node goes down nothing more is said.
+
+    Raises:
+        rospy.ROSException: the topic is closed, or the message does not fit, while the node runs on.
+    """
+    try:
+        publisher.publish(message)
+    except rospy.ROSException as error:
+        if not going_down():
+            raise
+        rospy.logdebug("topic %s is closed: %s", publisher.name, error)
