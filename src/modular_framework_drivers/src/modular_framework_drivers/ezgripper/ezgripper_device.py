@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An EZGripper that can be used from any thread and never makes one wait.
+
+A thread of its own talks to the servos: it connects, calibrates, follows goals, and, whatever goes wrong, says so and
+comes back by itself. Everybody else reads its last state and leaves goals.
+"""
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from dataclasses import dataclass, replace
+
+from modular_framework_drivers.ezgripper.dynamixel_bus import BusError, DynamixelBus
+from modular_framework_drivers.ezgripper.grip import Drive, Goal, Grip, Motion
+from modular_framework_drivers.ezgripper.gripper_servos import (
+    CLOSED_POSITION,
+    GripperError,
+    GripperReading,
+    GripperServos,
+    describe_errors,
+)
+from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
+from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, ServoErrors
+
+LOGGER = logging.getLogger("rosout.ezgripper")
+WARM = 70.0
+"""From here on a motor is reported as warm [deg C]; it switches itself off at 80."""
+UNWATCHED_TORQUE = 100
+"""What the maker lets an MX-64 hold with for any time [units of the servo]."""
+SILENT_S = 1.0
+"""A state as old as this is none [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class GripperState:
+    """The gripper as it was when it was asked last.
+
+    Attributes:
+        stamp_s: when, on the monotonic clock [s].
+        reading: what was measured.
+        motion: what the fingers do.
+        goal: what they do it for.
+        ready: calibrated, and has been at its start position.
+        fault: why it cannot be used just now, "" when it can.
+    """
+
+    stamp_s: float
+    reading: GripperReading
+    motion: Motion
+    goal: Goal
+    ready: bool
+    fault: str
+
+
+class _Ended(Exception):
+    """The device is to be closed."""
+
+
+class EzGripper:
+    """One gripper. `start`, then `state`, `command` and `stop` from any thread; `close` in the end.
+
+    Args:
+        settings: how to reach it and how to treat it.
+    """
+
+    def __init__(self, settings: GripperSettings) -> None:
+        self.settings = settings
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._lock = threading.Lock()
+        first = Goal(0, settings.start_position, settings.start_torque)
+        self._wanted, self._stop_wanted = first, False
+        self._grip = Grip(settings.rules, first)
+        self._bus = DynamixelBus(settings.port_name, settings.baudrate)
+        self._servos = GripperServos(self._bus, settings.servo_ids, self._wait)
+        nothing = GripperReading(CLOSED_POSITION, 0.0, 0.0, 0.0, 0.0, ServoErrors.NONE)
+        self._state = GripperState(-math.inf, nothing, Motion.MOVING, first, False,
+                                   f"{settings.name}: not connected yet")
+        self._ready = False
+        self._warm = False
+        self._off_since_s: float | None = None
+
+    # ---- any thread ----
+
+    def start(self) -> None:
+        """Begin to connect. Returns at once; `state` tells how it goes."""
+        self._thread = threading.Thread(target=self._run, name=self.settings.name, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop the fingers, go on holding with little torque, and end. May be called twice."""
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join(2.0)
+
+    def state(self) -> GripperState:
+        """The latest state; one that is too old has a fault that says so."""
+        state = self._state
+        age_s = time.monotonic() - state.stamp_s
+        if age_s > SILENT_S and not state.fault:
+            return replace(state, fault=f"{self.settings.name}: nothing heard of the servos for {age_s:.1f} s")
+        return state
+
+    def command(self, position: float, torque: int) -> int:
+        """Leave a goal; while there is a fault it is ignored.
+
+        Args:
+            position: of the knuckle joint [rad].
+            torque: greatest torque [units of the servo].
+
+        Returns:
+            The number of the goal, which `state().goal` has once it is worked on.
+
+        Raises:
+            ValueError: the position or the torque is out of its limits.
+        """
+        if not 0.0 <= position <= CLOSED_POSITION:
+            raise ValueError(f"{self.settings.name}: position {position} rad is outside [0, {CLOSED_POSITION}]")
+        if not 0 <= torque <= TORQUE_MAX:
+            raise ValueError(f"{self.settings.name}: torque {torque} is outside [0, {TORQUE_MAX}]")
+        with self._lock:
+            if self._state.fault:
+                return self._wanted.number + 1
+            if (position, torque) != (self._wanted.position, self._wanted.torque) or self._stop_wanted:
+                self._wanted = Goal(self._wanted.number + 1, position, torque)
+                self._stop_wanted = False
+            return self._wanted.number
+
+    def stop(self) -> None:
+        """Stop the fingers where they are; what they hold they go on holding."""
+        with self._lock:
+            self._stop_wanted = True
+
+    # ---- the gripper's thread ----
+
+    def _run(self) -> None:
+        try:
+            while True:
+                try:
+                    self._connect()
+                    while True:
+                        begun_s = time.monotonic()
+                        self._cycle()
+                        self._wait(max(0.0, self.settings.poll_period_s - (time.monotonic() - begun_s)))
+                except (BusError, GripperError) as error:
+                    self._report(str(error))
+                    self._bus.close()
+                    self._wait(self.settings.reconnect_period_s)
+        except _Ended:
+            self._calm_down()
+        except Exception:
+            LOGGER.exception("%s: unexpected error; the gripper is out of use", self.settings.name)
+            self._report("internal error; see the log")
+        finally:
+            self._bus.close()
+
+    def _calm_down(self) -> None:
+        """Leave the fingers where they are, with a torque that the motor endures without anybody looking after it."""
+        if not self._ready or self._state.fault:
+            return
+        try:
+            position = self._servos.read().position
+            self._grip.stop(position)
+            drive = self._grip.update(position, time.monotonic())
+            self._servos.drive(replace(drive, torque=min(drive.torque, UNWATCHED_TORQUE)))
+        except BusError as error:
+            LOGGER.warning("%s: %s", self.settings.name, error)
+
+    def _wait(self, duration_s: float) -> None:
+        if self._ended.wait(duration_s):
+            raise _Ended
+
+    def _connect(self) -> None:
+        """Open the line, and bring the servos into a known state."""
+        self._bus.open()
+        self._servos.set_up()
+        if not self._servos.calibrated:
+            self._report("calibrating", logging.INFO)
+            self._servos.calibrate()
+            self._follow_anew(self.settings.start_position)
+        elif not self._servos.find_again():
+            self._follow_anew(self._servos.read().position)
+        self._servos.drive(self._grip.update(self._servos.read().position, time.monotonic()))
+
+    def _follow_anew(self, position: float) -> None:
+        """Forget all goals; the new one is `position` [rad]."""
+        with self._lock:
+            goal = Goal(self._wanted.number + 1, min(max(position, 0.0), CLOSED_POSITION), self.settings.start_torque)
+            self._wanted, self._stop_wanted = goal, False
+            self._grip = Grip(self.settings.rules, goal)
+
+    def _cycle(self) -> None:
+        reading, now_s = self._servos.read(), time.monotonic()
+        if reading.errors & MOTOR_FAULTS:
+            self._handle_motor_fault(reading, now_s)
+            return
+        if self._off_since_s is not None:  # the motor has come round, but not its torque limit
+            self._off_since_s = None
+            self._servos.forget()
+            self._follow_anew(reading.position)
+        self._warn_of_heat(reading.temperature)
+        self._take_orders(reading.position, now_s)
+        self._servos.drive(self._grip.update(reading.position, now_s))
+        self._ready |= self._grip.motion is not Motion.MOVING
+        self._publish(reading, now_s, "")
+
+    def _take_orders(self, position: float, time_s: float) -> None:
+        with self._lock:
+            if self._stop_wanted:
+                self._grip.stop(position)
+                self._wanted, self._stop_wanted = self._grip.goal, False
+            elif self._wanted.number != self._grip.goal.number:
+                self._grip.retarget(self._wanted, position, time_s)
+
+    def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
+        """Say it; after a pause give the torque again, where the fingers are."""
+        text = f"{self.settings.name}: {describe_errors(reading.errors, reading.temperature, reading.voltage)}"
+        if self._off_since_s is None:
+            self._off_since_s = now_s
+            LOGGER.error("%s", text)
+        self._publish(reading, now_s, text)
+        if now_s - self._off_since_s >= self.settings.fault_pause_s:
+            self._off_since_s = now_s
+            self._servos.forget()
+            self._servos.drive(Drive(reading.position, self.settings.start_torque))
+
+    def _warn_of_heat(self, temperature: float) -> None:
+        if temperature >= WARM and not self._warm:
+            LOGGER.warning("%s: the motor is at %.0f degrees C, it switches itself off at 80; hold with less torque",
+                           self.settings.name, temperature)
+        self._warm = temperature >= WARM
+
+    def _publish(self, reading: GripperReading, now_s: float, fault: str) -> None:
+        with self._lock:
+            if self._state.fault and not fault:
+                LOGGER.info("%s: in use", self.settings.name)
+            self._state = GripperState(now_s, reading, self._grip.motion, self._grip.goal, self._ready, fault)
+
+    def _report(self, problem: str, level: int = logging.ERROR) -> None:
+        """Publish a fault; log it when it is another one than before."""
+        text = f"{self.settings.name}: {problem}"
+        if text != self._state.fault:
+            LOGGER.log(level, "%s", text)
+        with self._lock:
+            self._state = replace(self._state, stamp_s=time.monotonic(), fault=text)
