@@ -22,10 +22,10 @@ from modular_framework_control.hardware_interface import (
     interface_from_name,
 )
 from modular_framework_control.joint_limits import (
+    EffortJointSaturation,
     JointLimits,
     PositionJointSaturation,
-    SymmetricSaturation,
-    enforce_all,
+    VelocityJointSaturation,
     limits_from_urdf,
     limits_with_parameters,
 )
@@ -119,17 +119,20 @@ def test_a_saturated_position_stays_in_range_and_never_jumps(wanted: list[float]
 def test_after_a_reset_saturation_starts_from_where_the_joint_is() -> None:
     handle = JointHandle(JointStateHandle("bend", 0.0), 0.0)
     saturation = PositionJointSaturation(handle, JointLimits(-1.0, 2.0, 0.5))
-    enforce_all([saturation], 0.1)
+    saturation.enforce_limits(0.1)
     handle.state.position = handle.command = 1.5
     saturation.reset()
-    enforce_all([saturation], 0.1)
+    saturation.enforce_limits(0.1)
     assert handle.command == 1.5
 
 
 @pytest.mark.parametrize(("command", "saturated"), [(5.0, 2.0), (-5.0, -2.0), (1.0, 1.0), (math.nan, 0.0)])
 def test_velocity_and_effort_are_bounded_on_both_sides(command: float, saturated: float) -> None:
     handle = JointHandle(JointStateHandle("bend"), command)
-    SymmetricSaturation(handle, 2.0).enforce_limits(0.1)
+    VelocityJointSaturation(handle, JointLimits(max_velocity=2.0)).enforce_limits(0.1)
+    assert handle.command == saturated
+    handle.command = command
+    EffortJointSaturation(handle, JointLimits(max_effort=2.0)).enforce_limits(0.1)
     assert handle.command == saturated
 
 
@@ -153,7 +156,7 @@ def test_every_built_in_type_can_be_made() -> None:
     types = ControllerTypes()
     assert set(types.names) >= set(BUILT_IN_TYPES)
     for name in BUILT_IN_TYPES:
-        assert type(types.create(name)).__name__.endswith(name.split("/")[1])
+        assert type(types.create(name)).__name__.endswith(name.split("/")[1].removeprefix("Scaled"))
     types.reload()
     with pytest.raises(ControllerError, match="package/Class"):
         types.register("NoSlash", ControllerTypes().create)  # type: ignore[arg-type]

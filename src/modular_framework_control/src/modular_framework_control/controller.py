@@ -59,7 +59,7 @@ class Controller:
         """Called once after the last update before a stop."""
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
-        """Called once when hardware whose joints this controller commands cannot follow: end goals, hold, refuse new ones.
+        """Called once when hardware whose joints it commands cannot follow: end goals, hold, refuse new ones.
 
         `update` goes on being called. A controller that is started meanwhile is told before its first update.
 

@@ -130,7 +130,7 @@ class ControllerManager:
         if faults or self._fault_text:
             text = "; ".join(fault.reason for fault in faults)
             if text and text != self._fault_text:
-                LOGGER.error("hardware fault: %s; controllers of its joints hold and refuse goals until it is over", text)
+                LOGGER.error("hardware fault: %s; controllers of its joints hold until it is over", text)
             elif not text:
                 LOGGER.info("the hardware follows again (it did not for: %s)", self._fault_text)
             self._fault_text = text

@@ -16,6 +16,9 @@ _CLOSED_LOOP = f"{_PACKAGE}.closed_loop_trajectory_controllers"
 _POS_VEL = f"{_PACKAGE}.position_velocity_trajectory_controllers"
 BUILT_IN_TYPES: dict[str, str] = {
     "joint_state_controller/JointStateController": f"{_PACKAGE}.joint_state_controller:JointStateController",
+    "force_torque_sensor_controller/ForceTorqueSensorController":
+        f"{_PACKAGE}.sensor_controllers:ForceTorqueSensorController",
+    "imu_sensor_controller/ImuSensorController": f"{_PACKAGE}.sensor_controllers:ImuSensorController",
     "position_controllers/JointTrajectoryController":
         f"{_PACKAGE}.joint_trajectory_controller:JointTrajectoryController",
     "position_controllers/ScaledJointTrajectoryController":

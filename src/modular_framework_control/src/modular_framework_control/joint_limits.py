@@ -1,107 +1,66 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps joint commands within the limits of the robot, whatever a controller asks for.
 
-Limits come from the robot description and may be replaced, value by value, by parameters `joint_limits/<joint>/...`
-under the names MoveIt and ros_control use.
+A hardware does so first thing in `write`: with one object per command handle (`limit_handle`), or for all its handles
+at once (`JointLimitGuard`). The rules for positions, velocities and efforts, with and without soft limits, are those of
+ros_control's joint_limits_interface.
 """
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
-from modular_framework_control.hardware_interface import JointHandle
-from modular_framework_control.node_handle import NodeHandle, ParameterError, read_bool, read_number
-
-INFINITY = math.inf
-
-
-@dataclass(frozen=True, slots=True)
-class JointLimits:
-    """Limits of one joint; infinite where there is none.
-
-    Attributes:
-        min_position: [rad] or [m].
-        max_position: [rad] or [m].
-        max_velocity: largest absolute velocity [rad/s] or [m/s].
-        max_effort: largest absolute effort [Nm] or [N].
-        continuous: whether the joint turns without end, so that positions 2 pi apart are the same place.
-    """
-
-    min_position: float = -INFINITY
-    max_position: float = INFINITY
-    max_velocity: float = INFINITY
-    max_effort: float = INFINITY
-    continuous: bool = False
+from modular_framework_control.hardware_interface import (
+    EffortJointInterface,
+    HardwareInterface,
+    JointHandle,
+    PosVelAccJointInterface,
+    PosVelJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.joint_limit_parameters import (
+    JointLimits,
+    SoftJointLimits,
+    limits_from_urdf,
+    limits_with_parameters,
+    soft_limits_from_urdf,
+    soft_limits_with_parameters,
+)
+from modular_framework_control.node_handle import NodeHandle
+from modular_framework_control.robot_hw import RobotHW
 
 
-def limits_from_urdf(robot_description: str) -> dict[str, JointLimits]:
-    """Limits of every movable joint of a URDF text.
+class JointLimiter(Protocol):
+    """What keeps the command of one handle within limits."""
 
-    Raises:
-        ParameterError: the text is not XML, or a limit is not a number.
-    """
-    try:
-        root = ElementTree.fromstring(robot_description)
-    except ElementTree.ParseError as error:
-        raise ParameterError(f"robot_description: not well-formed XML ({error})") from error
-    limits: dict[str, JointLimits] = {}
-    for joint in root.findall("joint"):
-        if joint.get("type") in ("revolute", "prismatic", "continuous"):
-            limits[joint.get("name", "")] = _limits_of(joint)
-    return limits
+    handle: Any
 
+    def reset(self) -> None:
+        """Forget the last command, after the joint was moved by other means."""
 
-def _limits_of(joint: ElementTree.Element) -> JointLimits:
-    continuous = joint.get("type") == "continuous"
-    limit = joint.find("limit")
-    if limit is None:
-        return JointLimits(continuous=continuous)
-    try:
-        values = {key: float(limit.get(key, default)) for key, default in
-                  (("lower", "0"), ("upper", "0"), ("velocity", "inf"), ("effort", "inf"))}
-    except ValueError as error:
-        raise ParameterError(f"robot_description: <limit> of joint '{joint.get('name')}': {error}") from error
-    return JointLimits(
-        min_position=-INFINITY if continuous else values["lower"],
-        max_position=INFINITY if continuous else values["upper"],
-        max_velocity=values["velocity"],
-        max_effort=values["effort"],
-        continuous=continuous,
-    )
-
-
-def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) -> JointLimits:
-    """`limits` with what `joint_limits/<name>/` says put in its place.
-
-    Raises:
-        ParameterError: a value of the wrong type.
-    """
-    handle = root_nh.child(f"joint_limits/{name}")
-    if read_bool(handle, "has_position_limits", False):
-        limits = replace(limits, min_position=read_number(handle, "min_position", limits.min_position, None),
-                         max_position=read_number(handle, "max_position", limits.max_position, None))
-    if read_bool(handle, "has_velocity_limits", False):
-        limits = replace(limits, max_velocity=read_number(handle, "max_velocity", limits.max_velocity))
-    if read_bool(handle, "has_effort_limits", False):
-        limits = replace(limits, max_effort=read_number(handle, "max_effort", limits.max_effort))
-    return limits
+    def enforce_limits(self, period_s: float) -> None:
+        """Replace the command by the nearest allowed one; `period_s` [s] is the time since the last call."""
 
 
 class PositionJointSaturation:
     """Saturates position commands: inside the range, and no faster than the velocity limit from one cycle to the next.
 
+    With soft limits the speed towards an end of the soft range is besides at most `k_position` times the way left.
+    It looks at commands, not at measured positions, which lag behind them.
+
     Args:
         handle: the joint.
         limits: its limits.
+        soft: its soft limits, if any.
     """
 
-    __slots__ = ("handle", "limits", "_last_command")
+    __slots__ = ("handle", "limits", "soft", "_last_command")
 
-    def __init__(self, handle: JointHandle, limits: JointLimits) -> None:
+    def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
         self.handle = handle
         self.limits = limits
+        self.soft = soft
         self._last_command = math.nan
 
     def reset(self) -> None:
@@ -114,14 +73,24 @@ class PositionJointSaturation:
         Args:
             period_s: time since the last call [s].
         """
-        limits, handle = self.limits, self.handle
-        last = handle.position if math.isnan(self._last_command) else self._last_command
-        command = last if math.isnan(handle.command) else handle.command
-        reach = limits.max_velocity * period_s if period_s > 0.0 else 0.0
-        if command > last + reach:
-            command = last + reach
-        elif command < last - reach:
-            command = last - reach
+        limits, handle, last = self.limits, self.handle, self._last_command
+        command = handle.command
+        if last != last:
+            last = handle.position
+        if command != command:
+            command = last
+        if period_s <= 0.0:
+            lowest = highest = last
+        elif self.soft is None:
+            reach = limits.max_velocity * period_s
+            lowest, highest = last - reach, last + reach
+        else:
+            slowest, fastest = _soft_velocities(last, limits, self.soft)
+            lowest, highest = last + slowest * period_s, last + fastest * period_s
+        if command > highest:
+            command = highest
+        elif command < lowest:
+            command = lowest
         if command > limits.max_position:
             command = limits.max_position
         elif command < limits.min_position:
@@ -130,28 +99,176 @@ class PositionJointSaturation:
         handle.command = command
 
 
-class SymmetricSaturation:
-    """Saturates a velocity or effort command to a largest absolute value; not a number becomes 0.
+class PosVelJointSaturation(PositionJointSaturation):
+    """Saturates positions as above, and the velocities (and accelerations) commanded with them to their largest."""
+
+    __slots__ = ()
+
+    def enforce_limits(self, period_s: float) -> None:
+        super().enforce_limits(period_s)
+        handle: Any = self.handle
+        handle.command_velocity = _clamped(handle.command_velocity, self.limits.max_velocity)
+        if hasattr(handle, "command_acceleration"):
+            handle.command_acceleration = _clamped(handle.command_acceleration, self.limits.max_acceleration)
+
+
+class VelocityJointSaturation:
+    """Saturates velocity commands: largest velocity, largest change of the measured velocity; only the way back at an
+    end of the range. With soft limits at most `k_position` times the way left. Not a number becomes 0.
 
     Args:
         handle: the joint.
-        bound: largest absolute command, in the unit of the command.
+        limits: its limits.
+        soft: its soft limits, if any.
     """
 
-    __slots__ = ("handle", "bound")
+    __slots__ = ("handle", "limits", "soft")
 
-    def __init__(self, handle: JointHandle, bound: float) -> None:
+    def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
         self.handle = handle
-        self.bound = bound
+        self.limits = limits
+        self.soft = soft
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def enforce_limits(self, period_s: float) -> None:
+        """Replace `handle.command` by the nearest allowed one."""
+        limits, handle = self.limits, self.handle
+        state = handle.state
+        position = state.position
+        if self.soft is None:
+            lowest, highest = -limits.max_velocity, limits.max_velocity
+        else:
+            lowest, highest = _soft_velocities(position, limits, self.soft)
+        if limits.max_acceleration < math.inf:
+            change = limits.max_acceleration * max(0.0, period_s)
+            lowest, highest = max(lowest, state.velocity - change), min(highest, state.velocity + change)
+        if position >= limits.max_position:
+            highest = min(highest, 0.0)
+        if position <= limits.min_position:
+            lowest = max(lowest, 0.0)
+        command = handle.command
+        if command != command:
+            command = 0.0
+        handle.command = max(lowest, min(highest, command))
+
+
+class EffortJointSaturation:
+    """Saturates effort commands: largest effort; none that drives a joint further out of its range or beyond its
+    largest velocity. With soft limits at most `k_velocity` times what is left to the velocity that is allowed there.
+    Not a number becomes 0.
+
+    Args:
+        handle: the joint.
+        limits: its limits.
+        soft: its soft limits, if any.
+    """
+
+    __slots__ = ("handle", "limits", "soft")
+
+    def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
+        self.handle = handle
+        self.limits = limits
+        self.soft = soft
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
 
     def enforce_limits(self, period_s: float) -> None:
         """Replace `handle.command` by the nearest allowed one."""
         del period_s
-        command = 0.0 if math.isnan(self.handle.command) else self.handle.command
-        self.handle.command = max(-self.bound, min(self.bound, command))
+        limits, handle = self.limits, self.handle
+        position, velocity = handle.state.position, handle.state.velocity
+        lowest, highest = -limits.max_effort, limits.max_effort
+        if self.soft is not None:
+            slowest, fastest = _soft_velocities(position, limits, self.soft)
+            if slowest > -math.inf:
+                lowest = _clamped(self.soft.k_velocity * (slowest - velocity), limits.max_effort)
+            if fastest < math.inf:
+                highest = _clamped(self.soft.k_velocity * (fastest - velocity), limits.max_effort)
+        if position < limits.min_position or velocity < -limits.max_velocity:
+            lowest = max(lowest, 0.0)
+        if position > limits.max_position or velocity > limits.max_velocity:
+            highest = min(highest, 0.0)
+        command = handle.command
+        if command != command:
+            command = 0.0
+        handle.command = max(lowest, min(highest, command))
 
 
-def enforce_all(saturations: Iterable[PositionJointSaturation | SymmetricSaturation], period_s: float) -> None:
-    """Saturate every command; called by a RobotHW at the start of `write`."""
-    for saturation in saturations:
-        saturation.enforce_limits(period_s)
+def _clamped(value: float, bound: float) -> float:
+    """`value` within `bound` on both sides of 0; 0 when it is not a number."""
+    return max(-bound, min(bound, value)) if value == value else 0.0
+
+
+def _soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
+    """Smallest and largest velocity allowed at `position`."""
+    largest = limits.max_velocity
+    lowest = -largest if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
+    highest = largest if soft.max_position == math.inf else soft.k_position * (soft.max_position - position)
+    return max(-largest, min(largest, lowest)), max(-largest, min(largest, highest))
+
+
+def limit_handle(interface_class: type[HardwareInterface[Any]], handle: JointHandle, limits: JointLimits,
+                 soft_limits: SoftJointLimits | None = None) -> JointLimiter:
+    """What keeps the commands of a handle within limits, by what the handle commands.
+
+    Args:
+        interface_class: interface the handle belongs to.
+        handle: the joint.
+        limits: its limits.
+        soft_limits: its soft limits, if any.
+    """
+    if issubclass(interface_class, VelocityJointInterface):
+        return VelocityJointSaturation(handle, limits, soft_limits)
+    if issubclass(interface_class, EffortJointInterface):
+        return EffortJointSaturation(handle, limits, soft_limits)
+    if issubclass(interface_class, (PosVelJointInterface, PosVelAccJointInterface)):
+        return PosVelJointSaturation(handle, limits, soft_limits)
+    return PositionJointSaturation(handle, limits, soft_limits)
+
+
+class JointLimitGuard:
+    """Keeps all commands of a hardware within the limits of `robot_description` and of `joint_limits/<joint>/...`.
+
+    Args:
+        robot_hw: hardware whose command interfaces are registered.
+        root_nh: where `robot_description` and `joint_limits` are found, if they are there.
+
+    Attributes:
+        limits: limits by joint name, of every joint that can be commanded.
+
+    Raises:
+        ParameterError: a limit makes no sense; says which parameter.
+    """
+
+    def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle) -> None:
+        description = root_nh.get_param("robot_description")
+        known = limits_from_urdf(description) if isinstance(description, str) else {}
+        soft = soft_limits_from_urdf(description) if isinstance(description, str) else {}
+        self.limits: dict[str, JointLimits] = {}
+        self._limiters: list[JointLimiter] = []
+        for interface in robot_hw.interfaces:
+            for handle in interface.handles if interface.claims_resources else ():
+                name = handle.name
+                self.limits[name] = limits_with_parameters(name, known.get(name, JointLimits()), root_nh)
+                self._limiters.append(limit_handle(type(interface), handle, self.limits[name],
+                                                   soft_limits_with_parameters(name, soft.get(name), root_nh)))
+
+    def enforce(self, period_s: float) -> None:
+        """Replace every command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+        for limiter in self._limiters:
+            limiter.enforce_limits(period_s)
+
+    def reset(self, joints: Iterable[str] | None = None) -> None:
+        """Forget the last commands (of these joints), after they were moved by other means."""
+        names = self.limits.keys() if joints is None else set(joints)
+        for limiter in self._limiters:
+            if limiter.handle.name in names:
+                limiter.reset()
+
+
+__all__ = ["EffortJointSaturation", "JointLimitGuard", "JointLimiter", "JointLimits", "PosVelJointSaturation",
+           "PositionJointSaturation", "SoftJointLimits", "VelocityJointSaturation", "limit_handle", "limits_from_urdf",
+           "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters"]

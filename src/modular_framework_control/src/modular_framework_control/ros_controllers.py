@@ -34,6 +34,8 @@ from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
 from modular_framework_control.ros_command_edges import JointCommandEdge
 from modular_framework_control.ros_outbox import Outbox
+from modular_framework_control.ros_sensor_edges import SensorEdge
+from modular_framework_control.sensor_controllers import SensorController
 from modular_framework_control.trajectory_goal import (
     GoalRejectedError,
     TrajectoryErrorCode,
@@ -147,6 +149,7 @@ _EDGES: tuple[tuple[type[Controller], Any], ...] = (
     (JointTrajectoryController, JointTrajectoryEdge),
     (GripperActionController, GripperEdge),
     (JointCommandController, JointCommandEdge),
+    (SensorController, SensorEdge),
 )
 
 

@@ -7,7 +7,6 @@ Which interfaces a joint offers is read from the transmissions of the robot desc
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TypeAlias
 
 from modular_framework_control.hardware_interface import (
     ControllerInfo,
@@ -20,23 +19,25 @@ from modular_framework_control.hardware_interface import (
     interface_from_name,
 )
 from modular_framework_control.joint_limits import (
+    JointLimiter,
     JointLimits,
-    PositionJointSaturation,
-    SymmetricSaturation,
+    SoftJointLimits,
+    limit_handle,
     limits_with_parameters,
+    soft_limits_from_urdf,
+    soft_limits_with_parameters,
 )
 from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_simulation.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.robot_description import RobotJoint
 
-_MODES = {
-    PositionJointInterface.type_name: Mode.POSITION,
-    VelocityJointInterface.type_name: Mode.VELOCITY,
-    EffortJointInterface.type_name: Mode.EFFORT,
+_INTERFACES = {
+    Mode.POSITION: PositionJointInterface,
+    Mode.VELOCITY: VelocityJointInterface,
+    Mode.EFFORT: EffortJointInterface,
 }
-
-Saturation: TypeAlias = PositionJointSaturation | SymmetricSaturation
+_MODES = {interface.type_name: mode for mode, interface in _INTERFACES.items()}
 
 
 class PyBulletRobotHW(RobotHW):
@@ -53,7 +54,7 @@ class PyBulletRobotHW(RobotHW):
         self._robot = robot
         self._states: list[JointStateHandle] = []
         self._handles: dict[str, dict[Mode, JointHandle]] = {}
-        self._saturations: dict[str, dict[Mode, Saturation]] = {}
+        self._saturations: dict[str, dict[Mode, JointLimiter]] = {}
         self._drives: dict[str, Drive] = {}
         self._efforts: dict[str, float] = {}
 
@@ -61,7 +62,7 @@ class PyBulletRobotHW(RobotHW):
         """Registers a state handle for every movable joint and command handles as the transmissions say.
 
         Args:
-            root_nh: Read for `joint_limits/<joint>/...`.
+            root_nh: Read for `joint_limits/<joint>/...` and the soft limits of `robot_description`.
             robot_hw_nh: Not read.
 
         Raises:
@@ -70,12 +71,10 @@ class PyBulletRobotHW(RobotHW):
         """
         del robot_hw_nh
         states = JointStateInterface()
-        commands = {
-            Mode.POSITION: PositionJointInterface(),
-            Mode.VELOCITY: VelocityJointInterface(),
-            Mode.EFFORT: EffortJointInterface(),
-        }
+        commands = {mode: interface_class() for mode, interface_class in _INTERFACES.items()}
         joints = {joint.name: joint for joint in self._robot.description.joints}
+        text = root_nh.get_param("robot_description")
+        soft = soft_limits_from_urdf(text) if isinstance(text, str) else {}
         for name in self._robot.joint_names:
             state = states.register_handle(JointStateHandle(name))
             self._states.append(state)
@@ -84,7 +83,8 @@ class PyBulletRobotHW(RobotHW):
                 handle = JointHandle(state, supports_max_effort=True)
                 commands[mode].register_handle(handle)
                 limits = limits_with_parameters(name, _limits(joints[name]), root_nh)
-                self._add_command(name, mode, handle, limits)
+                soft_limits = soft_limits_with_parameters(name, soft.get(name), root_nh)
+                self._add_command(mode, handle, limits, soft_limits)
         self.register_interface(states)
         for interface_object in commands.values():
             if interface_object.names:
@@ -93,18 +93,11 @@ class PyBulletRobotHW(RobotHW):
         self.hold()
         return True
 
-    def _add_command(self, name: str, mode: Mode, handle: JointHandle, limits: JointLimits) -> None:
-        self._handles.setdefault(name, {})[mode] = handle
-        self._efforts[name] = limits.max_effort
-        saturation: Saturation
-        match mode:
-            case Mode.POSITION:
-                saturation = PositionJointSaturation(handle, limits)
-            case Mode.VELOCITY:
-                saturation = SymmetricSaturation(handle, limits.max_velocity)
-            case Mode.EFFORT:
-                saturation = SymmetricSaturation(handle, limits.max_effort)
-        self._saturations.setdefault(name, {})[mode] = saturation
+    def _add_command(self, mode: Mode, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None) -> None:
+        self._handles.setdefault(handle.name, {})[mode] = handle
+        self._efforts[handle.name] = limits.max_effort
+        limiter = limit_handle(_INTERFACES[mode], handle, limits, soft)
+        self._saturations.setdefault(handle.name, {})[mode] = limiter
 
     def hold(self) -> None:
         """Makes the present positions the commands; to be called after the robot was put somewhere."""
@@ -112,9 +105,7 @@ class PyBulletRobotHW(RobotHW):
             position = next(iter(handles.values())).position
             for mode, handle in handles.items():
                 handle.command = position if mode is Mode.POSITION else 0.0
-                saturation = self._saturations[name][mode]
-                if isinstance(saturation, PositionJointSaturation):
-                    saturation.reset()
+                self._saturations[name][mode].reset()
             first = self._drives[name].mode if name in self._drives else next(iter(handles))
             self._drives[name] = Drive(first, handles[first].command, 0.0, self._efforts[name])
             if first is Mode.POSITION:
@@ -148,13 +139,11 @@ class PyBulletRobotHW(RobotHW):
             for name in joints:
                 handle = self._handles[name][mode]
                 handle.command = handle.position if mode is Mode.POSITION else 0.0
-                saturation = self._saturations[name][mode]
-                if isinstance(saturation, PositionJointSaturation):
-                    if self._drives[name].mode is Mode.POSITION:
-                        # The drive keeps its set point: a loaded joint sags a little below it.
-                        handle.command = self._drives[name].command
-                    else:
-                        saturation.reset()
+                if mode is Mode.POSITION and self._drives[name].mode is Mode.POSITION:
+                    # The drive keeps its set point: a loaded joint sags a little below it.
+                    handle.command = self._drives[name].command
+                else:
+                    self._saturations[name][mode].reset()
                 self._drives[name] = Drive(mode, handle.command, 0.0, self._efforts[name])
 
 

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whatever a controller commands, the hardware gets what the limits allow: hard and soft, by parameter and by URDF."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modular_framework_control.hardware_interface import (
+    JointHandle,
+    JointStateHandle,
+    PositionJointInterface,
+    PosVelAccJointHandle,
+    PosVelAccJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.joint_limits import (
+    EffortJointSaturation,
+    JointLimitGuard,
+    JointLimits,
+    PositionJointSaturation,
+    SoftJointLimits,
+    VelocityJointSaturation,
+    limit_handle,
+    limits_with_parameters,
+    soft_limits_from_urdf,
+    soft_limits_with_parameters,
+)
+from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
+
+LIMITS = JointLimits(-1.0, 1.0, 2.0, 5.0)
+SOFT = SoftJointLimits(-0.8, 0.8, 10.0, 4.0)
+URDF = """<robot name="r">
+<joint name="j" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="5"/>
+  <safety_controller soft_lower_limit="-0.8" soft_upper_limit="0.8" k_position="10" k_velocity="4"/></joint>
+<joint name="wheel" type="continuous"><limit velocity="2" effort="5"/>
+  <safety_controller k_velocity="4"/></joint></robot>"""
+
+
+def handle(position: float = 0.0, velocity: float = 0.0, command: float = 0.0) -> JointHandle:
+    return JointHandle(JointStateHandle("j", position, velocity), command)
+
+
+@given(st.lists(st.floats(), min_size=1, max_size=40), st.floats(-0.8, 0.8))
+def test_positions_near_a_soft_end_slow_down_and_never_pass_it(wanted: list[float], start: float) -> None:
+    joint = handle(start)
+    limiter = PositionJointSaturation(joint, LIMITS, SOFT)
+    last = start
+    for joint.command in wanted:
+        limiter.enforce_limits(0.01)
+        way = joint.command - last
+        left = SOFT.max_position - last if way > 0.0 else last - SOFT.min_position
+        assert abs(way) <= min(LIMITS.max_velocity, SOFT.k_position * left) * 0.01 + 1e-12
+        last = joint.command
+
+
+def test_a_joint_beyond_its_soft_end_is_led_back_at_once() -> None:
+    joint = handle(0.9, command=0.9)
+    PositionJointSaturation(joint, LIMITS, SOFT).enforce_limits(0.01)
+    assert joint.command == pytest.approx(0.9 - 10.0 * 0.1 * 0.01)
+
+
+@pytest.mark.parametrize(("position", "velocity", "command", "expected"), [
+    (0.0, 0.0, 9.0, 2.0), (0.0, 0.0, -9.0, -2.0), (0.75, 0.0, 9.0, 0.5), (0.85, 0.0, 9.0, -0.5),
+    (-0.75, 0.0, -9.0, -0.5), (0.0, 0.0, math.nan, 0.0)])
+def test_velocities_near_a_soft_end_shrink(position: float, velocity: float, command: float, expected: float) -> None:
+    joint = handle(position, velocity, command)
+    VelocityJointSaturation(joint, LIMITS, SOFT).enforce_limits(0.01)
+    assert joint.command == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("position", "velocity", "command", "expected"), [
+    (0.0, 0.0, 9.0, 0.1), (0.0, 0.5, 9.0, 0.6), (0.0, 0.5, -9.0, 0.4), (0.0, 1.95, 9.0, 2.0), (1.0, 0.0, 9.0, 0.0),
+    (-1.1, 0.0, -9.0, 0.0), (1.0, 0.0, -9.0, -0.1)])
+def test_velocities_change_no_faster_than_the_acceleration_allows_and_stop_at_the_ends(
+        position: float, velocity: float, command: float, expected: float) -> None:
+    joint = handle(position, velocity, command)
+    VelocityJointSaturation(joint, JointLimits(-1.0, 1.0, 2.0, max_acceleration=10.0)).enforce_limits(0.01)
+    assert joint.command == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("position", "velocity", "command", "soft", "expected"), [
+    (0.0, 0.0, 9.0, None, 5.0), (1.01, 0.0, 9.0, None, 0.0), (1.01, 0.0, -9.0, None, -5.0),
+    (-1.01, 0.0, -9.0, None, 0.0),
+    (0.0, 2.1, 9.0, None, 0.0), (0.0, -2.1, -9.0, None, 0.0), (0.0, 2.1, -9.0, None, -5.0),
+    (0.0, 0.0, math.nan, None, 0.0),
+    (0.0, 0.0, 9.0, SOFT, 5.0), (0.0, 1.5, 9.0, SOFT, 2.0), (0.75, 0.0, 9.0, SOFT, 2.0), (0.8, 0.5, 9.0, SOFT, -2.0)])
+def test_efforts_drive_no_joint_out_of_its_range_or_speed(position: float, velocity: float, command: float,
+                                                          soft: SoftJointLimits | None, expected: float) -> None:
+    joint = handle(position, velocity, command)
+    EffortJointSaturation(joint, LIMITS, soft).enforce_limits(0.01)
+    assert joint.command == pytest.approx(expected)
+
+
+def test_velocity_and_acceleration_beside_a_position_are_bounded_too() -> None:
+    joint = PosVelAccJointHandle(JointStateHandle("j"), 9.0)
+    joint.command_velocity, joint.command_acceleration = -9.0, math.nan
+    limiter = limit_handle(PosVelAccJointInterface, joint, JointLimits(-1.0, 1.0, 2.0, max_acceleration=3.0))
+    limiter.enforce_limits(0.1)
+    assert (joint.command, joint.command_velocity, joint.command_acceleration) == (0.2, -2.0, 0.0)
+
+
+def test_soft_limits_are_read_from_the_description_and_replaced_as_a_whole_by_parameters() -> None:
+    known = soft_limits_from_urdf(URDF)
+    assert known["j"] == SOFT
+    assert (known["wheel"].min_position, known["wheel"].max_position) == (-math.inf, math.inf)
+    values = {"soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 1.0, "k_velocity": 2.0}
+    root = MappingNodeHandle({"joint_limits": {"j": values}})
+    assert soft_limits_with_parameters("j", SOFT, root) == SoftJointLimits(-0.5, 0.5, 1.0, 2.0)
+    assert soft_limits_with_parameters("other", SOFT, root) == SOFT
+    assert soft_limits_with_parameters("other", None, root) is None
+
+
+def test_a_limit_said_to_be_absent_is_removed() -> None:
+    root = MappingNodeHandle({"joint_limits": {"j": {
+        "has_position_limits": False, "angle_wraparound": True, "has_velocity_limits": False,
+        "has_effort_limits": False,
+        "has_acceleration_limits": True, "max_acceleration": 3.0, "has_jerk_limits": True, "max_jerk": 9.0}}})
+    assert limits_with_parameters("j", LIMITS, root) == JointLimits(continuous=True, max_acceleration=3.0)
+
+
+@pytest.mark.parametrize(("values", "words"), [
+    ({"has_position_limits": True, "min_position": 2.0, "max_position": 1.0}, "must not exceed"),
+    ({"has_position_limits": "yes"}, "/joint_limits/j/has_position_limits: got 'yes'"),
+    ({"has_velocity_limits": True, "max_velocity": -1.0}, "/joint_limits/j/max_velocity: got -1.0"),
+    ({"k_position": 1.0}, "only k_position are set"),
+    ({"soft_lower_limit": 1.0, "soft_upper_limit": 1.0, "k_position": 1.0, "k_velocity": 1.0}, "must be below"),
+])
+def test_limits_that_make_no_sense_refuse_the_hardware(values: dict[str, Any], words: str,
+                                                       caplog: pytest.LogCaptureFixture) -> None:
+    root = MappingNodeHandle({"joint_limits": {"j": values}, "hw": {"joints": ["j"]}})
+    assert MockRobotHW().init(root, root.child("hw")) is False
+    assert words in caplog.text
+
+
+def test_a_number_of_the_description_that_is_none_is_named() -> None:
+    with pytest.raises(ParameterError, match="<safety_controller> of joint 'j': k_position"):
+        soft_limits_from_urdf(URDF.replace('k_position="10"', 'k_position="ten"'))
+
+
+@pytest.mark.parametrize(("interface", "controller", "command"), [
+    ("PositionJointInterface", "position_controllers/JointPositionController", 9.0),
+    ("VelocityJointInterface", "velocity_controllers/JointVelocityController", 9.0),
+    ("EffortJointInterface", "effort_controllers/JointEffortController", 9.0)])
+def test_between_controller_and_hardware_the_limits_hold(make_loop: Callable[..., Any], interface: str, controller: str,
+                                                         command: float) -> None:
+    loop = make_loop({"robot_description": URDF, "hw": {"joints": ["j"], "command_interface": interface},
+                      "c": {"type": controller, "joint": "j"}})
+    loop.spawn("c")
+    loop.controllers["c"].submit([command])
+    joint = loop.robot_hw.interfaces[1].handles[0]
+    fastest = 0.0
+    for _ in range(500):
+        loop.step()
+        fastest = max(fastest, abs(joint.velocity))
+        if interface == "EffortJointInterface":  # a body that brakes with at most 5 overshoots the soft end
+            assert joint.position <= 1.0 and abs(joint.command) <= 5.0
+        else:
+            assert joint.position <= 0.8 + 1e-2
+    assert joint.position == pytest.approx(0.8, abs=1e-2)
+    assert 1.0 < fastest <= 2.0 + 5.0 * 0.01 + 1e-9
+
+
+def test_a_guard_forgets_the_joints_it_is_told_to_forget() -> None:
+    robot_hw = MockRobotHW()
+    root = MappingNodeHandle({"hw": {"joints": ["a", "b"]}, "joint_limits": {
+        name: {"has_velocity_limits": True, "max_velocity": 1.0} for name in ("a", "b")}})
+    assert robot_hw.init(root, root.child("hw"))
+    guard = JointLimitGuard(robot_hw, root)
+    handles = robot_hw.get(PositionJointInterface).handles
+    guard.enforce(0.1)
+    for joint in handles:
+        joint.state.position = joint.command = 3.0
+    guard.reset(["a"])
+    guard.enforce(0.1)
+    assert [joint.command for joint in handles] == [3.0, 0.1]
+    assert limit_handle(VelocityJointInterface, handles[0], LIMITS).handle is handles[0]
