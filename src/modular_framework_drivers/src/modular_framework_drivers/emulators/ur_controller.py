@@ -8,13 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
-from modular_framework_drivers.emulators.ur_motion import (
-    JOINTS,
-    MAX_SERVO_ERROR,
-    ArmMotion,
-    Drive,
-    Order,
-)
+from modular_framework_drivers.emulators.ur_motion import MAX_SERVO_ERROR, ArmMotion, Drive, Order
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 REGISTERS = 48
@@ -126,7 +120,7 @@ class UrController:
 
     @property
     def speed_scaling(self) -> float:
-        """Share of the program's pace at which the arm moves, beside the slider: 1, or 0 while the program is paused."""
+        """Share of its pace at which the program moves the arm, beside the slider: 1, or 0 while it is paused."""
         return 0.0 if self.runtime_state is RuntimeState.PAUSED else 1.0
 
     @property

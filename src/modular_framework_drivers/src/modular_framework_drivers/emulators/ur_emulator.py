@@ -205,7 +205,7 @@ class UrEmulator:
     def order_log(self, path: str) -> None:
         """Write every commanded position to this file: wall time [s], controller time [s], commanded q, actual q."""
         self._end_log()
-        self._log = open(path, "w", encoding="utf-8")
+        self._log = open(path, "w", encoding="utf-8")  # noqa: SIM115  closed by _end_log
         self._log.write("wall_s,controller_s," + ",".join(f"{kind}_{joint}" for kind in ("command", "actual")
                                                            for joint in range(JOINTS)) + "\n")
         self.controller.on_command = self._write_log

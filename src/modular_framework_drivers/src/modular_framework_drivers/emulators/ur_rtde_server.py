@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from modular_framework_drivers.emulators.ur_controller import REGISTERS, UrController
 from modular_framework_drivers.emulators.ur_motion import flange_pose
@@ -118,9 +119,9 @@ def _getter(values: Sequence[float], index: int) -> Callable[[], Value]:
     return lambda: values[index]
 
 
-def _setter(values: list[float], index: int) -> Callable[[Value], None]:
+def _setter(values: list[Any], index: int) -> Callable[[Value], None]:
     def set_value(value: Value) -> None:
-        values[index] = value  # type: ignore[call-overload]
+        values[index] = value
 
     return set_value
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from modular_framework_drivers.ur.arm_messages import FAILED, READY, STATE, ArmState, servo_message
+from modular_framework_drivers.ur.arm_modes import robot_fault
 from modular_framework_drivers.ur.child_process import ChildProcess
 
 LOGGER = logging.getLogger("rosout.ur_arm")
@@ -42,7 +43,7 @@ class LinkSettings:
     """
 
     address: str
-    timeout_s: float = 0.15
+    timeout_s: float = 0.12
     speed_scale: float | None = None
     payload_kg: float = 0.0
     payload_centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -189,10 +190,11 @@ class RtdeLink:
 
     def _keep_program(self, now_s: float) -> None:
         wanted = self._program_wanted and not self.lost
+        possible = self.state is not None and not robot_fault(self.state, self._settings.address)
         if self._control is not None and (not wanted or self._control.ended):
             process, self._control = self._control, None
             process.end()
-        elif self._control is None and wanted:
+        elif self._control is None and wanted and possible:
             settings = self._settings
             scale = [] if settings.speed_scale is None else ["--speed-scale", str(settings.speed_scale)]
             self._control = self._start("control", [

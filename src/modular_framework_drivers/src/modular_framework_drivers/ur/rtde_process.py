@@ -8,6 +8,7 @@ and ends, or is ended; whoever started it starts the next. It also ends, and sto
 from __future__ import annotations
 
 import argparse
+import contextlib
 import signal
 import socket
 import sys
@@ -71,10 +72,8 @@ def _send(channel: socket.socket, message: bytes) -> None:
     Raises:
         BrokenPipeError: the control loop is gone.
     """
-    try:
+    with contextlib.suppress(BlockingIOError):
         channel.send(message)
-    except BlockingIOError:
-        pass
 
 
 def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
@@ -129,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("role", choices=("state", "control"))
     parser.add_argument("channel", type=int, help="file descriptor of the socket to the control loop")
     parser.add_argument("address")
-    parser.add_argument("--timeout", type=float, default=0.15)
+    parser.add_argument("--timeout", type=float, default=0.12)
     parser.add_argument("--speed-scale", type=float)
     parser.add_argument("--payload", type=float, default=0.0)
     parser.add_argument("--payload-centre", type=float, nargs=3, default=[0.0, 0.0, 0.0])

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the parameters of an arm of Universal Robots and checks them."""
+from __future__ import annotations
+
+import math
+
+from modular_framework_control.joint_limit_parameters import JointLimits, limits_from_urdf, limits_with_parameters
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_number
+from modular_framework_drivers.ur.command_check import MotionLimits
+from modular_framework_drivers.ur.rtde_link import LinkSettings
+
+_UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, math.pi)
+_MAX_ACCELERATION = 40.0          # the most URScript accepts of a joint [rad/s^2]
+
+
+def read_prefix(nh: NodeHandle) -> str:
+    """What the joint names begin with: `robot_id` and an underscore, or nothing.
+
+    Raises:
+        ParameterError: it is no text.
+    """
+    robot_id = nh.get_param("robot_id", "")
+    if not isinstance(robot_id, str):
+        raise ParameterError(f"parameter {join_names(nh.namespace, 'robot_id')}: got {robot_id!r}; expected a text")
+    return f"{robot_id}_" if robot_id else ""
+
+
+def read_link_settings(nh: NodeHandle) -> LinkSettings:
+    """How to reach the arm, from the parameters below `nh`.
+
+    Raises:
+        ParameterError: something is missing or not allowed.
+    """
+    address = nh.get_param("robot_ip_address")
+    if not isinstance(address, str) or not address:
+        raise ParameterError(f"parameter {join_names(nh.namespace, 'robot_ip_address')}: got {address!r}; expected the "
+                             "address of the arm's controller, for example 192.168.56.101")
+    scale = _read_bounded(nh, "speed_scale", 1.0, 0.0, 1.0) if nh.has_param("speed_scale") else None
+    return LinkSettings(address, read_number(nh, "link_timeout", 0.12, 0.02), scale,
+                        read_number(nh, "payload_mass_kg", 0.0), _read_centre(nh),
+                        _read_bounded(nh, "servoj_lookahead_time", 0.03, 0.03, 0.2),
+                        _read_bounded(nh, "servoj_gain", 2000.0, 100.0, 2000.0))
+
+
+def _read_bounded(nh: NodeHandle, key: str, default: float, low: float, high: float) -> float:
+    value = read_number(nh, key, default, low)
+    if value > high:
+        raise ParameterError(f"parameter {join_names(nh.namespace, key)}: got {value:g}; expected {low:g} to {high:g}")
+    return value
+
+
+def _read_centre(nh: NodeHandle) -> tuple[float, float, float]:
+    value = nh.get_param("payload_center_of_mass_m", [0.0, 0.0, 0.0])
+    numbers = [float(number) for number in value if isinstance(number, (int, float))] if isinstance(value, list) else []
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise ParameterError(f"parameter {join_names(nh.namespace, 'payload_center_of_mass_m')}: got {value!r}; "
+                             "expected three numbers [m]")
+    return numbers[0], numbers[1], numbers[2]
+
+
+def read_motion_limits(names: list[str], root_nh: NodeHandle) -> list[MotionLimits]:
+    """Limits of the joints, from the robot description, `joint_limits` and what the arm can do at most.
+
+    Raises:
+        ParameterError: a limit is not allowed.
+    """
+    description = root_nh.get_param("robot_description")
+    known = limits_from_urdf(description) if isinstance(description, str) else {}
+    limits = []
+    for name in names:
+        limit = limits_with_parameters(name, known.get(name, _UR_LIMITS), root_nh)
+        acceleration = _MAX_ACCELERATION
+        if root_nh.get_param(f"joint_limits/{name}/has_acceleration_limits", False):
+            acceleration = read_number(root_nh, f"joint_limits/{name}/max_acceleration", _MAX_ACCELERATION)
+        limits.append(MotionLimits(name, limit.min_position, limit.max_position, min(limit.max_velocity, math.pi),
+                                   acceleration))
+    return limits
