@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An EZGripper as hardware for controllers, alone or beside an arm in a combination."""
+from __future__ import annotations
+
+import logging
+import time
+
+from modular_framework_control.hardware_interface import (
+    JointHandle,
+    JointStateHandle,
+    JointStateInterface,
+    PositionJointInterface,
+)
+from modular_framework_control.joint_limits import JointLimitGuard
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+from modular_framework_control.robot_hw import RobotHW
+from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
+from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
+from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
+from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
+
+LOGGER = logging.getLogger("rosout.ezgripper_robot_hw")
+JOINT = "ezgripper_knuckle_palm_L1_1"
+READY_POLL_S = 0.02
+
+
+class EzGripperRobotHW(RobotHW):
+    """modular_framework_drivers/EzGripperRobotHW: one joint, commanded by position, its effort bounded on request.
+
+    `init` calibrates the gripper, which closes it and then brings it to its start position. A fault of the link or of
+    the motor is `fault()`; the gripper comes back by itself and then stands still until it is commanded.
+
+    Parameters, below its name: `joint` ezgripper_knuckle_palm_L1_1; `port_name`, `baudrate` 57600, `servo_ids` [1],
+    `manipulator_name` EzGripper (these four are looked for in the root namespace when it has no `port_name`);
+    `full_effort` [Nm] 1.0: effort of the joint at full torque; `startup_timeout` [s] 30; `poll_rate` [1/s] 50,
+    `start_position` [rad] 0, `hold_torque` [0 to 1023] 400, `position_tolerance` [rad] 0.03, `stall_time` [s] 0.25.
+    Limits come from `robot_description` and from `joint_limits`, when they are there.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._gripper: EzGripper | None = None
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        where = join_names(robot_hw_nh.namespace, "")
+        try:
+            joint = read_names(robot_hw_nh, "joint")[0] if robot_hw_nh.has_param("joint") else JOINT
+            connection = robot_hw_nh if robot_hw_nh.has_param("port_name") else root_nh
+            settings = read_gripper_settings(connection, robot_hw_nh)
+            self._full_effort = read_number(robot_hw_nh, "full_effort", 1.0, 0.001)
+            timeout_s = read_number(robot_hw_nh, "startup_timeout", 30.0)
+            self._register(joint, root_nh)
+        except ParameterError as error:
+            LOGGER.error("%s in %s: %s", type(self).__name__, where, error)
+            return False
+        self._default_torque = settings.rules.hold_torque
+        self._gripper = EzGripper(settings)
+        self._gripper.start()
+        if not self._wait_until_ready(self._gripper, timeout_s):
+            LOGGER.error("%s in %s: not ready within %g s: %s", type(self).__name__, where, timeout_s,
+                         self._gripper.state().fault or "it has not come to its start position")
+            self.close()
+            return False
+        self.read(0.0, 0.0)
+        self._handle.command = self._handle.position
+        return True
+
+    def _register(self, joint: str, root_nh: NodeHandle) -> None:
+        states, commands = JointStateInterface(), PositionJointInterface()
+        state = states.register_handle(JointStateHandle(joint))
+        self._handle = commands.register_handle(JointHandle(state, 0.0, supports_max_effort=True))
+        self.register_interface(states)
+        self.register_interface(commands)
+        self._guard = JointLimitGuard(self, root_nh)
+
+    @staticmethod
+    def _wait_until_ready(gripper: EzGripper, timeout_s: float) -> bool:
+        end_s = time.monotonic() + timeout_s
+        while not gripper.state().ready:
+            if time.monotonic() > end_s:
+                return False
+            time.sleep(READY_POLL_S)
+        return True
+
+    def read(self, time_s: float, period_s: float) -> None:
+        if self._gripper is None:
+            return
+        state, joint = self._gripper.state(), self._handle.state
+        joint.position, joint.velocity = state.reading.position, state.reading.velocity
+        joint.effort = state.reading.load * TORQUE_MAX / FULL_TORQUE * self._full_effort
+        if state.fault:
+            self._handle.command = joint.position
+            self._guard.reset()
+
+    def write(self, time_s: float, period_s: float) -> None:
+        if self._gripper is None:
+            return
+        self._guard.enforce(period_s)
+        position = min(max(self._handle.command, 0.0), CLOSED_POSITION)
+        self._gripper.command(position, self._torque())
+
+    def _torque(self) -> int:
+        """The greatest torque the controller allows [units of the servo]."""
+        if self._handle.max_effort <= 0.0:
+            return self._default_torque
+        return min(FULL_TORQUE, round(self._handle.max_effort / self._full_effort * FULL_TORQUE))
+
+    def fault(self) -> str:
+        return self._gripper.state().fault if self._gripper is not None else ""
+
+    def close(self) -> None:
+        if self._gripper is not None:
+            self._gripper.close()

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers drive the gripper through its hardware interface, with the emulated servos behind it."""
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from modular_framework_control.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.controller import Controller
+from modular_framework_control.controller_manager import ControllerManager
+from modular_framework_control.goal_ticket import GoalStatus
+from modular_framework_control.gripper_action_controller import GripperTicket
+from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_control.robot_hw import RobotHW
+from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
+from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
+from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
+from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
+
+PERIOD_S = 0.008
+CONTROLLER = {"type": "position_controllers/GripperActionController", "joint": JOINT, "goal_tolerance": 0.03,
+              "max_effort": 0.5, "stall_timeout": 0.3, "stall_velocity_threshold": 0.02}
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DynamixelLine]:
+    finger = Finger(DynamixelServo(), FingerModel(top_speed=12000.0, time_constant_s=0.015), opening=200.0)
+    made = DynamixelLine([finger], tmp_path_factory.mktemp("line") / "gripper")
+    made.connect()
+    yield made
+    made.close()
+
+
+class Loop:
+    """A control loop in real time."""
+
+    def __init__(self, robot_hw: RobotHW, root: MappingNodeHandle) -> None:
+        self.robot_hw = robot_hw
+        self.controllers: dict[str, Controller] = {}
+        self.manager = ControllerManager(robot_hw, root, None, self._attach)
+
+    def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
+        self.controllers[name] = controller
+        return lambda: None
+
+    def run(self, until: Callable[[], bool], timeout_s: float = 5.0) -> float:
+        """Runs until something is so; returns how long that took [s]."""
+        start_s = time.monotonic()
+        while not until():
+            now_s = time.monotonic()
+            assert now_s - start_s < timeout_s, f"in vain for {timeout_s} s"
+            self.robot_hw.read(now_s, PERIOD_S)
+            self.manager.update(now_s, PERIOD_S)
+            self.robot_hw.write(now_s, PERIOD_S)
+            time.sleep(PERIOD_S)
+        return time.monotonic() - start_s
+
+    def spawn(self, name: str) -> Any:
+        from threading import Thread
+
+        self.manager.load_controller(name)
+        thread = Thread(target=self.manager.switch_controller, args=([name], []))
+        thread.start()
+        self.run(lambda: not thread.is_alive())
+        return self.controllers[name]
+
+
+def parameters(line: DynamixelLine) -> dict[str, Any]:
+    gripper = {"type": "modular_framework_drivers/EzGripperRobotHW", "start_position": 1.5, "hold_torque": 300}
+    return {"port_name": str(line.link), "baudrate": 57600, "servo_ids": [1], "manipulator_name": "EzGripper",
+            "hand": gripper, "grip": CONTROLLER}
+
+
+@pytest.fixture(scope="module")
+def loop(line: DynamixelLine) -> Iterator[Loop]:
+    root = MappingNodeHandle(parameters(line))
+    robot_hw = EzGripperRobotHW()
+    assert robot_hw.init(root, root.child("hand"))
+    made = Loop(robot_hw, root)
+    made.spawn("grip")
+    yield made
+    robot_hw.close()
+
+
+def go(loop: Loop, position: float, max_effort: float = 0.0) -> GripperTicket:
+    ticket: GripperTicket = GripperTicket()
+    loop.controllers["grip"].submit(position, max_effort, ticket)
+    loop.run(lambda: not ticket.open)
+    return ticket
+
+
+def test_the_gripper_controller_moves_it(line: DynamixelLine, loop: Loop) -> None:
+    line.remove_object()
+    assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
+    assert line.fingers[0].opening == pytest.approx(2500 * (1 - 0.9 / 1.94), abs=60)
+
+
+def test_an_object_stalls_it_and_is_held_with_the_effort_asked_for(line: DynamixelLine, loop: Loop) -> None:
+    line.remove_object()
+    go(loop, 0.9)
+    line.place_object(900.0)
+    ticket = go(loop, 1.9, max_effort=0.25)
+    assert ticket.status is GoalStatus.ABORTED
+    assert ticket.result is not None
+    assert ticket.result.stalled
+    handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
+    loop.run(lambda: handle.effort == pytest.approx(0.25, abs=0.01))
+    assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
+
+
+def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_back(line: DynamixelLine,
+                                                                                     loop: Loop) -> None:
+    line.remove_object()
+    go(loop, 0.9)
+    ticket: GripperTicket = GripperTicket()
+    loop.controllers["grip"].submit(1.9, 0.1, ticket)
+    loop.run(lambda: ticket.status is GoalStatus.ACTIVE)
+    line.unplug()
+    loop.run(lambda: not ticket.open, 1.0)
+    assert ticket.status is GoalStatus.ABORTED
+    assert "EzGripper: port" in ticket.text
+    assert "EzGripper: port" in loop.robot_hw.fault()
+    line.plug()
+    loop.run(lambda: not loop.robot_hw.fault())
+    assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
+
+
+def test_an_overload_is_no_grasp(line: DynamixelLine, loop: Loop) -> None:
+    line.remove_object()
+    go(loop, 0.9)
+    line.place_object(900.0)
+    ticket: GripperTicket = GripperTicket()
+    loop.controllers["grip"].submit(1.9, 0.5, ticket)
+    loop.run(lambda: ticket.status is GoalStatus.ACTIVE)
+    line.overload()
+    loop.run(lambda: not ticket.open)
+    assert ticket.status is GoalStatus.ABORTED
+    assert "overloaded" in ticket.text
+    loop.run(lambda: not loop.robot_hw.fault())
+    line.remove_object()
+
+
+def test_beside_other_hardware_only_its_own_controllers_hear_of_its_faults(make_line: Callable[..., DynamixelLine],
+                                                                          ) -> None:
+    line = make_line(opening=200.0)
+    root = MappingNodeHandle({
+        **parameters(line), "robot_hardware": ["arm", "hand"], "elbow_controller": {
+            "type": "position_controllers/JointPositionController", "joint": "elbow"},
+        "arm": {"type": "modular_framework_control/MockRobotHW", "joints": ["elbow"]}})
+    robot_hw = CombinedRobotHW()
+    assert robot_hw.init(root, root)
+    loop = Loop(robot_hw, root)
+    loop.spawn("grip")
+    loop.spawn("elbow_controller")
+    assert go(loop, 1.2).status is GoalStatus.SUCCEEDED
+    line.unplug()
+    took_s = loop.run(lambda: bool(robot_hw.faults()))
+    assert took_s < 1.0
+    assert [fault.joints for fault in robot_hw.faults()] == [frozenset({JOINT})]
+    robot_hw.close()
+
+
+def test_a_gripper_that_is_not_there_is_an_error_that_says_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    root = MappingNodeHandle({"hand": {"port_name": str(tmp_path / "nowhere"), "startup_timeout": 0.2}})
+    with caplog.at_level(logging.ERROR):
+        assert not EzGripperRobotHW().init(root, root.child("hand"))
+    assert "EzGripperRobotHW in /hand: not ready within 0.2 s: EzGripper: port" in caplog.text
+    assert "nowhere cannot be opened" in caplog.text
+
+
+def test_wrong_parameters_are_an_error_that_says_so(caplog: pytest.LogCaptureFixture) -> None:
+    root = MappingNodeHandle({"hand": {"baudrate": 1}})
+    with caplog.at_level(logging.ERROR):
+        assert not EzGripperRobotHW().init(root, root.child("hand"))
+    assert "/port_name: got ''" in caplog.text
