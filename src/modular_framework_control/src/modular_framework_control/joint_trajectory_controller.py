@@ -143,8 +143,8 @@ class JointTrajectoryController(Controller):
         self._mailbox.append(ticket)
 
     def desired_at(self, time_s: float) -> Array:
-        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), as if a slowed robot went on at
-        full speed.
+        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), as if a robot that is slowed
+        went on at full speed.
 
         Raises:
             ControllerError: the controller does not run, or the motion that far back is forgotten.

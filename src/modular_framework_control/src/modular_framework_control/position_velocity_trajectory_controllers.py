@@ -24,7 +24,7 @@ class PosVelJointTrajectoryController(JointTrajectoryController):
 
 
 class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
-    """pos_vel_acc_controllers/JointTrajectoryController: commands position, velocity and acceleration [rad/s^2|m/s^2]."""
+    """pos_vel_acc_controllers/JointTrajectoryController: commands acceleration [rad/s^2|m/s^2] besides."""
 
     interface_class = PosVelAccJointInterface
 

@@ -187,8 +187,10 @@ def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: flo
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
-    coefficients = spline.coefficients[max(0, first - 1):].copy()
-    coefficients[:, 0] += offset
+    coefficients = spline.coefficients[max(0, first - 1):]
+    if offset.any():
+        coefficients = coefficients.copy()
+        coefficients[:, 0] += offset
     if not (first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset)):
         target = spline.states[first].copy()
         target[POSITION] += offset
