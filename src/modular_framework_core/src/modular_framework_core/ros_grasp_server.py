@@ -21,7 +21,7 @@ from modular_framework_core.grasp_server import (
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_core.robot_groups import Group, RobotModelError, read_group
 from modular_framework_core.ros_calls import CallError, wait_until
-from modular_framework_core.ros_manipulator_drivers import JointMonitor, ManipulatorDriver, Motion, make_driver
+from modular_framework_core.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
 
 FEEDBACK_PERIOD_S = 0.1
 MODEL_TIMEOUT_S = 60.0
@@ -35,33 +35,27 @@ class GraspServer:
     Only ``posture`` of the commanded stage moves anything here: bringing the hand to ``pose`` is the arm's part.
 
     Parameters:
-        ``manipulator_controller_action_server_name`` (moveit_grasp_action_server): name of the action.
-        ``manipulator_group_name``: planning group of the fingers.
-        ``robot_description``, ``robot_description_semantic``: the robot.
-        ``/move_group/controller_list`` or ``~controller_list``: controllers to drive the fingers with.
         ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.
         ``~position_tolerance`` (0.05 rad): distance that counts as reached.
-        ``~motion_timeout`` (30 s), ``~motion_duration`` (2 s, trajectory controllers only).
+        ``~motion_timeout`` (30 s).
 
-    Subscribers: ``joint_states``. Actions called: the controller's own.
+    Args:
+        group: The joints of the fingers and their limits.
+        manipulator: What moves them.
     """
 
-    def __init__(self, group: Group, controllers: list[dict[str, Any]]) -> None:
-        """Stores the robot's side; the action is offered by :meth:`connect`."""
-        self._group, self._controllers = group, controllers
+    def __init__(self, group: Group, manipulator: Manipulator) -> None:
+        self._group, self._manipulator = group, manipulator
         self._full_scale = float(rospy.get_param("~max_torque_full_scale", 800.0))
         self._tolerance = float(rospy.get_param("~position_tolerance", 0.05))
         self._timeout_s = float(rospy.get_param("~motion_timeout", 30.0))
-        self._duration_s = float(rospy.get_param("~motion_duration", 2.0))
-        self._monitor = JointMonitor()
         self._lock = threading.Lock()
         self._motion_lock = threading.Lock()
         self._stops: dict[str, threading.Event] = {}
-        self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
 
     def connect(self, action_name: str) -> None:
-        """Starts to listen to the joints and offers the action."""
-        self._monitor.connect()
+        """Connects the manipulator and offers the action."""
+        self._manipulator.connect()
         self._server = SteadyActionServer(action_name, GraspAction, self._on_goal, self._on_cancel, auto_start=False)
         self._server.start()
 
@@ -123,18 +117,15 @@ class GraspServer:
         return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)
 
     def _move(self, handle: Any, motion: Motion) -> Outcome:
-        key = tuple(sorted(motion.targets))
-        if key not in self._drivers:
-            self._drivers[key] = make_driver(self._controllers, motion.targets, self._duration_s)
         ended = threading.Event()
 
         def publish() -> None:
             while not ended.wait(FEEDBACK_PERIOD_S):
-                handle.publish_feedback(GraspFeedback(current_joint_state=self._monitor.message(motion.targets)))
+                handle.publish_feedback(GraspFeedback(current_joint_state=self._manipulator.joint_state(motion.targets)))
 
         threading.Thread(target=publish, daemon=True).start()
         try:
-            return self._drivers[key].move(motion, self._monitor)
+            return self._manipulator.move(motion)
         finally:
             ended.set()
 
@@ -174,10 +165,21 @@ def read_controllers() -> list[dict[str, Any]]:
 
 
 def main() -> int:
-    """Runs the node ``moveit_grasp_action_server``; returns 1 when the robot's side is incomplete."""
+    """Runs the node ``moveit_grasp_action_server``; returns 1 when the robot's side is incomplete.
+
+    Parameters, beside those of :class:`GraspServer`:
+        ``manipulator_controller_action_server_name`` (moveit_grasp_action_server): name of the action.
+        ``manipulator_group_name``: planning group of the fingers.
+        ``robot_description``, ``robot_description_semantic``: the robot.
+        ``/move_group/controller_list`` or ``~controller_list``: controllers to drive the fingers with.
+        ``~motion_duration`` (2 s, trajectory controllers only).
+
+    Subscribers: ``joint_states``. Actions called: the controller's own.
+    """
     rospy.init_node("moveit_grasp_action_server")
     try:
-        server = GraspServer(read_manipulator(), read_controllers())
+        duration_s = float(rospy.get_param("~motion_duration", 2.0))
+        server = GraspServer(read_manipulator(), ControlledManipulator(read_controllers(), duration_s))
     except RobotModelError as error:
         rospy.logfatal("moveit_grasp_action_server: %s", error)
         return 1

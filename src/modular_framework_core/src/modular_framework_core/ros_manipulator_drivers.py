@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moves the manipulator through its own controller, whichever of the two kinds of action it offers."""
+"""What moves the manipulator for the grasp server: its controller, whichever of the two kinds of action it offers, or a
+device's own driver."""
 from __future__ import annotations
 
 import threading
@@ -188,6 +189,53 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
                     raise GraspCommandError(f"controller '{entry.get('name')}' has the type '{other}', allowed are "
                                             "GripperCommand and FollowJointTrajectory")
     raise GraspCommandError(f"no controller has all the joints {sorted(joints)}; controller_list has {known}")
+
+
+class Manipulator(Protocol):
+    """Whatever moves the fingers and knows where they are."""
+
+    def connect(self) -> None:
+        """Begins to know."""
+
+    def move(self, motion: Motion) -> Outcome:
+        """Moves the fingers and waits for the end.
+
+        Raises:
+            GraspCommandError: It could not be done, or was stopped; the text says why.
+            CallError: Somebody did not answer.
+        """
+
+    def joint_state(self, names: Mapping[str, float]) -> JointState:
+        """Makes a message of where these joints are now."""
+
+
+class ControlledManipulator:
+    """A manipulator with a ROS controller.
+
+    Args:
+        controllers: Entries of ``controller_list``: name, action_ns, type, joints.
+        duration_s: Time given to a motion of a trajectory controller [s].
+    """
+
+    def __init__(self, controllers: list[dict[str, Any]], duration_s: float) -> None:
+        self._controllers, self._duration_s = controllers, duration_s
+        self._monitor = JointMonitor()
+        self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
+
+    def connect(self) -> None:
+        """Starts to listen to the joints."""
+        self._monitor.connect()
+
+    def move(self, motion: Motion) -> Outcome:
+        """Moves the joints through the controller that has them all."""
+        key = tuple(sorted(motion.targets))
+        if key not in self._drivers:
+            self._drivers[key] = make_driver(self._controllers, motion.targets, self._duration_s)
+        return self._drivers[key].move(motion, self._monitor)
+
+    def joint_state(self, names: Mapping[str, float]) -> JointState:
+        """Makes a message of the positions heard of last."""
+        return self._monitor.message(names)
 
 
 def _refuse_unfinished(status: int, action: str, motion: Motion) -> None:
