@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state to begin with: copy it, name the file after your class (open_door.py: OpenDoor) and change it.
 
-A task finds it by ``states_directory:=<its folder>`` and ``source: my_state``. Its test, test_my_state.py, is beside it.
+A task finds it by ``states_directory:=<its folder>`` and ``source: my_state``. Its test, test_my_state.py, is beside
+it.
 """
 from __future__ import annotations
 
@@ -30,11 +31,9 @@ class MyState(FrameworkState):
         self._side, self._timeout_s = side, float(timeout)
 
     def execute(self, userdata: Any) -> str:
-        """Does the work; waits only with ``wait_until``, which a request to stop ends."""
+        """Does the work; a request to stop ends ``wait_until`` and the calls of ``ros_calls``."""
         self.feedback = f"looking to the {self._side}"
         if not self.wait_until(self._is_done, self._timeout_s):
-            if self.preempt_requested():
-                return self.stopped()
             return self.fail(f"nothing was seen on the {self._side} within {self._timeout_s} s")
         if "chosen_side" in self.get_registered_output_keys():
             userdata.chosen_side = self._side

@@ -9,6 +9,8 @@ import pytest
 
 import smach
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.ros_calls import CallError, call_service
+from modular_framework_core.stop_requests import stop_requested
 
 
 def test_the_first_outcome_is_positive_and_the_last_negative() -> None:
@@ -70,3 +72,65 @@ def test_a_stopped_state_services_the_request_and_can_wait_again(outcomes: list[
 def test_a_shutdown_ends_a_wait() -> None:
     smach.set_shutdown_check(lambda: True)
     assert not FrameworkState().wait_until(lambda: True, None)
+
+
+class SlowService:
+    """A service that does not answer before the test is over."""
+
+    resolved_name = "/slow"
+
+    def __init__(self) -> None:
+        self.called, self.over = threading.Event(), threading.Event()
+
+    def __call__(self, request: object) -> None:
+        self.called.set()
+        self.over.wait(60.0)
+
+
+class Asks(FrameworkState):
+    """A state whose service is called by a function that knows nothing of the state."""
+
+    def __init__(self, service: SlowService) -> None:
+        super().__init__()
+        self._service = service
+
+    def execute(self, userdata: object) -> str:
+        try:
+            call_service(self._service, None, 60.0)
+        except CallError as error:
+            return self.fail(str(error))
+        return self.succeed()
+
+
+@pytest.mark.parametrize("whole_task", [False, True])
+def test_a_request_to_stop_ends_a_call_that_is_not_answered(whole_task: bool) -> None:
+    service, asked = SlowService(), threading.Event()
+    state = Asks(service)
+    smach.set_shutdown_check(asked.is_set)
+    threading.Timer(0.1, asked.set if whole_task else state.request_preempt).start()
+    begun = time.monotonic()
+    assert state.execute(None) == "fail"
+    service.over.set()
+    assert time.monotonic() - begun < 5.0
+    assert service.called.is_set() and state.reason == "stopped on request"
+    assert not stop_requested()
+
+
+def test_a_concurrence_that_has_its_outcome_ends_the_calls_of_its_other_states() -> None:
+    service = SlowService()
+    machine = smach.Concurrence(["success", "fail"], "fail", child_termination_cb=lambda outcomes: True,
+                                outcome_map={"success": {"QUICK": "done"}})
+    with machine:
+        smach.Concurrence.add("SLOW", Asks(service))
+        smach.Concurrence.add("QUICK", smach.CBState(lambda userdata: "done", outcomes=["done"]))
+    begun = time.monotonic()
+    assert machine.execute() == "success"
+    service.over.set()
+    assert time.monotonic() - begun < 5.0
+
+
+def test_a_call_outside_of_states_waits_as_long_as_it_may() -> None:
+    service = SlowService()
+    with pytest.raises(CallError, match="did not answer within 0.2 s"):
+        call_service(service, None, 0.2)
+    service.over.set()

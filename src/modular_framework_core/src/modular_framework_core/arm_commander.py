@@ -54,6 +54,7 @@ from modular_framework_core.ros_calls import (
     wait_for_service,
     wait_until,
 )
+from modular_framework_core.stop_requests import stop_requested
 
 EXECUTE_ACTION = "execute_trajectory"
 PLANNERS_SERVICE = "query_planner_interface"
@@ -258,7 +259,7 @@ class ArmCommander:
             return IkResult({}, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
 
     def execute_plan(self, plan: RobotTrajectory | PlanResult,
-                     stop_requested: Callable[[], bool] = lambda: False) -> ExecutionResult:
+                     stop_requested: Callable[[], bool] = stop_requested) -> ExecutionResult:
         """Executes a plan and waits for its end.
 
         Args:

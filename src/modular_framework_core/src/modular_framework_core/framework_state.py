@@ -2,7 +2,8 @@
 """The base of the framework's states: one way to succeed, to fail with a reason, and to stop when asked.
 
 A plain ``smach.State`` only returns an outcome, so nobody learns why a task failed, and a state that waits
-cannot be interrupted unless its author thought of it. ``FrameworkState`` settles both. A state is written as::
+cannot be interrupted unless its author thought of it. ``FrameworkState`` settles both: its own waits, and calls of
+services and actions through ``ros_calls`` below it, end when the state is asked to stop. A state is written as::
 
     class OpenDoor(FrameworkState):
         def __init__(self, door_name, timeout=5.0, outcomes=("success", "fail"),
@@ -12,18 +13,19 @@ cannot be interrupted unless its author thought of it. ``FrameworkState`` settle
 
         def execute(self, userdata):
             if not self.wait_until(self._door_is_open, self._timeout):
-                if self.preempt_requested():
-                    return self.stopped()
                 return self.fail(f"door '{self._door_name}' did not open within {self._timeout} s")
             return self.succeed()
 """
 from __future__ import annotations
 
+import functools
 import threading
 import time
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import smach
+from modular_framework_core.stop_requests import stoppable
 
 DEFAULT_OUTCOMES = ("success", "fail")
 
@@ -36,6 +38,12 @@ class FrameworkState(smach.State):
         reason: why the last execution did not succeed; "" after a success or before the first execution.
         feedback: what the state is doing now, in words, for whoever watches the task; a state may set it while it runs.
     """
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Make what ``execute`` waits for end when the state is asked to stop."""
+        super().__init_subclass__(**options)
+        if "execute" in vars(cls):
+            cls.execute = _stoppable(cls.execute)  # type: ignore[assignment, method-assign]
 
     def __init__(
         self,
@@ -78,12 +86,20 @@ class FrameworkState(smach.State):
     def fail(self, reason: str) -> str:
         """Record and log why the state did not reach its aim, and return the negative outcome.
 
+        A state that has been asked to stop counts as stopped: whatever it waited for was given up for that.
+
         Args:
             reason: one sentence: what was attempted, what was got, and what was expected.
         """
+        if self.stop_requested():
+            return self.stopped()
         self.reason = reason
         smach.logwarn(f"{type(self).__name__}: {reason}")
         return self.outcomes[-1]
+
+    def stop_requested(self) -> bool:
+        """Return whether this state, or the whole task, has been asked to stop."""
+        return bool(self.preempt_requested()) or smach.is_shutdown()
 
     def stopped(self) -> str:
         """Acknowledge a request to stop; return ``preempted`` where declared, the negative outcome otherwise."""
@@ -100,10 +116,10 @@ class FrameworkState(smach.State):
             period_s: time between two questions [s].
 
         Returns:
-            True when the condition held. When False, ``preempt_requested()`` tells a stop from a timeout.
+            True when the condition held. When False, ``stop_requested()`` tells a stop from a timeout.
         """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        while not self.preempt_requested() and not smach.is_shutdown():
+        while not self.stop_requested():
             if condition():
                 return True
             if deadline is not None and time.monotonic() >= deadline:
@@ -125,3 +141,12 @@ class FrameworkState(smach.State):
         """Mark the request to stop as dealt with."""
         super().service_preempt()
         self._preempt_event.clear()
+
+
+def _stoppable(execute: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
+    @functools.wraps(execute)
+    def heeding(state: FrameworkState, userdata: Any) -> str:
+        with stoppable(state.stop_requested):
+            return execute(state, userdata)
+
+    return heeding

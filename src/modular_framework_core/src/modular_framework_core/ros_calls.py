@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls services and actions of other nodes without ever waiting for ever.
+"""Calls services and actions of other nodes without ever waiting for ever, or longer than a task that is stopped.
 
 All limits are wall time: a simulation that is paused or has died stops the clock of ROS, and every wait on it.
 """
@@ -15,14 +15,17 @@ import rospy
 from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
+from modular_framework_core.stop_requests import stop_requested
+
 POLL_PERIOD_S = 0.01
+STOP_PERIOD_S = 0.05
 
 CANCEL_WAIT_S = 0.5
 """How long the answer to a cancelled goal is waited for [s]; a task has to end within a second of a request to stop."""
 
 
 class CallError(RuntimeError):
-    """A service or an action did not answer; the text names it and the time waited."""
+    """A service or an action did not answer; the text names it and the time waited, or that the task was stopped."""
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float, period_s: float = POLL_PERIOD_S) -> bool:
@@ -39,12 +42,14 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
     """Waits for a service to be advertised.
 
     Raises:
-        CallError: It was not advertised in time.
+        CallError: It was not advertised in time, or what needs it was asked to stop.
     """
     end = time.monotonic() + timeout_s
     while True:
+        if stop_requested():
+            raise _given_up(f"service '{proxy.resolved_name}'")
         try:
-            rospy.wait_for_service(proxy.resolved_name, max(0.05, min(1.0, end - time.monotonic())))
+            rospy.wait_for_service(proxy.resolved_name, max(0.05, min(0.2, end - time.monotonic())))
             return
         except rospy.ROSException as error:
             if rospy.is_shutdown():
@@ -67,20 +72,26 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
         The answer.
 
     Raises:
-        CallError: The service is absent, refused the call, or did not answer in time.
+        CallError: The service is absent, refused the call, or did not answer in time, or what needs the answer was
+            asked to stop.
     """
     answers: list[Any] = []
     errors: list[Exception] = []
+    done = threading.Event()
 
     def call() -> None:
         try:
             answers.append(proxy(request))
         except (rospy.ServiceException, rospy.ROSException, OSError) as error:
             errors.append(error)
+        finally:
+            done.set()
 
-    thread = threading.Thread(target=call, daemon=True, name=f"call {proxy.resolved_name}")
-    thread.start()
-    thread.join(timeout_s)
+    deadline = time.monotonic() + timeout_s
+    threading.Thread(target=call, daemon=True, name=f"call {proxy.resolved_name}").start()
+    while not done.wait(max(0.0, min(STOP_PERIOD_S, deadline - time.monotonic()))) and time.monotonic() < deadline:
+        if stop_requested():
+            raise _given_up(f"service '{proxy.resolved_name}'")
     if answers:
         return answers[0]
     if errors:
@@ -88,11 +99,15 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
     raise CallError(f"service '{proxy.resolved_name}' did not answer within {timeout_s:.1f} s")
 
 
+def _given_up(what: str) -> CallError:
+    return CallError(f"{what} was not waited for any longer: the task was asked to stop")
+
+
 def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: float) -> None:
     """Waits until an action server listens to a client.
 
     Raises:
-        CallError: No server was there in time.
+        CallError: No server was there in time, or what needs it was asked to stop.
     """
     inner = client.action_client
 
@@ -100,13 +115,16 @@ def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: 
         ends = (inner.pub_goal, inner.pub_cancel, inner.result_sub, inner.feedback_sub)
         return inner.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
 
-    if not wait_until(connected, timeout_s):
+    there = wait_until(lambda: connected() or stop_requested(), timeout_s)
+    if stop_requested():
+        raise _given_up(f"action server '{rospy.resolve_name(name)}'")
+    if not there:
         raise CallError(f"action server '{rospy.resolve_name(name)}' was not there within {timeout_s:.1f} s; "
                         "start the node that offers it")
 
 
 def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,
-                    stop_requested: Callable[[], bool] = lambda: False) -> int:
+                    stop_requested: Callable[[], bool] = stop_requested) -> int:
     """Waits for the end of a goal; cancels it when asked to stop or out of time.
 
     Args:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import smach
+from modular_framework_core.stop_requests import stoppable
 from modular_framework_core.task_record import FailureSummary, TaskRecorder
 
 EXIT_SUCCEEDED = 0
@@ -108,7 +109,8 @@ class TaskRun:
     def _run(self) -> None:
         """Body of the thread."""
         try:
-            machine = self._factory()
+            with stoppable(self._stop.is_set):
+                machine = self._factory()
         except Exception as error:  # whatever a state's constructor raises is the user's to read, not ours to handle
             smach.logdebug(traceback.format_exc())
             if self._stop.is_set():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
 from xml.etree import ElementTree
 
 from modular_framework_core.task_constructor.faults import nearest
@@ -12,7 +14,8 @@ Bounds = tuple[float, float]
 TOLERANCE = 1e-6  # [rad or m]; numbers rounded in a file may end just outside
 
 
-def bounds_from_urdf(text: str) -> dict[str, Bounds]:
+@lru_cache(maxsize=1)
+def bounds_from_urdf(text: str) -> Mapping[str, Bounds]:
     """Returns (lower, upper) [rad or m] of every joint that moves; a continuous joint has no bounds.
 
     Raises:
@@ -30,7 +33,7 @@ def bounds_from_urdf(text: str) -> dict[str, Bounds]:
                 bounds[str(joint.get("name"))] = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
             case "continuous":
                 bounds[str(joint.get("name"))] = -math.inf, math.inf
-    return bounds
+    return MappingProxyType(bounds)
 
 
 def fault_of(joint: str, position: float, bounds: Mapping[str, Bounds]) -> str:

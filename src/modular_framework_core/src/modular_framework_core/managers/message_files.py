@@ -11,7 +11,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -118,18 +118,26 @@ def flow_text(value: Any) -> str:
     """Writes a message, or a value of one, as flow YAML."""
     match value:
         case genpy.Message():
-            fields = [f"{json.dumps(name)}: {flow_text(getattr(value, name))}" for name in value.__slots__]
+            fields = [f'"{name}": {flow_text(getattr(value, name))}' for name in value.__slots__]
             return f"{{{', '.join(fields)}}}"
         case genpy.TVal():
             return f'{{"secs": {int(value.secs)}, "nsecs": {int(value.nsecs)}}}'
         case float():
             return _float_text(value)
         case bytes() | list() | tuple():
-            return f"[{', '.join(map(flow_text, value))}]"
+            return _list_text(value)
         case _ if hasattr(value, "tolist"):  # of NumPy
             return flow_text(value.tolist())
         case _:
             return json.dumps(value)
+
+
+def _list_text(values: Sequence[Any]) -> str:
+    if all(type(value) is float for value in values):
+        text = repr(list(values))  # of most numbers this is JSON already, in a tenth of the time
+        if not set(text) & set("eni"):
+            return text
+    return f"[{', '.join(map(flow_text, values))}]"
 
 
 def _float_text(value: float) -> str:

@@ -81,7 +81,7 @@ class AcmServices:
             if not isinstance(indices, list) or not all(type(index) is int for index in indices):
                 raise AcmError(f"parameter '{rospy.resolve_name(INDICES_PARAMETER)}' is {indices!r}, "
                                "expected a list of whole numbers")
-            prefix = str(rospy.get_param(PREFIX_PARAMETER, ""))
+            prefix = "" if indices else str(rospy.get_param(PREFIX_PARAMETER, ""))
             if self.manager.set_initial(matrix_from_message(request.acm), indices, prefix):
                 rospy.loginfo("set_init_acm: an earlier reference collision matrix was replaced.")
             return SetInitACMResponse(success=True)

@@ -17,6 +17,8 @@ from modular_framework_core.managers.yaml_entries import EntryError
 from modular_framework_core.msg import ManagerChange
 from modular_framework_core.task_constructor import default_folders
 
+OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes tells of every one
+
 
 @dataclass(frozen=True, slots=True)
 class MessageKind:
@@ -135,7 +137,7 @@ class MessageServices:
     def _add(self, request: Any) -> Any:
         name = getattr(request, self.kind.name_field)
         if self.store.add(getattr(request, self.kind.message_field), name):
-            rospy.loginfo("The %s '%s' was overwritten.", self.kind.noun, name)
+            rospy.loginfo_throttle(OVERWRITTEN_PERIOD_S, f"The {self.kind.noun} '{name}' was overwritten.")
         return self.kind.add_type._response_class(success=True)
 
     def _get(self, request: Any) -> Any:

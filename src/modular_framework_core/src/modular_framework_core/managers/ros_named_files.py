@@ -81,9 +81,9 @@ def read_robot_poses(path: Path) -> NamedMessages:
     return {pose.name: robot_pose_message(pose) for pose in poses if pose.is_robot_pose}, []
 
 
-def robot_bounds() -> dict[str, Bounds]:
+def robot_bounds() -> Mapping[str, Bounds]:
     """Returns the bounds of the robot's joints; none when no robot is described, or not as XML (which is logged)."""
-    description = rospy.get_param("robot_description", "")
+    description = rospy.get_param_cached("robot_description", "")
     if not description:
         return {}
     try:

@@ -41,8 +41,7 @@ class Grasp(FrameworkState):
             send(userdata.manipulator_controller_client, self._type, grasp, userdata.max_torque, self._timeout_s,
                  self.preempt_requested)
         except (ManagerError, GraspGoalError) as error:
-            return self.stopped() if self.preempt_requested() else self.fail(
-                f"{self._type} of grasp '{self._name or 'selected'}' was not reached: {error}")
+            return self.fail(f"{self._type} of grasp '{self._name or 'selected'}' was not reached: {error}")
         return self.succeed()
 
     def _grasp(self, userdata: Any) -> Any:

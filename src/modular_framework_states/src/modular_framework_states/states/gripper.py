@@ -50,7 +50,7 @@ class Gripper(FrameworkState):
             send(userdata.manipulator_controller_client, self._stage, grasp, userdata.max_torque, self._timeout_s,
                  self.preempt_requested)
         except (RobotModelError, GraspGoalError) as error:
-            return self.stopped() if self.preempt_requested() else self.fail(f"gripper to {wanted}: {error}")
+            return self.fail(f"gripper to {wanted}: {error}")
         return self.succeed()
 
     def _positions_of_posture(self) -> dict[str, float]:

@@ -48,8 +48,6 @@ class WaitForMessage(FrameworkState):
         name = rospy.resolve_name(self._topic)
         arrived = self._wait(lambda: bool(published_type(name)), end, 0.1) and self._receive(name, end)
         if not arrived:
-            if self.preempt_requested():
-                return self.stopped()
             what = "no message as expected" if self._expected else "no message"
             return self.fail(f"{what} came on topic '{name}' within {self._timeout_s} s ({self._last_difference})")
         if FOUND in self.get_registered_output_keys():

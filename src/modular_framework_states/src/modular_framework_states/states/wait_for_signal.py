@@ -46,8 +46,6 @@ class WaitForSignal(FrameworkState):
     def execute(self, userdata: Any) -> str:
         """Waits for a signal that was not read yet."""
         if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
-            if self.preempt_requested():
-                return self.stopped()
             publishers = self._subscribers[0].get_num_connections()
             return self.fail(f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s "
                              f"({publishers} publishers are connected)")
