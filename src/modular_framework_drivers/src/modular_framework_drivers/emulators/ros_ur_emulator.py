@@ -2,13 +2,9 @@
 """The emulated controller of a UR arm as a ROS node."""
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from typing import Any
-
 import rospy
-from std_srvs.srv import Trigger, TriggerResponse
 
+from modular_framework_drivers.emulators.ros_orders import offer_orders
 from modular_framework_drivers.emulators.ur_controller import HOME
 from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT, UrEmulator
 
@@ -30,7 +26,6 @@ class UrEmulatorNode:
                                     [float(value) for value in rospy.get_param("~positions", list(HOME))],
                                     float(rospy.get_param("~unlock_delay", 5.0)),
                                     int(rospy.get_param("~command_port", COMMAND_PORT)))
-        self._services: list[rospy.Service] = []
 
     def connect(self) -> None:
         """Listen, and offer the services.
@@ -42,27 +37,13 @@ class UrEmulatorNode:
         log = str(rospy.get_param("~log", ""))
         if log:
             self._emulator.commands["log"](path=log)
-        for name, order in self._emulator.commands.items():
-            parameters = inspect.signature(order).parameters.values()
-            if all(parameter.default is not parameter.empty for parameter in parameters):
-                self._services.append(rospy.Service(f"~{name}", Trigger, _served(order)))
+        offer_orders(self._emulator.commands)
 
     def run(self) -> None:
         """Serve until the node is shut down."""
         rospy.on_shutdown(self._emulator.stop)
         self._emulator.run()
         self._emulator.close()
-
-
-def _served(order: Callable[..., str | None]) -> Callable[[Any], TriggerResponse]:
-    def serve(request: Any) -> TriggerResponse:
-        del request
-        try:
-            return TriggerResponse(success=True, message=order() or "")
-        except (OSError, ValueError) as error:
-            return TriggerResponse(success=False, message=str(error))
-
-    return serve
 
 
 def main() -> int:

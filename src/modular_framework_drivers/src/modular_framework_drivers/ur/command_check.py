@@ -97,23 +97,26 @@ class CommandCheck:
         self._targets[joint] = self.sent[joint]
 
     def _approach(self, joint: int, command: float, limit: MotionLimits, period_s: float) -> None:
-        """Go to the command at once if velocity and acceleration allow it, else as fast as they do."""
+        """Go to the command at once if velocity and acceleration allow it, else as fast as they do.
+
+        "At once" also asks that the joint can be as fast as the commands are in the next cycle, lest it run past them.
+        """
         position, velocity = self.sent[joint], self._velocities[joint]
         top, change = limit.max_velocity, limit.max_acceleration * period_s
         pace = (command - self._targets[joint]) / period_s
         self._targets[joint] = command
         wanted = (command - position) / period_s
-        if abs(wanted) <= top * (1.0 + _SLACK) and abs(wanted - velocity) <= change * (1.0 + _SLACK):
+        at_once = max(abs(wanted - velocity), abs(wanted - pace)) <= change * (1.0 + _SLACK)
+        if not at_once or abs(wanted) > top * (1.0 + _SLACK):
+            pace = min(max(pace, -top), top)
+            behind = command - pace * period_s - position
+            goal = pace + math.copysign(_closing_speed(abs(behind), limit.max_acceleration, period_s), behind)
+            velocity += min(max(min(max(goal, -top), top) - velocity, -change), change)
+            self._velocities[joint] = velocity
+            self.sent[joint] = position + velocity * period_s
+        else:
             self._velocities[joint] = wanted
             self.sent[joint] = command
-            return
-        pace = min(max(pace, -top), top)
-        behind = command - pace * period_s - position
-        goal = pace + math.copysign(_closing_speed(abs(behind), limit.max_acceleration, period_s), behind)
-        goal = min(max(goal, -top), top)
-        velocity += min(max(goal - velocity, -change), change)
-        self._velocities[joint] = velocity
-        self.sent[joint] = position + velocity * period_s
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:

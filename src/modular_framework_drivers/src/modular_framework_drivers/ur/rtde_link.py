@@ -82,6 +82,7 @@ class RtdeLink:
         self.lost = "not connected yet"
         self.commanding = False
         self.program_failure = ""
+        self.program_failed_s = 0.0
 
     def connect(self) -> None:
         """Begin to connect, and go on until `close`; returns at once."""
@@ -105,6 +106,7 @@ class RtdeLink:
         self.commanding = False
         self._program_wanted = False
         self.program_failure = reason
+        self.program_failed_s = time.monotonic()
 
     def poll(self) -> None:
         """Take in what the processes have said."""
@@ -151,7 +153,7 @@ class RtdeLink:
     def _lose(self, stream: _Stream, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
-            self.drop_program("the link was lost")
+            self.drop_program("its program was given up when the link was lost")
         if not stream.failed:
             stream.failed = True
             self.lost = reason

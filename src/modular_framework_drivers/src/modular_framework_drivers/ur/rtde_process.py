@@ -107,7 +107,7 @@ def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
         if message[:1] == SERVO:
             positions, time_s = read_servo_message(message)
             if not arm.servoJ(positions, 0.0, 0.0, time_s, options.lookahead, options.gain):
-                raise ConnectionEndedError("the arm's program no longer takes commands")
+                raise ConnectionEndedError("the program on the arm was stopped")
 
 
 def _newest(channel: socket.socket) -> bytes:

@@ -27,6 +27,7 @@ LOGGER = logging.getLogger("rosout.ur_arm")
 JOINT_NAMES = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint",
                "wrist_3_joint")
 _PERIOD_SMOOTHING = 0.02
+_CAUSE_S = 0.03      # so much later than the end of its program a state of the arm tells why [s]
 
 
 class UrArmHardware(RobotHW):
@@ -199,6 +200,12 @@ class UrArmHardware(RobotHW):
         link = self._link
         if link is None or self._following:
             return ""
+        if link.program_failure and self._cause_may_follow(link):
+            return ""
         if link.program_failure:
             return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
         return f"the arm at {self.address} is being made ready for commands"
+
+    def _cause_may_follow(self, link: RtdeLink) -> bool:
+        """A stop of the arm ends its program, and that may be known before the stop itself."""
+        return link.state is None or link.state.received_s < link.program_failed_s + _CAUSE_S

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs an emulated UR controller for tests and measurements: a process of its own at a loopback address of its own."""
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from modular_framework_drivers.emulators.command_port import send_command
+from modular_framework_drivers.emulators.ur_controller import HOME
+from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT
+
+_MODULE = "modular_framework_drivers.emulators.ur_emulator"
+
+
+class EmulatedArm:
+    """A running emulator.
+
+    Args:
+        model: kind of controller, see ur_controller.py.
+        unlock_delay_s: after a protective stop [s].
+        positions: of the joints at the beginning [rad].
+
+    Attributes:
+        address: where it listens.
+    """
+
+    def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0,
+                 positions: Sequence[float] = HOME) -> None:
+        draw = random.Random(os.urandom(8))    # 127.x.y.z is this machine; nobody else's test draws the same
+        self.address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", _MODULE, "--address", self.address, "--model", model,
+             "--unlock-delay", str(unlock_delay_s), "--positions", *map(str, positions)],
+            stdout=subprocess.PIPE, text=True)
+        if self._process.stdout is None or self._process.stdout.readline() != "ready\n":
+            raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")
+
+    def order(self, command: str, **arguments: Any) -> str:
+        """Give an order at the command port."""
+        return send_command(COMMAND_PORT, command, self.address, **arguments)
+
+    def state(self) -> dict[str, str]:
+        """What the order `state` tells, by name."""
+        return dict(pair.split("=") for pair in self.order("state").split())
+
+    def positions(self) -> list[float]:
+        """Where the joints are [rad]."""
+        return [float(value) for value in self.state()["q"].split(",")]
+
+    def kill(self) -> None:
+        """End the process without notice."""
+        self._process.kill()
+        self._process.wait()
+
+    def close(self) -> None:
+        """End the process; may be called twice."""
+        self._process.terminate()
+        self._process.wait(10.0)
+        if self._process.stdout is not None:
+            self._process.stdout.close()
