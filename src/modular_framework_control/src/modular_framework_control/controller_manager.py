@@ -83,6 +83,11 @@ class ControllerManager:
         self._last_time_s = float("-inf")
         self._fault_text = ""
 
+    @property
+    def fault(self) -> str:
+        """Why the hardware could not follow in the last cycle; "" when it could."""
+        return self._fault_text
+
     # ---- control loop ----
 
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:

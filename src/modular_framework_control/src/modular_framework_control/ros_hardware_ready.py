@@ -78,18 +78,19 @@ class HardwareReadiness:
         if message.data:
             event.set()
 
-    def wait(self, timeout_s: float) -> None:
+    def wait(self, timeout_s: float, ended: threading.Event) -> None:
         """Return when every awaited hardware has said True, or the node is shut down.
 
         Args:
             timeout_s: how long to wait for all of them together [s of real time].
+            ended: set when nobody waits any more.
 
         Raises:
             HardwareNotReadyError: not all have; names each that has not.
         """
         deadline = time.monotonic() + timeout_s
         while not all(event.wait(0.05) for event in self._ready.values()):
-            if rospy.is_shutdown():
+            if rospy.is_shutdown() or ended.is_set():
                 return
             if time.monotonic() > deadline:
                 missing = ", ".join(f"topic {self._topics.awaited[name]} of hardware '{name}'"

@@ -2,6 +2,7 @@
 """The control loop of a robot that is not simulated: hardware, controller manager and time in one node."""
 from __future__ import annotations
 
+import signal
 import threading
 import time
 import traceback
@@ -9,16 +10,18 @@ import traceback
 import rospy
 
 from modular_framework_control.combined_robot_hw import robot_hw_of_type
-from modular_framework_control.node_handle import ParameterError, read_number
+from modular_framework_control.cycle_pacer import CyclePacer, LoopStatistics
+from modular_framework_control.node_handle import ParameterError, read_bool, read_number
 from modular_framework_control.plugins import PluginError
+from modular_framework_control.real_time import prepare_interpreter, run_in_real_time
 from modular_framework_control.ros_controller_manager import RosControllerManager
 from modular_framework_control.ros_hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
+from modular_framework_control.ros_loop_report import LoopReport
 from modular_framework_control.ros_node_handle import RosNodeHandle
 
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
-OVERRUN_WARNING_PERIOD_S = 10.0
-
+CLOCK_TOLERANCE_S = 1e-6
 
 class RobotHwNode:
     """Node `robot_hw`.
@@ -27,15 +30,23 @@ class RobotHwNode:
     combined to one robot; without it, `~type` (MockRobotHW of this package) is one hardware, with private parameters.
     `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
     says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
-    itself may take for that.
+    itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that is
+    not permitted the log says so once, and the loop runs as it can.
 
     Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
-    `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning.
+    `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning. What
+    `LoopReport` publishes and serves is there as long as the loop runs.
+
+    Args:
+        ended: set by whoever wants the loop to end; controllers are then stopped, goals end, and the hardware is closed
+            while the node can still say so.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, ended: threading.Event) -> None:
+        self._ended = ended
         self._nh = RosNodeHandle("~")
         self._period_s = 1.0 / read_number(self._nh, "rate", 125.0, 1.0)
+        self._real_time = read_bool(self._nh, "real_time", True)
         self._ready_timeout_s = read_number(self._nh, "ready_timeout", 60.0)
         listed = RosNodeHandle("/").has_param("robot_hardware") and not self._nh.has_param("type")
         self._hw_nh = RosNodeHandle("/") if listed else self._nh
@@ -48,7 +59,7 @@ class RobotHwNode:
         self._manager: RosControllerManager | None = None
         self._connected = threading.Event()
         self._failure = ""
-        self._overruns = 0
+        self._statistics = LoopStatistics(self._period_s)
 
     def connect(self) -> None:
         """Initialise the hardware.
@@ -62,9 +73,18 @@ class RobotHwNode:
         self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
         self._readiness.connect()
         self._manager = RosControllerManager(self._robot_hw)
+        self._report = LoopReport(self._statistics, self._period_s, type(self._robot_hw).__name__, self._fault)
+        self._report.connect()
+
+    def _fault(self) -> str:
+        return self._manager.manager.fault if self._manager is not None else ""
+
+    def close(self) -> None:
+        """Close the hardware; may be called twice."""
+        self._robot_hw.close()
 
     def run(self) -> bool:
-        """Run the control loop until the node is shut down; then stop all controllers.
+        """Run the control loop until it is told to end; then stop all controllers, and tell the hardware what they left.
 
         Returns:
             Whether it ended because it was told to; otherwise the log says why.
@@ -73,20 +93,26 @@ class RobotHwNode:
             raise RuntimeError("connect() comes before run()")
         starter = threading.Thread(target=self._get_ready, args=(self._manager,), name="get_ready", daemon=True)
         starter.start()
+        self._prepare()
         try:
             self._loop(self._manager)
-        except rospy.ROSInterruptException:
-            rospy.loginfo("control loop ends: the node is shut down")
+        except Exception as error:  # a user's hardware may raise anything
+            self._failure = f"hardware {type(self._robot_hw).__name__} raised {type(error).__name__}: {error}"
+            rospy.logfatal("control loop ends: %s\n%s", self._failure, traceback.format_exc())
         finally:
-            starter.join(timeout=2.0)
-            self._readiness.close()
-            self._manager.close()
+            self._end(self._manager, starter)
         return not self._failure
 
+    def _prepare(self) -> None:
+        prepare_interpreter()
+        refused = run_in_real_time() if self._real_time else []
+        if refused:
+            rospy.logwarn("control loop without: %s", "; ".join(refused))
+
     def _loop(self, manager: RosControllerManager) -> None:
-        last_s = rospy.get_time()
-        rate = rospy.Rate(1.0 / self._period_s, reset=True)
-        while not rospy.is_shutdown() and not self._failure:
+        wait = CyclePacer(self._period_s).wait if rospy.rostime.is_wallclock() else self._wait_for_simulated_clock
+        last_s, late_s, missed = rospy.get_time(), 0.0, 0
+        while not self._ended.is_set() and not self._failure and not rospy.is_shutdown():
             begun_s = time.perf_counter()
             time_s = rospy.get_time()
             period_s = max(0.0, time_s - last_s)
@@ -95,20 +121,37 @@ class RobotHwNode:
             if self._connected.is_set():
                 manager.update(time_s, period_s)
             self._robot_hw.write(time_s, period_s)
-            self._count_overrun(time.perf_counter() - begun_s)
-            rate.sleep()
+            self._statistics.add(late_s, missed, time.perf_counter() - begun_s)
+            late_s, missed = wait()
 
-    def _count_overrun(self, work_s: float) -> None:
-        if work_s > self._period_s:
-            self._overruns += 1
-            rospy.logwarn_throttle(OVERRUN_WARNING_PERIOD_S, f"control loop: a cycle took {work_s * 1e3:.1f} ms, its "
-                                   f"period is {self._period_s * 1e3:.1f} ms; overruns so far: {self._overruns}")
+    def _wait_for_simulated_clock(self) -> tuple[float, int]:
+        """Wait until the simulated clock has gone on by a period, or has jumped back; it says nothing about lateness."""
+        begun_s = rospy.get_time()
+        tick = rospy.rostime.get_rostime_cond()
+        while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
+            if self._ended.is_set() or self._failure:
+                break
+            with tick:
+                tick.wait(0.1)
+        return 0.0, 0
+
+    def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
+        """Stop the controllers, write what they leave as commands (velocities and efforts of 0), close everything."""
+        self._ended.set()
+        starter.join(timeout=2.0)
+        self._readiness.close()
+        manager.close()
+        try:
+            self._robot_hw.write(rospy.get_time(), self._period_s)
+        except Exception as error:  # a user's hardware may raise anything; what follows must be done all the same
+            rospy.logerr("last write of hardware %s raised %s", type(self._robot_hw).__name__, error)
+        self._report.close()
 
     def _get_ready(self, manager: RosControllerManager) -> None:
         """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
         try:
-            self._readiness.wait(self._ready_timeout_s)
-            if rospy.is_shutdown():
+            self._readiness.wait(self._ready_timeout_s, self._ended)
+            if rospy.is_shutdown() or self._ended.is_set():
                 return
             manager.connect()
             self._connected.set()
@@ -121,11 +164,27 @@ class RobotHwNode:
 
 def main() -> int:
     """Run the node; returns its exit code."""
-    rospy.init_node("robot_hw")
+    ended, running = threading.Event(), threading.Event()
+
+    def on_signal(number: int, frame: object) -> None:
+        del frame
+        if not running.is_set():  # hardware that takes its time to connect must not hold the end up
+            raise SystemExit(128 + number)
+        ended.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    rospy.init_node("robot_hw", disable_signals=True)
+    node: RobotHwNode | None = None
     try:
-        node = RobotHwNode()
+        node = RobotHwNode(ended)
         node.connect()
+        running.set()
+        return 0 if node.run() else 1
     except ParameterError as error:
         rospy.logfatal("%s", error)
         return 1
-    return 0 if node.run() else 1
+    finally:
+        if node is not None:
+            node.close()
+        rospy.signal_shutdown("the control loop has ended")

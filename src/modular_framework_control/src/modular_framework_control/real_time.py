@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Asks the operating system to let the control loop run on time, where it permits that.
+
+What Python itself does against a steady loop is made small too: another thread gives the interpreter up after a fraction
+of a cycle, and what exists when the loop begins is never looked through for garbage again.
+"""
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import resource
+import sys
+
+PRIORITY = 80
+_SWITCH_INTERVAL_S = 2e-4
+_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
+
+
+def prepare_interpreter() -> None:
+    """Keep other threads and the garbage collector from holding the loop up; call it when everything is set up."""
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+    gc.collect()
+    gc.freeze()
+
+
+def run_in_real_time(priority: int = PRIORITY) -> list[str]:
+    """Run the calling thread, and none it starts, before all others (SCHED_FIFO), and keep the memory of the process from being swapped out.
+
+    Args:
+        priority: 1 to 99.
+
+    Returns:
+        What was not permitted and why; nothing when all was.
+    """
+    refused = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+    except OSError as error:
+        refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {priority} in limits.conf, "
+                       f"or docker run --cap-add SYS_NICE --ulimit rtprio={priority})")
+    reason = _lock_memory()
+    if reason:
+        refused.append(f"locking of memory ({reason}; allow it with memlock unlimited in limits.conf, "
+                       "or docker run --ulimit memlock=-1)")
+    return refused
+
+
+def _lock_memory() -> str:
+    """Keep the memory in use, now and later, in RAM; returns why that is not permitted, or ""."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
+        return f"at most {limit // 1024} kB may be locked"
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) != 0:
+        return os.strerror(ctypes.get_errno())
+    return ""

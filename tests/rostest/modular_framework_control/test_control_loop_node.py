@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node robot_hw as an operator sees it: its figures, its faults, how it waits for its hardware and how it ends."""
+from __future__ import annotations
+
+import os
+import signal
+import time
+import xmlrpc.client
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from controller_manager_msgs.srv import ListControllers, LoadController, SwitchController
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+MODULE = """
+import rospy
+from std_msgs.msg import String
+from modular_framework_control.hardware_interface import ForceTorqueSensorHandle, ForceTorqueSensorInterface
+from modular_framework_control.mock_robot_hw import MockRobotHW
+
+class LabArm(MockRobotHW):
+    announces_ready = True
+    text = ""
+
+    def init(self, root_nh, robot_hw_nh):
+        self.diary = robot_hw_nh.get_param("diary", "")
+        rospy.Subscriber(robot_hw_nh.namespace + "/fault", String, self._on_fault)
+        self.sensor = ForceTorqueSensorHandle("wrist" + robot_hw_nh.namespace.replace("/", "_"), "tool0")
+        sensors = ForceTorqueSensorInterface()
+        sensors.register_handle(self.sensor)
+        self.register_interface(sensors)
+        return super().init(root_nh, robot_hw_nh)
+
+    def _on_fault(self, message):
+        self.text = message.data
+
+    def fault(self):
+        return self.text
+
+    def read(self, time_s, period_s):
+        super().read(time_s, period_s)
+        self.sensor.force = (1.0, 2.0, 3.0)
+
+    def write(self, time_s, period_s):
+        super().write(time_s, period_s)
+        self.last = [handle.command for handle in self._handles]
+
+    def close(self):
+        if self.diary:
+            with open(self.diary, "w") as file:
+                file.write(f"closed at {self.last}")
+
+class LabWheel(LabArm):
+    announces_ready = False
+"""
+LAUNCH = """
+<launch>
+  <rosparam>
+    robot_hardware: [arm_hw, wheel_hw]
+    arm_hw: {{type: lab_arm/LabWheel, joints: [shoulder, elbow], topic_to_wait_for: arm_ready}}
+    wheel_hw: {{type: lab_arm/LabWheel, joints: [wheel], command_interface: VelocityJointInterface,
+               topic_to_wait_for: wheel_ready, diary: {diary}}}
+    arm: {{type: position_controllers/JointTrajectoryController, joints: [shoulder, elbow]}}
+    wheel: {{type: velocity_controllers/JointTrajectoryController, joints: [wheel], gains: {{wheel: {{p: 1.0}}}},
+            velocity_ff: {{wheel: 1.0}}, constraints: {{goal_time: 2.0}}}}
+    wrench: {{type: force_torque_sensor_controller/ForceTorqueSensorController, publish_rate: 20}}
+  </rosparam>
+  {environment}
+  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" args="_rate:=125"/>
+</launch>
+"""
+WAITING = """
+<launch>
+  {environment}
+  <node pkg="modular_framework_control" type="robot_hw" name="impatient" output="screen">
+    <rosparam>{{type: modular_framework_control/CombinedRobotHW, ready_timeout: 1, robot_hardware: [a, b, c],
+      a: {{type: lab_arm/LabArm, joints: [a], topic_to_wait_for: a_ready}},
+      b: {{type: lab_arm/LabArm, joints: [b], topic_to_wait_for: b_ready}},
+      c: {{type: lab_arm/LabWheel, joints: [c], topic_to_wait_for: c_ready}}}}</rosparam>
+  </node>
+</launch>
+"""
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Settings under which the user's package is found."""
+    folder = Path(tmp_path_factory.mktemp("lab_arm"))
+    (folder / "lab_arm_hw.py").write_text(MODULE)
+    (folder / "package.xml").write_text(
+        '<package format="3"><name>lab_arm</name><version>0.0.0</version><description>d</description>'
+        '<maintainer email="a@b.cd">a</maintainer><license>BSD-3-Clause</license>'
+        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>')
+    classes = "".join(f'<class name="lab_arm/{name}" type="{name}" base_class_type="hardware_interface::RobotHW"/>'
+                      for name in ("LabArm", "LabWheel"))
+    (folder / "plugins.xml").write_text(f'<library path="lab_arm_hw">{classes}</library>')
+    return (f'<env name="ROS_PACKAGE_PATH" value="{folder}:$(env ROS_PACKAGE_PATH)"/>'
+            f'<env name="PYTHONPATH" value="{folder}:$(env PYTHONPATH)"/>')
+
+
+@pytest.fixture(scope="module")
+def diary(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(tmp_path_factory.mktemp("diary")) / "diary.txt"
+
+
+@pytest.fixture(scope="module")
+def robot(ros_launch: Callable[..., Any], environment: str, diary: Path) -> Any:
+    session = ros_launch(LAUNCH.format(environment=environment, diary=diary))
+    rospy.wait_for_service("controller_manager/load_controller", 20.0)
+    names = ["arm", "wheel", "wrench"]
+    for name in names:
+        assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)(name).ok
+    assert rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)(names, [], 2, False, 0.0).ok
+    return session
+
+
+def follow(name: str, joints: list[str], positions: list[float], duration_s: float) -> actionlib.SimpleActionClient:
+    client = actionlib.SimpleActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(10.0))
+    point = JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(duration_s))
+    client.send_goal(FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=joints, points=[point])))
+    deadline = time.monotonic() + 5.0
+    while client.get_state() != GoalStatus.ACTIVE:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return client
+
+
+def figures() -> tuple[int, str, dict[str, str]]:
+    (status,) = rospy.wait_for_message("/diagnostics", DiagnosticArray, 10.0).status
+    assert status.name == "robot_hw: control loop"
+    return status.level, status.message, {value.key: value.value for value in status.values}
+
+
+def test_the_loop_reports_how_it_keeps_its_time_and_begins_anew_when_asked(robot: Any) -> None:
+    time.sleep(1.0)
+    _, text, values = figures()
+    assert values["rate"] == "125" and int(values["cycles"]) > 50
+    assert "cycles took too long" in text
+    assert 0.0 <= float(values["late_p50_us"]) <= float(values["late_p99_us"]) <= float(values["late_max_us"])
+    rospy.ServiceProxy("robot_hw/reset_statistics", Empty)()
+    assert int(figures()[2]["cycles"]) < int(values["cycles"]) + 150
+
+
+def test_what_every_controller_claims_is_listed_on_the_wire(robot: Any) -> None:
+    listed = {entry.name: entry for entry in
+              rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller}
+    claims = {name: [(claim.hardware_interface, claim.resources) for claim in entry.claimed_resources]
+              for name, entry in listed.items()}
+    assert claims == {"arm": [("hardware_interface/PositionJointInterface", ["elbow", "shoulder"])],
+                      "wheel": [("hardware_interface/VelocityJointInterface", ["wheel"])],
+                      "wrench": [("hardware_interface/ForceTorqueSensorInterface", [])]}
+
+
+def test_a_sensor_is_published_under_its_name(robot: Any) -> None:
+    message = rospy.wait_for_message("/wrist_arm_hw", WrenchStamped, 5.0)
+    assert (message.wrench.force.x, message.wrench.force.z, message.header.frame_id) == (1.0, 3.0, "tool0")
+
+
+def test_a_fault_of_the_arm_ends_its_goal_within_200_ms_and_leaves_the_wheel_alone(robot: Any) -> None:
+    switch = rospy.Publisher("/arm_hw/fault", String, queue_size=1)
+    arm, wheel = follow("arm", ["shoulder", "elbow"], [1.0, 1.0], 20.0), follow("wheel", ["wheel"], [1.0], 2.0)
+    while switch.get_num_connections() == 0:
+        time.sleep(0.01)
+    begun_s = time.monotonic()
+    switch.publish("protective stop")
+    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert time.monotonic() - begun_s < 0.2
+    assert arm.get_state() == GoalStatus.ABORTED
+    assert "hardware 'arm_hw': protective stop" in arm.get_result().error_string
+    assert wheel.wait_for_result(rospy.Duration(5.0)) and wheel.get_state() == GoalStatus.SUCCEEDED
+    level, text, values = figures()
+    assert level == 2 and values["fault"] == "hardware 'arm_hw': protective stop" and text.startswith("hardware fault")
+    switch.publish("")
+    again = time.monotonic() + 5.0
+    while figures()[2]["fault"]:
+        assert time.monotonic() < again
+    assert follow("arm", ["shoulder", "elbow"], [0.2, 0.2], 0.3).wait_for_result(rospy.Duration(5.0))
+
+
+def test_at_its_end_goals_end_velocities_are_0_and_the_hardware_is_closed(robot: Any, diary: Path) -> None:
+    wheel = follow("wheel", ["wheel"], [10.0], 20.0)
+    pid = rosnode_pid("/robot_hw")
+    os.kill(pid, signal.SIGINT)
+    assert wheel.wait_for_result(rospy.Duration(5.0))
+    assert wheel.get_state() == GoalStatus.PREEMPTED and "stopped" in wheel.get_goal_status_text()
+    deadline = time.monotonic() + 5.0
+    while Path(f"/proc/{pid}").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    assert diary.read_text() == "closed at [0.0]"
+
+
+def rosnode_pid(name: str) -> int:
+    _, _, uri = rospy.get_master().lookupNode(name)
+    _, _, pid = xmlrpc.client.ServerProxy(uri).getPid("/test")
+    return int(pid)
+
+
+def test_every_listed_hardware_that_is_not_ready_in_time_is_named(ros_launch: Callable[..., Any],
+                                                                 environment: str) -> None:
+    session = ros_launch(WAITING.format(environment=environment))
+    expected = "waited 1 s in vain for True on topic /a_ready of hardware 'a', topic /b_ready of hardware 'b';"
+    deadline = time.monotonic() + 20.0
+    while expected not in session.log():
+        assert time.monotonic() < deadline, session.log()
+        time.sleep(0.1)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The beat of the control loop: fixed times, cycles left out are counted, and no memory is used up."""
+from __future__ import annotations
+
+import gc
+import os
+import tracemalloc
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modular_framework_control import real_time
+from modular_framework_control.cycle_pacer import RESOLUTION_S, CyclePacer, LoopStatistics
+from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory_goal import TrajectoryGoal
+
+
+class Clock:
+    """Time that passes only when somebody sleeps or works, and oversleeps by a given time."""
+
+    def __init__(self) -> None:
+        self.now_s = 5.0
+        self.oversleep_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        assert duration_s > 0.0
+        self.now_s += duration_s + self.oversleep_s
+
+
+@given(st.lists(st.floats(0.0, 0.05), min_size=1, max_size=50), st.floats(0.0, 0.003))
+def test_cycles_begin_at_multiples_of_the_period_and_what_is_left_out_is_counted(work_s: list[float],
+                                                                                oversleep_s: float) -> None:
+    clock = Clock()
+    pacer = CyclePacer(0.01, clock, clock.sleep)
+    clock.oversleep_s = oversleep_s
+    beats = 0
+    for duration_s in work_s:
+        clock.now_s += duration_s
+        late_s, missed = pacer.wait()
+        beats += 1 + missed
+        assert late_s >= -1e-9
+        assert clock.now_s - (5.0 + 0.01 * beats) == pytest.approx(late_s - 0.01 * missed, abs=1e-9)
+        assert -1e-9 <= late_s - 0.01 * missed < 0.01 + 1e-9
+
+
+def test_a_cycle_that_takes_longer_is_made_up_for_when_the_next_ones_are_short() -> None:
+    clock = Clock()
+    pacer = CyclePacer(0.01, clock, clock.sleep)
+    for work_s, late_ms in ((0.002, 0.0), (0.014, 4.0), (0.002, 0.0), (0.035, 25.0), (0.002, 0.0)):
+        clock.now_s += work_s
+        late_s, missed = pacer.wait()
+        assert late_s * 1e3 == pytest.approx(late_ms, abs=1e-6)
+        assert missed == (2 if late_ms == 25.0 else 0)
+
+
+@given(st.lists(st.floats(0.0, 0.019), min_size=1, max_size=300))
+def test_percentiles_agree_with_numpy_up_to_the_resolution(late_s: list[float]) -> None:
+    statistics = LoopStatistics(0.01)
+    for value in late_s:
+        statistics.add(value, 0, value)
+    figures = statistics.figures()
+    for share, seen in ((50, figures.late_p50_s), (99, figures.late_p99_s)):
+        exact = float(np.percentile(late_s, share, method="inverted_cdf"))
+        assert exact - 1e-12 <= seen <= exact + RESOLUTION_S + 1e-12
+    assert figures.late_max_s == max(late_s)
+    assert figures.overruns == sum(value > 0.01 for value in late_s)
+    assert figures.work_mean_s == pytest.approx(sum(late_s) / len(late_s))
+
+
+def test_figures_begin_anew() -> None:
+    statistics = LoopStatistics(0.01)
+    assert statistics.figures().cycles == 0
+    statistics.add(9.0, 900, 9.0)
+    assert (statistics.figures().missed, statistics.figures().late_p99_s) == (900, 9.0)
+    statistics.reset()
+    assert (statistics.figures().cycles, statistics.figures().work_max_s) == (0, 0.0)
+
+
+def test_what_the_system_does_not_permit_is_said_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(real_time.resource, "getrlimit", lambda which: (65536, 65536))
+    refused = real_time.run_in_real_time()
+    assert [text.split(" (")[0] for text in refused] == ["real-time scheduling", "locking of memory"]
+    assert "rtprio" in refused[0] and "64 kB" in refused[1] and "memlock" in refused[1]
+
+
+def test_ten_thousand_cycles_with_moving_controllers_use_up_no_memory(make_loop: Callable[..., Any]) -> None:
+    names = [f"j{i}" for i in range(12)]
+    loop = make_loop({"hw": {"joints": names},
+                      "one": {"type": "position_controllers/JointTrajectoryController", "joints": names[:6]},
+                      "two": {"type": "position_controllers/JointTrajectoryController", "joints": names[6:]},
+                      "states": {"type": "joint_state_controller/JointStateController"}})
+    loop.spawn("one", "two", "states")
+    for part, controller in (("j0", "one"), ("j6", "two")):
+        joints = tuple(names[int(part[1:]):int(part[1:]) + 6])
+        points = tuple(TrajectoryPoint(float(i), (0.1 * (i % 2),) * 6, (0.0,) * 6) for i in range(1, 400))
+        loop.controllers[controller].submit(TrajectoryGoal(JointTrajectory(joints, points)))
+        loop.controllers[controller].on_state = lambda snapshot: None
+    loop.controllers["states"].on_state = lambda snapshot: None
+    loop.step(1000)
+    gc.collect()
+    tracemalloc.start()
+    loop.step(100)
+    gc.collect()
+    before, _ = tracemalloc.get_traced_memory()
+    loop.step(10000)
+    gc.collect()
+    after, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert after - before < 4096, f"{after - before} bytes more after 10,000 cycles"
