@@ -20,6 +20,7 @@ from control_msgs.msg import (
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import (
+    AttachedCollisionObject,
     CollisionObject,
     Constraints,
     JointConstraint,
@@ -124,6 +125,15 @@ def tip_pose(values: Any, frame: str = "world", link: str = TIP) -> Pose:
 
 def vector(pose: Pose) -> np.ndarray:
     return np.array([pose.position.x, pose.position.y, pose.position.z])
+
+
+def hold(item: CollisionObject, link: str = TIP) -> None:
+    """Gives the robot an object to hold; its pose counts in the link's frame."""
+    item.header.frame_id = link
+    scene = PlanningScene(is_diff=True)
+    scene.robot_state.is_diff = True
+    scene.robot_state.attached_collision_objects = [AttachedCollisionObject(link_name=link, object=item)]
+    assert call("apply_planning_scene", ApplyPlanningScene, scene).success
 
 
 def table() -> CollisionObject:

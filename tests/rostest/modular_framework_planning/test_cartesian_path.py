@@ -10,7 +10,8 @@ import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest
-from planning_wire import ARM, DOWN, GROUP, OK, START, TIP, add, box, call, report_of, tip_pose, vector
+from planning_wire import ARM, DOWN, GROUP, OK, START, TIP, add, box, call, hold, report_of, tip_pose, vector
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
@@ -101,6 +102,29 @@ def test_jump_thresholds_end_a_line_and_name_the_joint(home: Pose, changes: dict
     answer, report = report_of(lambda: follow(shifted(home, 0.2, 0.0, -0.1), **changes))
     assert answer.error_code.val == OK and answer.fraction < 1.0
     assert re.search(r"joint '\w+_joint'.*jump_threshold", report["reason"]), report
+
+
+def turn_of(pose: Pose) -> Rotation:
+    return Rotation.from_quat([pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w])
+
+
+def rod_at(tip: Pose) -> np.ndarray:
+    """Where the middle of the held rod is."""
+    return vector(tip) + turn_of(tip).apply([0.0, 0.0, 0.2])
+
+
+def test_a_held_object_follows_the_line_itself(home: Pose) -> None:
+    hold(box("rod", 0.0, 0.0, 0.2, (0.02, 0.02, 0.1)))
+    begin, shift = rod_at(home), np.array([0.05, 0.0, 0.05])
+    turn = Rotation.from_euler("y", 0.5) * turn_of(home)
+    goal = Pose(Point(*(begin + shift)), Quaternion(*turn.as_quat()))
+    answer = follow(goal, link_name="rod")
+    assert answer.error_code.val == OK and answer.fraction == 1.0
+    along = np.array([rod_at(tip_pose(row)) - begin for row in rows_of(answer)[0][::5]])
+    way = shift / np.linalg.norm(shift)
+    assert np.linalg.norm(along - np.outer(along @ way, way), axis=1).max() < 1e-3
+    end = tip_pose(rows_of(answer)[0][-1])
+    assert np.allclose(rod_at(end), begin + shift, atol=1e-5) and (turn_of(end).inv() * turn).magnitude() < 1e-5
 
 
 def test_path_constraints_end_a_line(home: Pose) -> None:

@@ -8,29 +8,29 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from moveit_msgs.msg import (
-    AttachedCollisionObject,
     BoundingVolume,
     Constraints,
     JointConstraint,
     MoveItErrorCodes,
     OrientationConstraint,
-    PlanningScene,
     PositionConstraint,
     PositionIKRequest,
     RobotState,
     VisibilityConstraint,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetPositionFK, GetPositionIK, GetStateValidity
+from moveit_msgs.srv import GetPositionFK, GetPositionIK, GetStateValidity
 from planning_wire import (
     ARM,
     DOWN,
     GROUP,
+    LAUNCH,
     OK,
     START,
     TIP,
     add,
     box,
     call,
+    hold,
     plan,
     report_of,
     request,
@@ -46,7 +46,9 @@ from std_msgs.msg import Header
 CODES = MoveItErrorCodes
 NAN = float("nan")
 UNTURNED = Quaternion(0, 0, 0, 1)
-pytestmark = pytest.mark.usefixtures("clean_scene")
+POSITION_ONLY = LAUNCH.replace("</launch>", """  <param name="robot_description_kinematics/arm/position_only_ik"
+         value="true"/></launch>""")
+pytestmark = [pytest.mark.move_group(launch=POSITION_ONLY), pytest.mark.usefixtures("clean_scene")]
 
 
 def in_box(x: float, y: float, z: float, size: tuple[float, float, float], **changes: Any) -> PositionConstraint:
@@ -205,16 +207,25 @@ def test_ik_is_for_one_tip_which_may_come_as_a_list_of_one() -> None:
 
 
 def test_ik_places_a_held_object() -> None:
-    scene = PlanningScene(is_diff=True)
-    scene.robot_state.is_diff = True
-    held = box("block", 0.0, 0.0, 0.1, (0.04, 0.04, 0.04))
-    held.header.frame_id = TIP
-    scene.robot_state.attached_collision_objects = [AttachedCollisionObject(link_name=TIP, object=held)]
-    assert call("apply_planning_scene", ApplyPlanningScene, scene).success
+    hold(box("block", 0.0, 0.0, 0.1, (0.04, 0.04, 0.04)))
     code, values = solve(ik(ik_link_name="block", robot_state=RobotState(is_diff=True), avoid_collisions=False))
     assert code == OK
     position, rotation = pose_at(values)
     assert np.abs(position + rotation.apply([0, 0, 0.1]) - (0.1, 0.5, 0.95)).max() < 1e-6
+
+
+def test_with_position_only_ik_the_orientation_is_open() -> None:
+    hold(box("block", 0.0, 0.0, 0.1, (0.04, 0.04, 0.04)))
+    ask = ik(group_name="arm", ik_link_name="block", robot_state=RobotState(is_diff=True), avoid_collisions=True)
+    ask.pose_stamped.pose.orientation = Quaternion(0.6, 0.0, 0.8, 0.0)
+    code, values = solve(ask)
+    assert code == OK
+    position, rotation = pose_at(values)
+    assert np.abs(position + rotation.apply([0, 0, 0.1]) - (0.1, 0.5, 0.95)).max() < 1e-6
+    assert np.linalg.norm(np.subtract(values, START)) < 0.8, "a state further than needed"
+    ask.pose_stamped.pose.position.z = 4.0
+    (code, _), report = report_of(lambda: solve(ask))
+    assert code == CODES.NO_IK_SOLUTION and "position_only_ik" in report["reason"]
 
 
 def test_validity_answers_every_constraint_and_every_contact() -> None:

@@ -18,15 +18,10 @@ from modular_framework_planning import compiled_kinematics
 from modular_framework_planning.chain_model import tree_of
 from modular_framework_planning.compiled_kinematics import joint_placements, rotation_vector
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.kinematics import (
-    NUMERIC,
-    InverseKinematics,
-    KinematicsPool,
-    KinematicsSettings,
-    clearest,
-    settings_from,
-)
+from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool
+from modular_framework_planning.kinematics_settings import NUMERIC, KinematicsSettings, settings_from
 from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.solution_choice import clearest
 from modular_framework_planning.spatial import pose_difference
 
 TIP = "eg_manipulator"
@@ -206,14 +201,43 @@ def test_a_joint_outside_the_group_stays_where_the_seed_has_it(seven: RobotModel
     assert max(pose_gap(seven_joint_flange(found[0]), seven_joint_flange(seed))) < 1e-6
 
 
+@pytest.mark.parametrize("arm_of", ["model", "seven"])
+def test_a_position_alone_is_reached_by_the_least_motion_found(arm_of: str, request: pytest.FixtureRequest) -> None:
+    part = request.getfixturevalue(arm_of)
+    group = part.group("arm" if arm_of == "seven" else "arm_and_manipulator")
+    solver, rng, point = InverseKinematics(part, group), np.random.default_rng(5), np.array([0.05, -0.02, 0.1])
+    nearer = 0
+    for _ in range(30):
+        ends = part.default_positions(), part.default_positions()
+        for positions in ends:
+            positions[group.indices] = rng.uniform(np.maximum(part.lower, -2.0), np.minimum(part.upper, 2.0)
+                                                   )[group.indices]
+        seed, there = ends
+        position = part.link_transforms(there)[group.tip_link].act(point)
+        found = solver.position_solutions(group.tip_link, point, position, seed, 0.5)
+        assert found, "the position was taken from a state"
+        for positions in found:
+            assert np.allclose(part.link_transforms(positions)[group.tip_link].act(point), position, atol=1e-6)
+            assert not part.bound_violations(positions, group.indices)
+        ways = [float(np.linalg.norm(positions - seed)) for positions in found]
+        assert ways == sorted(ways)
+        nearer += ways[0] < np.linalg.norm(there - seed)
+    assert nearer >= 25, "the orientation is open, so nearer states than the one it came from are there"
+
+
+def test_a_position_out_of_reach_has_no_solution(model: RobotModel, solver: InverseKinematics) -> None:
+    seed = model.default_positions()
+    assert not solver.position_solutions(TIP, np.zeros(3), np.array([0.0, 0.0, 4.0]), seed, 0.05)
+
+
 def test_kinematics_yaml_is_read_and_its_faults_are_told(model: RobotModel) -> None:
     read = settings_from({"arm": {"kinematics_solver": "kdl_kinematics_plugin/KDLKinematicsPlugin",
                                   "kinematics_solver_search_resolution": 0.005, "kinematics_solver_timeout": 0.01,
-                                  "kinematics_solver_attempts": 3}})
-    assert read["arm"] == KinematicsSettings("kdl_kinematics_plugin/KDLKinematicsPlugin", 0.005, 0.01, 3)
+                                  "kinematics_solver_attempts": 3, "position_only_ik": True}})
+    assert read["arm"] == KinematicsSettings("kdl_kinematics_plugin/KDLKinematicsPlugin", 0.005, 0.01, 3, True)
     assert KinematicsPool(model, read).solver("arm").settings.attempts == 3
     for bad in ({"arm": 3}, {"arm": {"kinematics_solver_timeout": "soon"}}, {"arm": {"kinematics_solver_timeout": 0}},
-                {"arm": {"kinematics_solver_search_resolution": -0.1}}):
+                {"arm": {"kinematics_solver_search_resolution": -0.1}}, {"arm": {"position_only_ik": "yes"}}):
         with pytest.raises(PlanningError, match="kinematics.yaml"):
             settings_from(bad)
 

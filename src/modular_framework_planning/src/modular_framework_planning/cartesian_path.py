@@ -90,17 +90,18 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
 
 def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints: Sequence[Transform],
                   max_step_m: float, jumps: JumpThresholds = NO_JUMP_TEST,
-                  objection: Objection = no_objection) -> StraightLine:
+                  objection: Objection = no_objection, carried: Transform | None = None) -> StraightLine:
     """Follows straight lines through waypoints until something is in the way.
 
     Args:
         solver: inverse kinematics of the group.
-        link: what follows the lines; rigidly fixed to the end of the group's chain.
+        link: what follows the lines, or carries what follows them; rigidly fixed to the end of the group's chain.
         start: positions of the whole robot.
-        waypoints: poses of the link in the planning frame.
+        waypoints: poses in the planning frame of what follows the lines.
         max_step_m: longest step [m].
         jumps: what counts as a jump.
         objection: told the joint values before and after each step; says why it is not allowed, or nothing.
+        carried: pose, in the link's frame, of what follows the lines (a held object); None: the link itself does.
 
     Raises:
         PlanningError: the step is not above 0 or gives more than 50,000 steps, a threshold is below 0, there is no
@@ -110,8 +111,9 @@ def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints:
     follower = PoseFollower(solver, link, start)
     rows = [np.array(start[follower.group.indices], dtype=float)]
     reached: list[int] = []
-    poses = [follower.pose(rows[0]), *waypoints]
-    lines = [_Line(follower, before, after, min(max_step_m, LONGEST_STEP_M), jumps, objection)
+    to_link = pin.SE3.Identity() if carried is None else carried.inverse()
+    poses = [follower.pose(rows[0]) * to_link.inverse(), *waypoints]
+    lines = [_Line(follower, (before, after, to_link), min(max_step_m, LONGEST_STEP_M), jumps, objection)
              for before, after in zip(poses[:-1], poses[1:], strict=True)]
     _require_countable(lines, max_step_m)
     for number, line in enumerate(lines):
@@ -150,8 +152,10 @@ def _require_countable(lines: Sequence[_Line], max_step_m: float) -> None:
 class _Line:
     """One straight line."""
 
-    def __init__(self, follower: PoseFollower, start: Transform, end: Transform, step_m: float, jumps: JumpThresholds,
-                 objection: Objection) -> None:
+    def __init__(self, follower: PoseFollower, ends: tuple[Transform, Transform, Transform], step_m: float,
+                 jumps: JumpThresholds, objection: Objection) -> None:
+        """Args: ends: first and last pose of what follows the line, and pose of the follower's link in its frame."""
+        start, end, self._to_link = ends
         self._follower, self._start, self._end = follower, start, end
         self._jumps, self._objection = jumps, objection
         self._turn = pin.log3(start.rotation.T @ end.rotation)
@@ -163,7 +167,8 @@ class _Line:
     def _pose(self, number: int) -> Transform:
         share = number / self.count
         return pin.SE3(self._start.rotation @ pin.exp3(share * self._turn),
-                       self._start.translation + share * (self._end.translation - self._start.translation))
+                       self._start.translation + share * (self._end.translation - self._start.translation)
+                       ) * self._to_link
 
     def follow(self, begin: Array) -> tuple[list[Array], str, ErrorCode]:
         """Returns the rows after the first, why they end early ("" if they do not) and the code of that."""

@@ -34,6 +34,26 @@ def tree_of(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
                 np.array(axes, dtype=float).reshape(-1, 3), np.array(prismatic, dtype=bool))
 
 
+BALL_GAIN = 10.0  # radians a unit of a ball joint's value: next to free beside the real joints
+
+
+def with_ball_joint(chain: Chain, joint: Array, width: int) -> Chain:
+    """Returns a chain that ends in a ball joint, so that reaching a pose of its tip asks for the position alone.
+
+    Args:
+        chain: the chain; group values drive it.
+        joint: pose of the ball joint in the frame of the chain's tip, shape (4, 4).
+        width: number of group values; the three of the ball joint come after them, each BALL_GAIN radians a unit.
+    """
+    end = (np.vstack([chain.tip, (0.0, 0.0, 0.0, 1.0)]) @ joint)[:3]
+    last, tree = len(chain.drivers) - 1, chain.tree
+    placements = np.concatenate([tree.placements, end[None], np.tile(np.eye(3, 4), (2, 1, 1))])
+    longer = Tree(np.concatenate([tree.parents, last + np.arange(3)]), placements,
+                  np.vstack([tree.axes, np.eye(3)]), np.append(tree.prismatic, np.zeros(3, dtype=bool)))
+    return Chain(longer, np.eye(3, 4), np.concatenate([chain.drivers, width + np.arange(3)]),
+                 np.append(chain.gains, np.full(3, BALL_GAIN)), np.append(chain.offsets, np.zeros(3)))
+
+
 class ChainModel:
     """The way from the planning frame to the last link of a group."""
 

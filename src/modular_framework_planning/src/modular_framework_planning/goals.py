@@ -13,10 +13,11 @@ from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool, first_free
+from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool
 from modular_framework_planning.motion_check import MotionChecker
 from modular_framework_planning.planning_request import ConstraintGoal, JointGoal, PlanningRequest, PoseGoal
 from modular_framework_planning.robot_model import JointGroup
+from modular_framework_planning.solution_choice import first_free
 from modular_framework_planning.spatial import Array
 
 MAX_GOAL_STATES = 8

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
-from modular_framework_planning.chain_model import ChainModel
+from modular_framework_planning.chain_model import BALL_GAIN, ChainModel, with_ball_joint
 from modular_framework_planning.closed_form import ClosedForm
 from modular_framework_planning.compiled_kinematics import (
     Chain,
@@ -19,6 +21,7 @@ from modular_framework_planning.compiled_kinematics import (
     whole_turns,
 )
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.kinematics_settings import NUMERIC, KinematicsSettings
 from modular_framework_planning.robot_model import JointGroup, RobotModel
 from modular_framework_planning.spatial import Array, Transform
 
@@ -35,56 +38,6 @@ LEAST_BATCHES = 8  # tried even where the time is over, so that a busy machine d
 FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
 ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
 APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
-SIMILAR = 0.1  # [rad]; distances from the seed that differ by less are decided by clearance
-NUMERIC = "numeric"
-
-
-@dataclass(frozen=True, slots=True)
-class KinematicsSettings:
-    """How one group is solved; the keys of kinematics.yaml without their prefix.
-
-    Attributes:
-        solver: plugin name of a config package, or "numeric" to leave closed forms out.
-        search_resolution: step of the held joint of a seven-joint chain [rad].
-        timeout_s: time one attempt of the numeric search may take, where a request gives none.
-        attempts: how many such times.
-    """
-
-    solver: str = ""
-    search_resolution: float = 0.1
-    timeout_s: float = 0.05
-    attempts: int = 1
-
-    def __post_init__(self) -> None:
-        if not (self.search_resolution > 0.0 and self.timeout_s > 0.0 and self.attempts >= 1):
-            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: kinematics_solver_search_resolution is "
-                                f"{self.search_resolution}, kinematics_solver_timeout is {self.timeout_s}, "
-                                f"kinematics_solver_attempts is {self.attempts}; allowed are numbers above 0, and "
-                                "whole attempts")
-
-
-def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSettings]:
-    """Reads the contents of kinematics.yaml: a mapping from group to its keys.
-
-    Raises:
-        PlanningError: a group's entry is not a mapping, or a value is not a number above 0.
-    """
-    result = {}
-    for group, entry in parameters.items():
-        if not isinstance(entry, Mapping):
-            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}' is {entry!r}; a mapping with "
-                                "kinematics_solver and its keys is needed")
-        default = KinematicsSettings()
-        try:
-            result[group] = KinematicsSettings(
-                str(entry.get("kinematics_solver", default.solver)),
-                float(entry.get("kinematics_solver_search_resolution", default.search_resolution)),
-                float(entry.get("kinematics_solver_timeout", default.timeout_s)),
-                int(entry.get("kinematics_solver_attempts", default.attempts)))
-        except (TypeError, ValueError) as error:
-            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
-                                "needed") from error
-    return result
 
 
 class InverseKinematics:
@@ -168,10 +121,26 @@ class InverseKinematics:
             found = self._from_search(problem, rng or np.random.default_rng(0))
         return self._ranked(problem, found)
 
+    def position_solutions(self, tip_link: str, point: Array, position: Array, seed: Array,
+                           timeout_s: float | None = None, rng: np.random.Generator | None = None) -> list[Array]:
+        """As `solutions`, for the position of a point alone; the orientation is left open, and kept where it can be.
+
+        Args:
+            tip_link: link that carries the point; rigidly fixed to the end of the group's chain.
+            point: in the link's frame (3,) [m].
+            position: where the point shall be, in the planning frame (3,) [m].
+            seed, timeout_s, rng: as for `solutions`.
+        """
+        joint = self.tip_offset(tip_link).inverse() * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
+        turn = self.model.link_transforms(seed)[tip_link].rotation
+        target = pin.SE3(turn, np.asarray(position, dtype=float))
+        problem = self._problem(target, seed, timeout_s).with_ball_joint(joint)
+        return self._ranked(problem, self._from_search(problem, rng or np.random.default_rng(0)))
+
     def _problem(self, target: Transform, seed: Array, timeout_s: float | None = None) -> _Problem:
         allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
         return _Problem(self._chain.at(seed), target, np.asarray(seed, dtype=float),
-                        np.array(seed[self.group.indices], dtype=float), *self._bounds(seed),
+                        np.array(seed[self.group.indices], dtype=float), *self._bounds(seed), self._turning,
                         time.monotonic() + allowed)
 
     def _bounds(self, seed: Array) -> tuple[Array, Array]:
@@ -238,13 +207,13 @@ class InverseKinematics:
         while fruitless < FRUITLESS_BATCHES and len(found) < enough:
             arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, enough)
             rows = np.vstack([found, starts[arrived]])
-            rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
+            rows = rows[unique_rows(rows, problem.turning, SAME_SOLUTION)]
             fruitless = fruitless + 1 if len(rows) == len(found) else 0
             found, batches = rows, batches + 1
             if time.monotonic() > problem.deadline and (len(found) or batches >= LEAST_BATCHES):
                 break
             starts = rng.uniform(lower, upper, (STARTS_A_BATCH, len(lower)))
-        return whole_turns(found, self._turning, problem.lower, problem.upper, MAX_TURNS)
+        return whole_turns(found, problem.turning, problem.lower, problem.upper, MAX_TURNS)
 
     def _ranked(self, problem: _Problem, found: Array) -> list[Array]:
         """Puts the nearest to the seed first; returns positions of the whole robot."""
@@ -252,7 +221,9 @@ class InverseKinematics:
             return []
         rows = found[np.argsort(np.linalg.norm(found - problem.seed, axis=1), kind="stable")]
         if rows.shape[1] > 6:
-            rows = self._approached(problem, rows)
+            rows = self._approached(problem, rows)[:, :len(self.group.joints)]
+            ways = np.linalg.norm(rows - problem.seed[:rows.shape[1]], axis=1)
+            rows = rows[np.argsort(ways, kind="stable")]
         result = np.tile(problem.whole_seed, (len(rows), 1))
         result[:, self.group.indices] = rows
         for follower, leader, multiplier, offset in self.model.mimics:
@@ -296,41 +267,19 @@ class _Problem:
     seed: Array
     lower: Array
     upper: Array
+    turning: NDArray[np.bool_]
     deadline: float
     pose: Array = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", np.ascontiguousarray(self.target.homogeneous[:3]))
 
-
-def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: int = 1) -> list[Array]:
-    """Returns the first candidates that are free, in their order.
-
-    Whole turns of a joint look the same to every obstacle, so each posture is checked once.
-    """
-    verdicts: dict[bytes, bool] = {}
-    free: list[Array] = []
-    for values in candidates:
-        key = np.round(np.exp(1j * values), 4).tobytes()
-        if key not in verdicts:
-            verdicts[key] = is_free(values)
-        if verdicts[key]:
-            free.append(values)
-            if len(free) >= most:
-                break
-    return free
-
-
-def clearest(free: list[Array], seed: Array, clearance: Callable[[Array], float]) -> Array:
-    """Returns, of free solutions ordered by distance from the seed, the nearest one.
-
-    Of several that are about as near as it, the one furthest from obstacles is taken.
-    """
-    distances = [float(np.linalg.norm(values - seed)) for values in free]
-    similar = [values for values, distance in zip(free, distances, strict=True) if distance <= distances[0] + SIMILAR]
-    if len(similar) == 1 or distances[0] < SAME_SOLUTION:
-        return free[0]
-    return max(similar, key=clearance)
+    def with_ball_joint(self, joint: Transform) -> _Problem:
+        """Returns the problem with a ball joint, at a pose in the last link's frame, that takes up the orientation."""
+        reach = np.full(3, np.pi / BALL_GAIN)
+        return replace(self, chain=with_ball_joint(self.chain, joint.homogeneous, len(self.seed)),
+                       seed=np.append(self.seed, np.zeros(3)), lower=np.append(self.lower, -reach),
+                       upper=np.append(self.upper, reach), turning=np.append(self.turning, np.zeros(3, dtype=bool)))
 
 
 class KinematicsPool:

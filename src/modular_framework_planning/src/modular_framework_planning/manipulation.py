@@ -18,12 +18,13 @@ from modular_framework_planning.collision import ATTACHED, WORLD, CollisionCheck
 from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import InverseKinematics, first_free
+from modular_framework_planning.kinematics import InverseKinematics
 from modular_framework_planning.line_timing import time_line
 from modular_framework_planning.motion_check import MotionChecker
 from modular_framework_planning.planning_request import JointGoal, PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import JointGroup
+from modular_framework_planning.solution_choice import first_free
 from modular_framework_planning.spatial import Array, Transform
 from modular_framework_planning.trajectory import Trajectory
 

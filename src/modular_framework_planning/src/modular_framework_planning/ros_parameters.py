@@ -7,7 +7,7 @@ import time
 import rospy
 
 from modular_framework_planning.errors import ModelError
-from modular_framework_planning.kinematics import KinematicsSettings, settings_from
+from modular_framework_planning.kinematics_settings import KinematicsSettings, settings_from
 from modular_framework_planning.robot_model import RobotModel
 
 DESCRIPTION = "robot_description"

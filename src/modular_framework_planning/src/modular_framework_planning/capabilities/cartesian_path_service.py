@@ -19,7 +19,7 @@ from modular_framework_planning.cartesian_path import (
     straight_line,
 )
 from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constraint_conversions import constraints_from_message
+from modular_framework_planning.constraint_conversions import constraints_from_message, holding_link
 from modular_framework_planning.conversions import (
     scene_with_state,
     state_message,
@@ -40,12 +40,13 @@ from modular_framework_planning.trajectory import Trajectory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lines:
-    """One request, read."""
+    """One request, read; `carried` is the pose of what follows the lines in the frame of `link`, which moves it."""
 
     scene: PlanningScene
     group: JointGroup
     solver: InverseKinematics
     link: str
+    carried: Transform
     waypoints: tuple[Transform, ...]
     motion: MotionChecker
     checker: CollisionChecker | None
@@ -73,7 +74,8 @@ class CartesianPathService:
             lines = self._read(request)
             found = straight_line(lines.solver, lines.link, lines.scene.positions, lines.waypoints, request.max_step,
                                   JumpThresholds(request.jump_threshold, request.prismatic_jump_threshold,
-                                                 request.revolute_jump_threshold), self._objection(lines, request))
+                                                 request.revolute_jump_threshold), self._objection(lines, request),
+                                  lines.carried)
             trajectory = self._timed(lines, found, request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             response.error_code.val = self._context.reporter.failure("cartesian_path", error, **details)
@@ -96,14 +98,17 @@ class CartesianPathService:
         if not request.start_state.joint_state.name or request.start_state.is_diff:
             self._context.monitor.wait_for_state()
         scene = scene_with_state(self._context.monitor.snapshot(), request.start_state, "start_state")
-        link = request.link_name or group.tip_link
-        if not scene.model.has_link(link):
-            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link_name", link, scene.model.frame_ids)
+        name = (request.link_name or group.tip_link).removeprefix("/")
+        link = holding_link(scene, name)
+        if not link:
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link_name", name,
+                                   [*scene.model.frame_ids, *scene.attached])
+        carried = scene.frame_transform(link).actInv(scene.frame_transform(name))
         checker = None
         if request.avoid_collisions:
             checker = self._context.pipeline("").checker(scene, group, scene.positions)
         motion = MotionChecker(checker or CollisionChecker(scene, group.indices), group.indices, scene.positions)
-        return _Lines(scene, group, solver, link, _waypoints(scene, link, request), motion, checker)
+        return _Lines(scene, group, solver, link, carried, _waypoints(scene, name, request), motion, checker)
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:
         """Returns what is asked about each step: path constraints, then collisions."""
@@ -140,15 +145,18 @@ class CartesianPathService:
                                        velocity, acceleration)
 
 
-def _waypoints(scene: PlanningScene, link: str, request: Any) -> tuple[Transform, ...]:
-    """Returns the waypoints in the planning frame; raises PlanningError for numbers or frames that cannot be used."""
+def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Transform, ...]:
+    """Returns the waypoints in the planning frame; raises PlanningError for numbers or frames that cannot be used.
+
+    Args: the scene, the link or held object that follows the lines, the message.
+    """
     if not math.isfinite(request.max_cartesian_speed):
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_cartesian_speed is {request.max_cartesian_speed}; a "
                             "finite number is needed, 0 for no limit")
     poses = [transform_from_pose(pose, f"waypoints[{number}]") for number, pose in enumerate(request.waypoints)]
     frame = request.header.frame_id.removeprefix("/")
     base = scene.frame_transform(frame)
-    if frame != link:
+    if frame != follower:
         return tuple(base * pose for pose in poses)
     result = []
     for pose in poses:

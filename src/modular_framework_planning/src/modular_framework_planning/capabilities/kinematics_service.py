@@ -2,6 +2,7 @@
 """Services compute_ik and compute_fk."""
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,14 +26,46 @@ from modular_framework_planning.conversions import (
     state_message,
 )
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
-from modular_framework_planning.kinematics import clearest, first_free
+from modular_framework_planning.kinematics import InverseKinematics
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import JointGroup
 from modular_framework_planning.ros_context import MoveGroupContext
+from modular_framework_planning.solution_choice import clearest, first_free
 from modular_framework_planning.spatial import Array, Transform
 
 LONGEST_TIMEOUT_S = 10.0
 MOST_COMPARED = 4  # free solutions whose clearance decides between them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wanted:
+    """What compute_ik is asked for.
+
+    Attributes:
+        link: the one that is moved.
+        placed: pose, in its frame, of what is to be placed: the link itself, a held object or one of its subframes.
+        target: where that shall be, in the planning frame.
+    """
+
+    link: str
+    placed: Transform
+    target: Transform
+
+    def solutions(self, solver: InverseKinematics, seed: Array, timeout_s: float | None) -> list[Array]:
+        """Returns positions of the whole robot, nearest to the seed first; of the position alone where the group's
+        settings say so."""
+        if solver.settings.position_only:
+            return solver.position_solutions(self.link, self.placed.translation, self.target.translation, seed,
+                                             timeout_s)
+        return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
+
+    def why_none(self, solver: InverseKinematics, seed: Array) -> str:
+        """Says why there is no solution."""
+        if solver.settings.position_only:
+            where = np.array2string(self.target.translation, precision=3, separator=", ")
+            return (f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
+                    f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)")
+        return solver.explain_unreachable(self.link, self.target * self.placed.inverse(), seed)
 
 
 class KinematicsService:
@@ -73,10 +106,11 @@ class KinematicsService:
         """Returns the solution nearest to the seed; raises PlanningError with the cause."""
         group = self._context.model.group(request.group_name)
         solver = self._context.kinematics.solver(group.name)
-        link, target = self._target(scene, group, request)
-        found = solver.solutions(link, target, scene.positions, self._timeout(request))
+        wanted = self._target(scene, group, request)
+        link = wanted.link
+        found = wanted.solutions(solver, scene.positions, self._timeout(request))
         if not found:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(link, target, scene.positions))
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, wanted.why_none(solver, scene.positions))
         kept = self._constrained(scene, request, found, link)
         if not request.avoid_collisions:
             return kept[0]
@@ -95,8 +129,8 @@ class KinematicsService:
         return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
 
     @staticmethod
-    def _target(scene: PlanningScene, group: JointGroup, request: Any) -> tuple[str, Transform]:
-        """Returns the link to place and its pose in the planning frame; raises PlanningError."""
+    def _target(scene: PlanningScene, group: JointGroup, request: Any) -> _Wanted:
+        """Reads what is to be placed where; raises PlanningError."""
         links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
         if len(links) > 1 or len(poses) > 1:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"{len(links)} ik_link_names and {len(poses)} poses in "
@@ -108,9 +142,7 @@ class KinematicsService:
         if not link:
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name,
                                    [*scene.model.frame_ids, *scene.attached])
-        if link != name:  # an attached object or one of its subframes is to be placed
-            target = target * scene.frame_transform(name).actInv(scene.frame_transform(link))
-        return link, target
+        return _Wanted(link, scene.frame_transform(link).actInv(scene.frame_transform(name)), target)
 
     @staticmethod
     def _constrained(scene: PlanningScene, request: Any, found: list[Array], link: str) -> list[Array]:

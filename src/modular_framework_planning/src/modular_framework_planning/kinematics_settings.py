@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How each group's inverse kinematics is solved: the contents of kinematics.yaml."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+
+NUMERIC = "numeric"
+
+
+@dataclass(frozen=True, slots=True)
+class KinematicsSettings:
+    """How one group is solved; the keys of kinematics.yaml without their prefix.
+
+    Attributes:
+        solver: plugin name of a config package, or "numeric" to leave closed forms out.
+        search_resolution: step of the held joint of a seven-joint chain [rad].
+        timeout_s: time one attempt of the numeric search may take, where a request gives none.
+        attempts: how many such times.
+        position_only: whether compute_ik brings the link's origin to the position and leaves the orientation open.
+    """
+
+    solver: str = ""
+    search_resolution: float = 0.1
+    timeout_s: float = 0.05
+    attempts: int = 1
+    position_only: bool = False
+
+    def __post_init__(self) -> None:
+        if not (self.search_resolution > 0.0 and self.timeout_s > 0.0 and self.attempts >= 1):
+            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: kinematics_solver_search_resolution is "
+                                f"{self.search_resolution}, kinematics_solver_timeout is {self.timeout_s}, "
+                                f"kinematics_solver_attempts is {self.attempts}; allowed are numbers above 0, and "
+                                "whole attempts")
+
+
+def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSettings]:
+    """Reads the contents of kinematics.yaml: a mapping from group to its keys.
+
+    Raises:
+        PlanningError: a group's entry is not a mapping, or a value is not a number above 0.
+    """
+    result = {}
+    for group, entry in parameters.items():
+        if not isinstance(entry, Mapping):
+            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}' is {entry!r}; a mapping with "
+                                "kinematics_solver and its keys is needed")
+        default = KinematicsSettings()
+        try:
+            result[group] = KinematicsSettings(
+                str(entry.get("kinematics_solver", default.solver)),
+                float(entry.get("kinematics_solver_search_resolution", default.search_resolution)),
+                float(entry.get("kinematics_solver_timeout", default.timeout_s)),
+                int(entry.get("kinematics_solver_attempts", default.attempts)),
+                _yes(entry.get("position_only_ik", default.position_only)))
+        except (TypeError, ValueError) as error:
+            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
+                                "needed, and for position_only_ik true or false") from error
+    return result
+
+
+def _yes(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"position_only_ik is {value!r}")
+    return value
