@@ -22,8 +22,7 @@ from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
 MakeLine = Callable[..., DynamixelLine]
 MakeGripper = Callable[..., tuple[DynamixelLine, EzGripper]]
 TOLERANCE = 0.03
-OBJECT_OPENING = 900.0
-OBJECT_POSITION = 1.94 * (1 - OBJECT_OPENING / 2500)
+OBJECT_POSITION = 1.24
 
 
 def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> float:
@@ -131,7 +130,7 @@ def test_velocity_and_load_have_the_sign_of_closing(gripper: EzGripper) -> None:
 
 
 def test_an_object_is_held_with_the_torque_asked_for_and_let_go(line: DynamixelLine, gripper: EzGripper) -> None:
-    line.place_object(OBJECT_OPENING)
+    line.place_object(OBJECT_POSITION)
     state = arrive(gripper, 1.94, 300)
     assert state.motion is Motion.HOLDING
     assert state.reading.position == pytest.approx(OBJECT_POSITION, abs=0.05)
@@ -142,7 +141,7 @@ def test_an_object_is_held_with_the_torque_asked_for_and_let_go(line: DynamixelL
 
 
 def test_holding_never_overloads_the_motor(line: DynamixelLine, gripper: EzGripper) -> None:
-    line.place_object(OBJECT_OPENING)
+    line.place_object(OBJECT_POSITION)
     arrive(gripper, 1.94, 1023)
     time.sleep(2.5)  # the emulated motor endures an overload for 2 s
     assert gripper.state().fault == ""
@@ -150,7 +149,7 @@ def test_holding_never_overloads_the_motor(line: DynamixelLine, gripper: EzGripp
 
 
 def test_fingers_whose_object_is_taken_close_on_and_say_so(line: DynamixelLine, gripper: EzGripper) -> None:
-    line.place_object(OBJECT_OPENING)
+    line.place_object(OBJECT_POSITION)
     arrive(gripper, 1.5, 300)
     line.remove_object()
     until(lambda: gripper.state().motion is Motion.REACHED)
@@ -169,7 +168,7 @@ def test_a_stop_stops_the_fingers(line: DynamixelLine, gripper: EzGripper) -> No
 
 
 def test_a_stop_keeps_hold_of_what_is_held(line: DynamixelLine, gripper: EzGripper) -> None:
-    line.place_object(OBJECT_OPENING)
+    line.place_object(OBJECT_POSITION)
     arrive(gripper, 1.94, 300)
     gripper.stop()
     time.sleep(0.3)
@@ -220,7 +219,7 @@ def test_a_bad_line_is_endured_without_a_fault(line: DynamixelLine, gripper: EzG
 
 
 def test_what_is_held_stays_held_while_the_cable_is_out(line: DynamixelLine, gripper: EzGripper) -> None:
-    line.place_object(OBJECT_OPENING)
+    line.place_object(OBJECT_POSITION)
     arrive(gripper, 1.94, 300)
     line.unplug()
     until(lambda: bool(gripper.state().fault))
@@ -296,12 +295,12 @@ def test_closed_it_leaves_the_fingers_with_little_torque(make_gripper: MakeGripp
     line, gripper = make_gripper()
     gripper.start()
     until(lambda: gripper.state().ready)
-    line.place_object(220.0)
+    line.place_object(1.77)
     assert arrive(gripper, 1.94, 300).motion is Motion.HOLDING
     gripper.close()
     assert line.fingers[0].servo.get(mx64.TORQUE_LIMIT) == 100
     time.sleep(0.1)
-    assert line.fingers[0].opening == pytest.approx(220.0, abs=30)
+    assert line.fingers[0].opening == pytest.approx(2500 * (1 - 1.77 / 1.94), abs=30)
 
 
 @pytest.mark.parametrize(("position", "torque", "hint"), [

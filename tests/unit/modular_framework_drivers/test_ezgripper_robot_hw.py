@@ -104,7 +104,7 @@ def test_the_gripper_controller_moves_it(line: DynamixelLine, loop: Loop) -> Non
 def test_an_object_stalls_it_and_is_held_with_the_effort_asked_for(line: DynamixelLine, loop: Loop) -> None:
     line.remove_object()
     go(loop, 0.9)
-    line.place_object(900.0)
+    line.place_object(1.24)
     ticket = go(loop, 1.9, max_effort=0.25)
     assert ticket.status is GoalStatus.ABORTED
     assert ticket.result is not None
@@ -134,7 +134,7 @@ def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_
 def test_an_overload_is_no_grasp(line: DynamixelLine, loop: Loop) -> None:
     line.remove_object()
     go(loop, 0.9)
-    line.place_object(900.0)
+    line.place_object(1.24)
     ticket: GripperTicket = GripperTicket()
     loop.controllers["grip"].submit(1.9, 0.5, ticket)
     loop.run(lambda: ticket.status is GoalStatus.ACTIVE)

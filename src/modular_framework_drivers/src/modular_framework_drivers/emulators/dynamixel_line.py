@@ -19,6 +19,7 @@ from modular_framework_drivers.emulators.command_port import Command
 from modular_framework_drivers.emulators.dynamixel_finger import Finger
 from modular_framework_drivers.emulators.dynamixel_servo import BROADCAST, Instruction, PacketReader, answer_bus
 from modular_framework_drivers.ezgripper import mx64
+from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION, TRAVEL_TICKS
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 BAUDRATE_MARGIN = 0.03
@@ -163,11 +164,11 @@ class DynamixelLine:
         with self._lock:
             self.fingers[0].servo.set(mx64.SERVO_ID, int(new))
 
-    def place_object(self, opening: float) -> None:
-        """Puts an object between the fingers that they meet at an opening [ticks]."""
+    def place_object(self, position: float) -> None:
+        """Puts an object between the fingers that they meet at a position of the knuckle joint [rad]."""
         with self._lock:
             for finger in self.fingers:
-                finger.object_opening = float(opening)
+                finger.object_opening = TRAVEL_TICKS * (1.0 - float(position) / CLOSED_POSITION)
 
     def remove_object(self) -> None:
         """Takes the object away."""

@@ -35,10 +35,10 @@ SILENT_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
-    """The gripper as it was when it was asked last.
+    """The gripper as it was when it answered last.
 
     Attributes:
-        stamp_s: when, on the monotonic clock [s].
+        stamp_s: when, on the monotonic clock [s]; minus infinity before it is calibrated.
         reading: what was measured.
         motion: what the fingers do.
         goal: what they do it for.
@@ -182,6 +182,7 @@ class EzGripper:
             self._follow_anew(self.settings.start_position)
         elif not self._servos.find_again():
             self._follow_anew(self._servos.read().position)
+        self._off_since_s = None
         self._servos.drive(self._grip.update(self._servos.read().position, time.monotonic()))
 
     def _follow_anew(self, position: float) -> None:
@@ -244,4 +245,4 @@ class EzGripper:
         if text != self._state.fault:
             LOGGER.log(level, "%s", text)
         with self._lock:
-            self._state = replace(self._state, stamp_s=time.monotonic(), fault=text)
+            self._state = replace(self._state, fault=text)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Grasp action of an EZGripper without ROS controllers: from the goal to the servos and back, in one node."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+
+import rospy
+from sensor_msgs.msg import JointState
+
+from modular_framework_control.node_handle import ParameterError
+from modular_framework_control.ros_node_handle import RosNodeHandle
+from modular_framework_control.ros_telling import tell
+from modular_framework_core.grasp_server import GraspCommandError, Outcome
+from modular_framework_core.robot_groups import Group, Joint
+from modular_framework_core.ros_grasp_server import GraspServer
+from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
+from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
+from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT
+from modular_framework_drivers.ezgripper.grip import Motion
+from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
+from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
+
+ACTION_NAME = "moveit_grasp_action_server"
+POLL_S = 0.01
+STOP_TIMEOUT_S = 0.5
+STANDING_SPEED = 0.05
+
+
+class EzGripperManipulator:
+    """Moves the gripper for the grasp server, and publishes its joint.
+
+    Publishers: `joint_states` (sensor_msgs/JointState), as long as the servos answer.
+
+    Args:
+        gripper: the device.
+        joint: name of the knuckle joint.
+    """
+
+    def __init__(self, gripper: EzGripper, joint: str) -> None:
+        self._gripper, self._joint = gripper, joint
+        self._publisher: rospy.Publisher | None = None
+
+    def connect(self) -> None:
+        """Begin to connect the gripper, and to publish."""
+        self._gripper.start()
+        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=10)
+        threading.Thread(target=self._publish, name="joint_states", daemon=True).start()
+
+    def joint_state(self, names: Mapping[str, float]) -> JointState:
+        """The joint as measured last."""
+        del names
+        return self._message(self._gripper.state())
+
+    def move(self, motion: WantedMotion) -> Outcome:
+        """Move the fingers until they are at their goal or hold something.
+
+        Raises:
+            GraspCommandError: the gripper has a fault, time is up, or the motion was stopped.
+        """
+        self._refuse_fault(self._gripper.state())
+        number = self._gripper.command(motion.targets[self._joint], round(motion.efforts[self._joint] * FULL_TORQUE))
+        end_s = time.monotonic() + motion.timeout_s
+        while True:
+            state = self._gripper.state()
+            self._refuse_fault(state)
+            if motion.stop_requested():
+                self._stop()
+                raise GraspCommandError("stopped on request")
+            if state.goal.number == number and state.motion is not Motion.MOVING:
+                return self._outcome(state)
+            if time.monotonic() > end_s:
+                self._stop()
+                raise GraspCommandError(f"the fingers still moved after {motion.timeout_s:.1f} s, at "
+                                        f"{state.reading.position:.4f} rad; check that nothing slips")
+            time.sleep(POLL_S)
+
+    def _outcome(self, state: GripperState) -> Outcome:
+        reading, held = state.reading, state.motion is Motion.HOLDING
+        text = f"the fingers {'press' if held else 'stand'} at {reading.position:.4f} rad with {reading.load:.0%} torque"
+        return Outcome({self._joint: reading.position}, held, text)
+
+    def _refuse_fault(self, state: GripperState) -> None:
+        if state.fault:
+            raise GraspCommandError(state.fault)
+
+    def _stop(self) -> None:
+        """Stop the servo, and see that it stands."""
+        self._gripper.stop()
+        end_s = time.monotonic() + STOP_TIMEOUT_S
+        asked_s = time.monotonic()
+        while time.monotonic() < end_s:
+            state = self._gripper.state()
+            if state.fault or (state.stamp_s > asked_s and abs(state.reading.velocity) < STANDING_SPEED):
+                return
+            time.sleep(POLL_S)
+        rospy.logwarn("%s: told to stop, the fingers still moved after %.1f s", self._gripper.settings.name,
+                      STOP_TIMEOUT_S)
+
+    def _publish(self) -> None:
+        last_s = self._gripper.state().stamp_s
+        while not rospy.is_shutdown():
+            state = self._gripper.state()
+            if state.stamp_s > last_s and self._publisher is not None:
+                last_s = state.stamp_s
+                tell(self._publisher, self._message(state))
+            time.sleep(self._gripper.settings.poll_period_s)
+
+    def _message(self, state: GripperState) -> JointState:
+        reading = state.reading
+        message = JointState(name=[self._joint], position=[reading.position], velocity=[reading.velocity],
+                             effort=[reading.load])
+        message.header.stamp = rospy.Time.now()
+        return message
+
+
+def gripper_group(joint: str) -> Group:
+    """The planning group of the gripper: one joint; its effort is counted in shares of the full torque."""
+    knuckle = Joint(joint, "revolute", "", "", 0.0, CLOSED_POSITION, 1.0, "")
+    return Group("ezgripper", (knuckle,), "", {"closed": {joint: CLOSED_POSITION}})
+
+
+def main() -> int:
+    """Run the node `ezgripper_grasp_action_server`; returns 1 when its parameters are wrong.
+
+    A gripper that is not there, or has a fault, does not end the node: goals are aborted with the reason until it is
+    back.
+
+    Parameters, beside those of `GraspServer`: `/manipulator_controller_action_server_name` moveit_grasp_action_server:
+    name of the action; `/port_name`, `/baudrate` 57600, `/servo_ids` [1], `/manipulator_name` EzGripper: how to reach
+    the gripper; `~joint` ezgripper_knuckle_palm_L1_1; `~poll_rate` [1/s] 50; `~start_position` [rad] 0;
+    `~hold_torque` [0 to 1023] 400; `~stall_time` [s] 0.25. A goal's `max_torque` is in units of the servo, of which no
+    more than 800 are used.
+
+    Publishers: `joint_states`.
+    """
+    rospy.init_node("ezgripper_grasp_action_server")
+    try:
+        settings = read_gripper_settings(RosNodeHandle("/"), RosNodeHandle("~"))
+    except ParameterError as error:
+        rospy.logfatal("ezgripper_grasp_action_server: %s", error)
+        return 1
+    joint = str(rospy.get_param("~joint", JOINT))
+    gripper = EzGripper(settings)
+    server = GraspServer(gripper_group(joint), EzGripperManipulator(gripper, joint))
+    name = str(rospy.get_param("/manipulator_controller_action_server_name", ACTION_NAME))
+    server.connect(name)
+    rospy.loginfo("%s at %s listens to action '%s'.", settings.name, settings.port_name, rospy.resolve_name(name))
+    rospy.spin()
+    gripper.close()
+    return 0
