@@ -36,11 +36,11 @@ class MotionChecker:
 
         The start itself is not looked at, the end is.
         """
-        return self._checker.path_is_free(self._whole_path(np.array([start, end])), step, 1)
+        return self._checker.path_is_free(self.whole_path(np.array([start, end])), step, 1)
 
     def first_collision(self, polyline: Array, step: float) -> Array | None:
         """Returns the first colliding sample along straight pieces (start included), or None."""
-        if self._checker.path_is_free(self._whole_path(polyline), step):
+        if self._checker.path_is_free(self.whole_path(polyline), step):
             return None
         if not self.state_is_free(polyline[0]):
             return polyline[0]
@@ -54,7 +54,8 @@ class MotionChecker:
                     return values
         return None
 
-    def _whole_path(self, path: Array) -> Array:
+    def whole_path(self, path: Array) -> Array:
+        """Returns positions of the whole robot for joint vectors of the group, shape (n, joints)."""
         if self._members:
             return np.array([self.whole(values) for values in path])
         result = np.empty((len(path), len(self._rest)))

@@ -10,6 +10,7 @@ from modular_framework_planning.spatial import Array
 from modular_framework_planning.stomp.compiled_costs import cover_of, depths
 
 WIDEST_SPHERE = 0.07  # [m]; of those that stand for the bodies
+DEPTH_WEIGHT = 10.0  # with 1, to graze something for a few states costs less than the accelerations of a way round it
 
 
 class StateCosts:
@@ -22,8 +23,8 @@ class StateCosts:
 
     def __call__(self, values: Array) -> Array:
         """Returns costs of joint vectors (n, joints), shape (n,)."""
-        states = np.array([self._problem.motion.whole(row) for row in values])
-        costs = np.asarray(depths(self._world, self._cover, states))
+        states = self._problem.motion.whole_path(values)
+        costs = DEPTH_WEIGHT * np.asarray(depths(self._world, self._cover, states))
         if self._problem.constraints is not None:
             costs += [self._violation(row) for row in values]
         return costs

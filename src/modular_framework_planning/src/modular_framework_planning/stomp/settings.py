@@ -15,7 +15,7 @@ LOWEST: dict[str, float] = {"num_timesteps": 5, "num_iterations": 1, "num_rollou
 
 @dataclass(frozen=True, slots=True)
 class StompSettings:
-    """Keys and defaults of MoveIt 2's plugin; the last two are this planner's own.
+    """Keys of MoveIt 2's plugin with the values of its Panda example; the last two are this planner's own.
 
     Attributes:
         num_timesteps: states of a motion.
