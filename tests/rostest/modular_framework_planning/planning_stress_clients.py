@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import sys
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xmlrpc.client import ServerProxy
 
-import coal
 import numpy as np
 import rosgraph
 import rospy
@@ -25,12 +23,10 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     RobotState,
 )
-from planning_wire import ARM, LAUNCH, OK, START, FakeArm, add, box, joint_goal, plan, request
+from planning_stress_world import IndependentChecker, World, gone, touched_bodies
+from planning_wire import ARM, LAUNCH, OK, START, FakeArm, box, joint_goal, plan, request
 
 from modular_framework_control.ros_action_client import SteadyActionClient
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit/modular_framework_planning"))
-from independent_checker import IndependentChecker, pose_matrix  # noqa: E402
 
 CHANGE_PERIOD_S = 0.1
 ANSWER_TIMEOUT_S = 40.0
@@ -39,6 +35,7 @@ WAY = -1.2  # [rad] how far the questions with an own wall turn the shoulder
 SIZE = (0.08, 0.08, 0.3)
 IN_COLLISION = MoveItErrorCodes.GOAL_IN_COLLISION
 TIMED_OUT = (MoveItErrorCodes.TIMED_OUT, MoveItErrorCodes.PLANNING_FAILED)
+FLIPPER = "flipper"  # the client that changes the scene all the time
 
 
 @dataclass(frozen=True)
@@ -58,39 +55,6 @@ def wall_at(turn: float, name: str) -> CollisionObject:
     """A box the forearm runs into when the shoulder is turned this far from the start."""
     x, y = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ [-0.11, 0.46]
     return box(name, float(x), float(y), 1.3, SIZE)
-
-
-@dataclass
-class World:
-    """The scene as the clients make it, and when it was what; one change at a time."""
-
-    lock: threading.Lock = field(default_factory=threading.Lock)
-    objects: dict[str, CollisionObject] = field(default_factory=dict)
-    history: list[tuple[float, float, tuple[CollisionObject, ...]]] = field(default_factory=list)
-    changes: int = 0
-
-    def change(self, *messages: CollisionObject) -> None:
-        """Applies objects (ADD or REMOVE) and notes when the old world ended and the new one began."""
-        with self.lock:
-            begun = time.monotonic()
-            assert add(*messages), "the scene was refused"
-            for item in messages:
-                if item.operation == CollisionObject.REMOVE:
-                    self.objects.pop(item.id, None)
-                else:
-                    self.objects[item.id] = item
-            self.history.append((begun, time.monotonic(), tuple(self.objects.values())))
-            self.changes += 1
-
-    def between(self, begun: float, ended: float) -> list[tuple[CollisionObject, ...]]:
-        """Worlds that were in force at some time of a span: each from the begin of its change to the next one's end."""
-        ends = [item[1] for item in self.history[1:]] + [np.inf]
-        return [objects for (start, _, objects), end in zip(self.history, ends, strict=True)
-                if start <= ended and end >= begun]
-
-
-def gone(name: str) -> CollisionObject:
-    return CollisionObject(id=name, operation=CollisionObject.REMOVE)
 
 
 class Clients:
@@ -122,11 +86,16 @@ class Clients:
             self.errors.append(f"{work.__name__}: {type(error).__name__}: {error}")
 
     def _change(self, _: int) -> None:
-        """A box stands now here and now there."""
-        number = self._world.changes
-        here, there = (("flip", "flop") if number % 2 else ("flop", "flip"))
-        self._world.change(wall_at(0.7 if here == "flip" else 1.0, here), gone(there))
-        time.sleep(CHANGE_PERIOD_S)
+        """A box stands now here and now there, at fixed times; a change that comes too late does not hurry the next."""
+        places = {"flip": wall_at(0.7, "flip"), "flop": wall_at(1.0, "flop")}
+        self._world.change(FLIPPER, places["flop"])
+        due = time.monotonic()
+        for here, there in itertools.cycle((("flip", "flop"), ("flop", "flip"))):
+            due = max(due + CHANGE_PERIOD_S, time.monotonic())
+            time.sleep(max(0.0, due - time.monotonic()))
+            if due >= self._end:
+                return
+            self._world.change(FLIPPER, places[here], gone(there))
 
     def _note(self, begun: float, response: Any, wanted: int, walls: tuple[CollisionObject, ...], kind: str,
               trajectory: Any) -> None:
@@ -171,50 +140,44 @@ class Clients:
         """A wall at the goal is in force when the scene service has answered, and so is its absence."""
         name, turn = f"proof{number}", 1.8 + 0.6 * (number % 2)
         for wanted, message in ((IN_COLLISION, wall_at(turn, name)), (OK, gone(name))):
-            self._world.change(message)
+            self._world.change(name, message)
             begun = time.monotonic()
             response = plan(request(joint_goal(PAN, START[0] + turn), allowed_planning_time=20.0))
             self._note(begun, response, wanted, (), "scene changed just before", response.trajectory)
 
 
-def obstacle(message: CollisionObject) -> tuple[str, Any, float, np.ndarray]:
-    """A box for the independent checker."""
-    size, place = message.primitives[0].dimensions, message.primitive_poses[0].position
-    return (message.id, coal.Box(*size), float(np.linalg.norm(size)) / 2.0,
-            pose_matrix([place.x, place.y, place.z], np.eye(3)))
+class Judge:
+    """Looks at answers with a checker that shares no code with the planner."""
 
+    def __init__(self, checker: IndependentChecker, rest: dict[str, float], step: float) -> None:
+        """Args: the robot; its joints that are not planned for [rad or m]; between states looked at [rad].
 
-def is_free(checker: IndependentChecker, answer: Answer, worlds: list[tuple[CollisionObject, ...]],
-            rest: dict[str, float], step: float) -> bool:
-    """Whether the whole motion is free in one of the worlds."""
-    for world in {tuple(sorted(item.id for item in objects)): objects for objects in worlds}.values():
-        checker.set_world([obstacle(item) for item in (*world, *answer.walls)])
-        if not checker.colliding_states(ARM, answer.points, rest, step):
-            return True
-    return False
+        The straight motion must be free without a wall and collide with one, or the verdicts mean nothing.
+        """
+        self._checker, self._rest, self._step = checker, rest, step
+        line, wall = np.array([START, [START[0] + WAY, *START[1:]]]), wall_at(WAY / 2, "wall")
+        assert not self._touched(line, {}) and self._touched(line, {"wall": wall}) == {"wall"}
 
+    def _touched(self, points: np.ndarray, objects: dict[str, CollisionObject]) -> set[str]:
+        return touched_bodies(self._checker, ARM, points, self._rest, objects, self._step)
 
-def verdict(answer: Answer, world: World, checker: IndependentChecker, rest: dict[str, float], step: float) -> str:
-    """What is wrong with an answer; empty where nothing is."""
-    if answer.code in TIMED_OUT and answer.wanted == OK:
-        return ""  # counted as timeouts: slow, but not wrong
-    if answer.code != answer.wanted:
-        return f"{answer.kind}: code {answer.code} instead of {answer.wanted}"
-    if answer.code != OK:
+    def fault(self, answer: Answer, world: World) -> str:
+        """What is wrong with an answer; empty where nothing is."""
+        if answer.code in TIMED_OUT and answer.wanted == OK:
+            return ""  # counted as timeouts: slow, but not wrong
+        if answer.code != answer.wanted:
+            return f"{answer.kind}: code {answer.code} instead of {answer.wanted}"
+        if answer.code != OK:
+            return ""
+        if not np.allclose(answer.points[0], START, atol=1e-6):
+            return f"{answer.kind}: does not begin where the robot is"
+        objects = world.objects_between(answer.begun, answer.ended)
+        touched = self._touched(answer.points, objects | {item.id: item for item in answer.walls})
+        if touched - objects.keys():
+            return f"{answer.kind}: the motion touches {', '.join(sorted(touched - objects.keys()))}"
+        if not world.was_free_of(touched, answer.begun, answer.ended):
+            return f"{answer.kind}: the motion touches something in every scene it may have been planned in"
         return ""
-    if not np.allclose(answer.points[0], START, atol=1e-6):
-        return f"{answer.kind}: does not begin where the robot is"
-    if not is_free(checker, answer, world.between(answer.begun, answer.ended), rest, step):
-        return f"{answer.kind}: the motion touches something in every world it may have been planned in"
-    return ""
-
-
-def require_a_judge(checker: IndependentChecker, rest: dict[str, float], step: float) -> None:
-    """The straight motion must be free without a wall and collide with one, or the verdicts mean nothing."""
-    end = [START[0] + WAY, *START[1:]]
-    for walls, wanted in (((), False), ((wall_at(WAY / 2, "wall"),), True)):
-        checker.set_world([obstacle(item) for item in walls])
-        assert bool(checker.colliding_states(ARM, np.array([START, end]), rest, step)) is wanted, walls
 
 
 class MemoryWatch:
@@ -256,28 +219,32 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
         step: between states the motions are looked at [rad].
 
     Returns:
-        Figures: plans, wrong, timeouts, unanswered, scene_changes, rss_*_mb, wrong_answers (sentences), ...
+        Figures: plans, wrong, timeouts, unanswered, scene_changes (of all clients), flips_per_s (of the one that
+        wants ten), rss_*_mb, wrong_answers (sentences), ...
     """
     session.launch(LAUNCH)
     session.wait_for_service("plan_kinematic_path", 120.0)
     arm = FakeArm()
     time.sleep(0.5)
     world = World()
-    world.change(box("crate", 0.0, -0.6, 1.0, (0.3, 0.3, 0.3)))
+    world.change("crate", box("crate", 0.0, -0.6, 1.0, (0.3, 0.3, 0.3)))
     plan(request(joint_goal(PAN, START[0] + 0.1)))  # what is made on first use is made now
     memory, asking = MemoryWatch(), Clients(world, seconds)
     unanswered = asking.run(clients)
     rss_start, rss_end, slope = memory.stop()
-    checker = robot_checker()
-    rest = {name: value for name, value in arm.positions.items() if name not in ARM}
-    require_a_judge(checker, rest, step)
-    wrong = [text for answer in asking.answers if (text := verdict(answer, world, checker, rest, step))]
+    judge = Judge(robot_checker(), {name: value for name, value in arm.positions.items() if name not in ARM}, step)
+    wrong = [text for answer in asking.answers if (text := judge.fault(answer, world))]
     took = sorted(item.ended - item.begun for item in asking.answers)
+    flips = world.histories[FLIPPER]
     return {"seconds": seconds, "clients": clients, "plans": len(asking.answers),
             "motions_checked": sum(item.code == OK for item in asking.answers),
             "kinds": dict(Counter(item.kind for item in asking.answers)), "wrong": len(wrong) + len(asking.errors),
             "timeouts": sum(item.code in TIMED_OUT for item in asking.answers), "unanswered": unanswered,
-            "scene_changes": world.changes, "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
+            "scene_changes": sum(map(len, world.histories.values())),
+            "flips_per_s": round(len(flips) / seconds, 2),
+            "change_median_ms": round(1000.0 * float(np.median([item.ended - item.begun for item in flips])), 1),
+            "change_max_ms": round(1000.0 * max(item.ended - item.begun for item in flips), 1),
+            "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
             "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2),
             "rss_mb_every_tenth": memory.tenths(),
             "wrong_answers": wrong[:10] + asking.errors[:10]}

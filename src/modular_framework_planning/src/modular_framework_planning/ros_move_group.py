@@ -28,6 +28,7 @@ from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.compile_loops import compile_all
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.many_threads import prepare
 from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
@@ -86,6 +87,7 @@ def advertise(context: MoveGroupContext) -> None:
 def main() -> int:
     """Runs the node; returns its exit code."""
     begun = time.monotonic()
+    prepare()
     rospy.init_node("move_group")
     try:
         context = build_context()

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scene as several clients change it at once, and whether a motion is free in a scene that was in force."""
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import rospy
+from moveit_msgs.msg import CollisionObject, PlanningScene
+from moveit_msgs.srv import ApplyPlanningScene
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit/modular_framework_planning"))
+from independent_checker import IndependentChecker, pose_matrix  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Change:
+    """When a client asked for its objects to be these, and when it heard that they are."""
+
+    begun: float
+    ended: float
+    objects: Mapping[str, CollisionObject]
+
+
+@dataclass
+class World:
+    """What each client has put into the scene, and when. Each client changes its own objects, from one thread."""
+
+    histories: dict[str, list[Change]] = field(default_factory=dict)
+
+    def change(self, owner: str, *messages: CollisionObject) -> None:
+        """Applies objects (ADD or REMOVE) of one client, all at once."""
+        history = self.histories.setdefault(owner, [])
+        objects = dict(history[-1].objects) if history else {}
+        for item in messages:
+            if item.operation == CollisionObject.REMOVE:
+                objects.pop(item.id)
+            else:
+                objects[item.id] = item
+        scene = PlanningScene(is_diff=True)
+        scene.world.collision_objects = list(messages)
+        begun = time.monotonic()
+        assert rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)(scene).success, "the scene was refused"
+        history.append(Change(begun, time.monotonic(), objects))
+
+    def objects_between(self, begun: float, ended: float) -> dict[str, CollisionObject]:
+        """Every object that may have been in the scene at some time of a span."""
+        return {name: item for history in self.histories.values() for number, change in enumerate(history)
+                if change.begun <= ended and _end(history, number) >= begun for name, item in change.objects.items()}
+
+    def was_free_of(self, touched: set[str], begun: float, ended: float) -> bool:
+        """Whether at some moment of a span the scene may have had none of the touched objects.
+
+        While a client waits for an answer, its objects may be the old ones or the new ones.
+        """
+        changes = [item for history in self.histories.values() for item in history]
+        moments = {begun, ended, *(moment for item in changes for moment in (item.begun, item.ended)
+                                   if begun <= moment <= ended)}
+        return any(all(any(not item.keys() & touched for item in _in_force(history, moment))
+                       for history in self.histories.values()) for moment in moments)
+
+
+def _end(history: Sequence[Change], number: int) -> float:
+    return history[number + 1].ended if number + 1 < len(history) else np.inf
+
+
+def _in_force(history: Sequence[Change], moment: float) -> list[Mapping[str, CollisionObject]]:
+    """What one client's objects may have been at a moment."""
+    found = [change.objects for number, change in enumerate(history)
+             if change.begun <= moment <= _end(history, number)]
+    return found + [{}] if moment <= history[0].ended else found
+
+
+def gone(name: str) -> CollisionObject:
+    """Takes an object out of the scene."""
+    return CollisionObject(id=name, operation=CollisionObject.REMOVE)
+
+
+def obstacle(message: CollisionObject) -> tuple[str, Any, float, np.ndarray]:
+    """A box for the independent checker."""
+    size, place = message.primitives[0].dimensions, message.primitive_poses[0].position
+    return (message.id, coal.Box(*size), float(np.linalg.norm(size)) / 2.0,
+            pose_matrix([place.x, place.y, place.z], np.eye(3)))
+
+
+def touched_bodies(checker: IndependentChecker, names: Sequence[str], path: np.ndarray, rest: Mapping[str, float],
+                   objects: Mapping[str, CollisionObject], step: float) -> set[str]:
+    """Names of the bodies that touch another one somewhere along a path, looked at every `step` [rad]."""
+    checker.set_world([obstacle(item) for item in objects.values()])
+    touched: set[str] = set()
+    for first, second in zip(path[:-1], path[1:], strict=True):
+        pieces = max(1, int(np.ceil(np.abs(second - first).max() / step)))
+        for share in np.arange(pieces + 1) / pieces:
+            state = dict(zip(names, first + share * (second - first), strict=True))
+            for pair in checker.collisions({**rest, **state}, first_only=False):
+                touched.update(pair if not objects.keys() & set(pair) else objects.keys() & set(pair))
+    return touched
