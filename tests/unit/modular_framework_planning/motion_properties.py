@@ -2,8 +2,9 @@
 """Random problems for each planning pipeline, and what every returned motion must be true of."""
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import coal
 import numpy as np
@@ -13,7 +14,7 @@ from independent_checker import IndependentChecker
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.constraint_kinds import JointConstraint
 from modular_framework_planning.constraints import KinematicConstraints
-from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.ompl_planning import OmplPlanner
 from modular_framework_planning.pilz.command_planner import CommandPlanner
@@ -34,6 +35,7 @@ GROUP, TIP = "arm_and_manipulator", "eg_manipulator"
 BOXES = 6
 SCALING = 0.5
 JOINT_SCALING = {"lin": 1.0}  # of the joints' limits; SCALING unless named: a line's factors scale the tip's limits
+LINE_TURNS = 0.6  # [rad]; most a joint differs between the ends of a line
 ROUNDING = 1.0e-6  # of a limit: points are at whole nanoseconds, some of them 4 ms apart
 PLANNERS = {"ompl": "RRTConnect", "ptp": "PTP", "lin": "LIN", "stomp": "STOMP"}
 CARTESIAN_LIMITS = {"max_trans_vel": 0.5, "max_trans_acc": 1.0, "max_trans_dec": -1.0, "max_rot_vel": 1.0}
@@ -50,11 +52,15 @@ class Problem:
 
 @dataclass
 class Tally:
-    """What a pipeline made of some problems: solved, refused or unsolved, and motions that lack a property."""
+    """What a pipeline made of some problems: motions, motions that lack a property, and refusals by their code."""
 
     solved: int = 0
-    unsolved: int = 0
-    violations: list[str] = None  # type: ignore[assignment]
+    violations: list[str] = field(default_factory=list)
+    refusals: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def unsolved(self) -> int:
+        return self.refusals.total()
 
 
 def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
@@ -77,27 +83,34 @@ def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, 
     return scene, world
 
 
-def _free_state(model: RobotModel, checker: CollisionChecker, rng: np.random.Generator) -> np.ndarray:
+def _free_state(model: RobotModel, checker: CollisionChecker, rng: np.random.Generator,
+                near: np.ndarray | None = None) -> np.ndarray:
+    """A free state: anywhere, or with each joint at most LINE_TURNS from another state."""
+    indices = model.group(GROUP).indices
     positions = model.default_positions()
     while True:
-        positions[model.group(GROUP).indices] = rng.uniform(-np.pi, np.pi, 6)
+        positions[indices] = (rng.uniform(-np.pi, np.pi, 6) if near is None
+                              else near[indices] + rng.uniform(-LINE_TURNS, LINE_TURNS, 6))
         if checker.is_free(positions):
             return positions.copy()
 
 
 def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Problem]:
-    """Random worlds, starts and goals; every second one has a path constraint (but for lines, which give their own)."""
+    """Random worlds, starts and goals; every second one has a path constraint (but for lines, which give their own).
+
+    The goal of a line is the tip's pose in a state near the start, so that it can be reached.
+    """
     rng = np.random.default_rng([seed, sorted(PLANNERS).index(kind)])
     indices = model.group(GROUP).indices
     for number in range(count):
         scene, world = _world(model, rng)
         checker = CollisionChecker(scene, indices)
-        start, end = _free_state(model, checker, rng), _free_state(model, checker, rng)
+        start = _free_state(model, checker, rng)
+        end = _free_state(model, checker, rng, start if kind == "lin" else None)
         constraints = None
         if kind == "lin":
-            target = model.link_transforms(start)[TIP]
-            target.translation += rng.uniform(-0.2, 0.2, 3)
-            goal, asked = target, PoseGoal(TIP, target)
+            goal = model.link_transforms(end)[TIP]
+            asked = PoseGoal(TIP, goal)
         else:
             goal = end[indices]
             asked = JointGoal(dict(zip(model.group(GROUP).joints, goal.tolist(), strict=True)))
@@ -155,16 +168,33 @@ def _goal_faults(model: RobotModel, problem: Problem, end: np.ndarray) -> list[s
     return [] if np.abs(error).max() < 1e-3 else [f"the motion ends {np.abs(error).max():.4f} from the goal"]
 
 
+def _groundless(model: RobotModel, checker: IndependentChecker, problem: Problem, kind: str) -> list[str]:
+    """What is wrong with a refusal: the straight motion a point-to-point command asks for has to touch something.
+
+    It keeps the path constraints by the way these are drawn.
+    """
+    if kind != "ptp":
+        return []
+    checker.set_world(problem.world)
+    start = problem.request.scene.positions
+    line = np.array([start[model.group(GROUP).indices], problem.goal])
+    named = dict(zip(model.joint_names, start.tolist(), strict=True))
+    touches = any(checker.colliding_states(list(model.group(GROUP).joints), line, named, step)
+                  for step in (0.01, 0.001, 0.00025))
+    return [] if touches else ["refused, though the straight motion is free"]
+
+
 def examine(model: RobotModel, checker: IndependentChecker, kind: str, count: int, seed: int = 1) -> Tally:
-    """Plans random problems and collects what is wrong with the motions."""
-    pipeline, tally = make_pipeline(model, kind, seed), Tally(violations=[])
+    """Plans random problems and collects what is wrong with the motions and the refusals."""
+    pipeline, tally = make_pipeline(model, kind, seed), Tally()
     for number, problem in enumerate(problems(model, kind, count, seed)):
         try:
             answer = pipeline.plan(problem.request)
-        except PlanningError:
-            tally.unsolved += 1
-            continue
-        tally.solved += 1
-        tally.violations += [f"{kind} {number}: {text}" for text in violations(
-            model, checker, problem, answer, JOINT_SCALING.get(kind, SCALING))]
+        except PlanningError as error:
+            tally.refusals[ErrorCode(error.code).name] += 1
+            faults = _groundless(model, checker, problem, kind)
+        else:
+            tally.solved += 1
+            faults = violations(model, checker, problem, answer, JOINT_SCALING.get(kind, SCALING))
+        tally.violations += [f"{kind} {number}: {text}" for text in faults]
     return tally

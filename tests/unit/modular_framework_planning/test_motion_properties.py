@@ -11,6 +11,7 @@ from motion_properties import examine
 from modular_framework_planning.urdf_document import package_resolver
 
 SHARE = {"ompl": 8, "ptp": 16, "lin": 30, "stomp": 5}
+LEAST_SOLVED = {"ompl": 0.95, "ptp": 0.25, "lin": 0.25, "stomp": 0.8}  # straight motions are refused where they touch
 
 
 @pytest.mark.parametrize("kind", SHARE)
@@ -21,4 +22,4 @@ def test_random_motions_have_all_properties(robot: object, kind: str) -> None:
     tally = examine(robot.model, checker, kind, count)
     print(f"{kind}: {tally.solved} solved, {tally.unsolved} not")
     assert not tally.violations
-    assert tally.solved >= count // 10, "there are motions to look at"
+    assert tally.solved >= LEAST_SOLVED[kind] * count, tally.refusals
