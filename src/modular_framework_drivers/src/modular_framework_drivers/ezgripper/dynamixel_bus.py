@@ -19,6 +19,7 @@ from modular_framework_drivers.ezgripper.mx64 import MODEL_NUMBER, Register, Ser
 READ, WRITE = 2, 3
 WRITE_TIMEOUT_S = 0.5
 QUIET_S = 0.03
+LEAST_TRIES = 3
 BAUDRATES = (9600, 19200, 57600, 115200, 500000, 1000000, 2000000, 3000000)
 BUS_ERRORS = ServoErrors.CHECKSUM | ServoErrors.INSTRUCTION | ServoErrors.RANGE | ServoErrors.ANGLE_LIMIT
 
@@ -64,13 +65,13 @@ class DynamixelBus:
     Args:
         port_name: serial port, for example /dev/ttyUSB0.
         baudrate: [bit/s].
-        attempts: how often an instruction is sent until the servo counts as silent.
+        timeout_s: a servo that has not answered for so long, and not to three tries, counts as silent [s].
     """
 
-    def __init__(self, port_name: str, baudrate: int, attempts: int = 3) -> None:
+    def __init__(self, port_name: str, baudrate: int, timeout_s: float = 0.15) -> None:
         if baudrate not in BAUDRATES:
             raise ValueError(f"baudrate: got {baudrate}; expected one of {', '.join(map(str, BAUDRATES))}")
-        self._name, self._baudrate, self._attempts = port_name, baudrate, attempts
+        self._name, self._baudrate, self._timeout_s = port_name, baudrate, timeout_s
         self._packets: Any = PacketHandler(1.0)
         self._port: _Port | None = None
         self.retries = 0
@@ -135,8 +136,10 @@ class DynamixelBus:
         if self._port is None:
             raise PortLostError(f"port {self._name} is not open")
         damaged, silent, errors = False, False, ServoErrors.NONE
-        for attempt in range(self._attempts):
-            self.retries += attempt > 0
+        tries, begun_s = 0, time.monotonic()
+        while tries < LEAST_TRIES or time.monotonic() - begun_s < self._timeout_s:
+            self.retries += tries > 0
+            tries += 1
             packet = [0, 0, servo_id, len(parameters) + 2, instruction, *parameters, 0]
             try:
                 answer, result, bits = self._packets.txRxPacket(self._port, packet)
@@ -151,7 +154,7 @@ class DynamixelBus:
                 self._check(servo_id, errors, what)
                 return bytes(answer[5:5 + size]), errors
             damaged |= result in (COMM_RX_CORRUPT, COMM_SUCCESS)
-        raise NoAnswerError(self._silence(servo_id, damaged))
+        raise NoAnswerError(self._silence(servo_id, damaged, tries))
 
     @staticmethod
     def _drain(port: _Port) -> None:
@@ -164,9 +167,9 @@ class DynamixelBus:
             raise RefusedError(f"servo {servo_id} on {self._name} refused '{what}': {(errors & BUS_ERRORS)!r}; "
                                "check that it is an MX-64 with protocol 1.0")
 
-    def _silence(self, servo_id: int, damaged: bool) -> str:
+    def _silence(self, servo_id: int, damaged: bool, tries: int) -> str:
         how = "answers with damaged packets" if damaged else "does not answer"
         where = ("the wiring and its termination, and that no two servos have one id" if damaged
                  else "its power, its cable, its id and the baud rate")
-        return (f"servo {servo_id} on {self._name} at {self._baudrate} baud {how} ({self._attempts} tries); "
+        return (f"servo {servo_id} on {self._name} at {self._baudrate} baud {how} ({tries} tries); "
                 f"check {where}")

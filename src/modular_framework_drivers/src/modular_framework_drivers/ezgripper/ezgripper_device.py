@@ -73,7 +73,7 @@ class EzGripper:
         first = Goal(0, settings.start_position, settings.start_torque)
         self._wanted, self._stop_wanted = first, False
         self._grip = Grip(settings.rules, first)
-        self._bus = DynamixelBus(settings.port_name, settings.baudrate)
+        self._bus = DynamixelBus(settings.port_name, settings.baudrate, settings.link_timeout_s)
         self._servos = GripperServos(self._bus, settings.servo_ids, self._wait)
         nothing = GripperReading(CLOSED_POSITION, 0.0, 0.0, 0.0, 0.0, ServoErrors.NONE)
         self._state = GripperState(-math.inf, nothing, Motion.MOVING, first, False,

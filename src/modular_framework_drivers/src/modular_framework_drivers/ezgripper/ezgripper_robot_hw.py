@@ -33,7 +33,8 @@ class EzGripperRobotHW(RobotHW):
     Parameters, below its name: `joint` ezgripper_knuckle_palm_L1_1; `port_name`, `baudrate` 57600, `servo_ids` [1],
     `manipulator_name` EzGripper (these four are looked for in the root namespace when it has no `port_name`);
     `full_effort` [Nm] 1.0: effort of the joint at full torque; `startup_timeout` [s] 30; `poll_rate` [1/s] 50,
-    `start_position` [rad] 0, `hold_torque` [0 to 1023] 400, `position_tolerance` [rad] 0.03, `stall_time` [s] 0.25.
+    `start_position` [rad] 0, `hold_torque` [0 to 1023] 400, `position_tolerance` [rad] 0.03, `stall_time` [s] 0.25,
+    `link_timeout` [s] 0.15.
     Limits come from `robot_description` and from `joint_limits`, when they are there.
     """
 

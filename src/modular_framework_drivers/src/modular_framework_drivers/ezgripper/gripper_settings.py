@@ -27,6 +27,7 @@ class GripperSettings:
         poll_period_s: the servos are asked so often [s].
         start_position: of the knuckle joint after calibration [rad].
         start_torque: to get there [units of the servo].
+        link_timeout_s: a servo that has not answered for so long is out of reach [s].
         reconnect_period_s: between two tries to reach a gripper that is not there [s].
         fault_pause_s: a motor that has switched itself off is left alone for so long [s].
         rules: when is arrived, when held up.
@@ -39,6 +40,7 @@ class GripperSettings:
     poll_period_s: float = 0.02
     start_position: float = 0.0
     start_torque: int = FULL_TORQUE // 2
+    link_timeout_s: float = 0.15
     reconnect_period_s: float = 0.5
     fault_pause_s: float = 2.0
     rules: GripRules = field(default_factory=GripRules)
@@ -50,7 +52,7 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
     Args:
         connection: namespace of port_name, baudrate, servo_ids and manipulator_name.
         behaviour: namespace of the others: poll_rate [1/s] 50, start_position [rad] 0, hold_torque [0 to 1023] 400,
-            position_tolerance [rad] 0.03, stall_time [s] 0.25.
+            position_tolerance [rad] 0.03, stall_time [s] 0.25, link_timeout [s] 0.15.
 
     Raises:
         ParameterError: tells all that is wrong.
@@ -82,10 +84,12 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
                       hold_torque=int(number("hold_torque", 400, TORQUE_MAX)))
     period_s = 1.0 / number("poll_rate", 50.0, 200.0, 1.0)
     start_position = number("start_position", 0.0, CLOSED_POSITION)
+    link_timeout_s = number("link_timeout", 0.15, 10.0)
     if faults:
         raise ParameterError("; ".join(faults))
     name = str(connection.get_param("manipulator_name", "EzGripper"))
-    return GripperSettings(port_name, baudrate, tuple(servo_ids), name, period_s, start_position, rules=rules)
+    return GripperSettings(port_name, baudrate, tuple(servo_ids), name, period_s, start_position,
+                           link_timeout_s=link_timeout_s, rules=rules)
 
 
 def _are_ids(value: object) -> bool:
