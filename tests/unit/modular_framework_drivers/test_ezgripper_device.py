@@ -229,6 +229,20 @@ def test_what_is_held_stays_held_while_the_cable_is_out(line: DynamixelLine, gri
     assert gripper.state().reading.load == pytest.approx(300 / 1023, abs=0.02)
 
 
+def test_fingers_under_way_when_the_cable_is_pulled_stop_when_it_is_back(line: DynamixelLine,
+                                                                         gripper: EzGripper) -> None:
+    gripper.command(0.0, 80)
+    until(lambda: gripper.state().reading.position < 1.1)
+    line.unplug()
+    until(lambda: bool(gripper.state().fault))
+    line.plug()
+    until(lambda: not gripper.state().fault)
+    there = gripper.state().reading.position
+    assert there > 0.1
+    time.sleep(0.3)
+    assert gripper.state().reading.position == pytest.approx(there, abs=0.05)
+
+
 def test_turns_of_the_shaft_are_counted_anew_after_a_loss_of_power(line: DynamixelLine, gripper: EzGripper) -> None:
     before = line.fingers[0].servo.get(mx64.PRESENT_POSITION)
     arrive(gripper, 1.9)

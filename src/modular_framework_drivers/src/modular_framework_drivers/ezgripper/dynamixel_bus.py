@@ -6,6 +6,8 @@ again, an answer of the wrong length is no answer, and every failure is an excep
 """
 from __future__ import annotations
 
+import errno
+import os
 import select
 import termios
 import time
@@ -68,7 +70,7 @@ class DynamixelBus:
         timeout_s: a servo that has not answered for so long, and not to three tries, counts as silent [s].
     """
 
-    def __init__(self, port_name: str, baudrate: int, timeout_s: float = 0.15) -> None:
+    def __init__(self, port_name: str, baudrate: int, timeout_s: float = 0.1) -> None:
         if baudrate not in BAUDRATES:
             raise ValueError(f"baudrate: got {baudrate}; expected one of {', '.join(map(str, BAUDRATES))}")
         self._name, self._baudrate, self._timeout_s = port_name, baudrate, timeout_s
@@ -87,8 +89,8 @@ class DynamixelBus:
         try:
             port.setBaudRate(self._baudrate)
         except (OSError, termios.error) as error:
-            raise PortLostError(f"port {self._name} cannot be opened: {error}; check the cable, the name and the right "
-                                "to use it, and that no other program has it") from error
+            raise PortLostError(f"port {self._name} cannot be opened: {_reason(error)}; check the cable, the name and "
+                                "the right to use it, and that no other program has it") from error
         self._port = port
 
     def close(self) -> None:
@@ -148,7 +150,7 @@ class DynamixelBus:
                     self._drain(self._port)
             except (OSError, termios.error) as error:
                 self.close()
-                raise PortLostError(f"port {self._name} is gone: {error}; check the cable") from error
+                raise PortLostError(f"port {self._name} is gone: {_reason(error)}; check the cable") from error
             errors = ServoErrors(bits)
             if result == COMM_SUCCESS and len(answer) == size + 6 and not errors & ServoErrors.CHECKSUM:
                 self._check(servo_id, errors, what)
@@ -173,3 +175,11 @@ class DynamixelBus:
                  else "its power, its cable, its id and the baud rate")
         return (f"servo {servo_id} on {self._name} at {self._baudrate} baud {how} ({tries} tries); "
                 f"check {where}")
+
+
+def _reason(error: OSError | termios.error) -> str:
+    """What is wrong with a port, in the words of the operating system where there are any."""
+    number = error.errno if isinstance(error, OSError) else error.args[0]
+    if number == errno.EAGAIN:
+        return "another program has it"
+    return os.strerror(number) if number else str(error)

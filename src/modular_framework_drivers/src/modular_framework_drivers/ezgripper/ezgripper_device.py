@@ -180,10 +180,14 @@ class EzGripper:
             self._report("calibrating", logging.INFO)
             self._servos.calibrate()
             self._follow_anew(self.settings.start_position)
-        elif not self._servos.find_again():
+        elif self._servos.find_again():
+            self.stop()
+        else:
             self._follow_anew(self._servos.read().position)
         self._off_since_s = None
-        self._servos.drive(self._grip.update(self._servos.read().position, time.monotonic()))
+        reading, now_s = self._servos.read(), time.monotonic()
+        self._take_orders(reading.position, now_s)
+        self._servos.drive(self._grip.update(reading.position, now_s))
 
     def _follow_anew(self, position: float) -> None:
         """Forget all goals; the new one is `position` [rad]."""

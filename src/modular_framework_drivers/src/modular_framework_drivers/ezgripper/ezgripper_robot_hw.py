@@ -34,7 +34,7 @@ class EzGripperRobotHW(RobotHW):
     `manipulator_name` EzGripper (these four are looked for in the root namespace when it has no `port_name`);
     `full_effort` [Nm] 1.0: effort of the joint at full torque; `startup_timeout` [s] 30; `poll_rate` [1/s] 50,
     `start_position` [rad] 0, `hold_torque` [0 to 1023] 400, `position_tolerance` [rad] 0.03, `stall_time` [s] 0.25,
-    `link_timeout` [s] 0.15.
+    `link_timeout` [s] 0.1.
     Limits come from `robot_description` and from `joint_limits`, when they are there.
     """
 

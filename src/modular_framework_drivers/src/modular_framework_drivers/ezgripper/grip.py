@@ -105,8 +105,8 @@ class Grip:
             self._begin(position, time_s)
 
     def stop(self, position: float) -> None:
-        """Stay where the fingers are, holding what they hold."""
-        if self.motion is not Motion.HOLDING:
+        """Stop moving fingers; those that stand, or hold something, go on with that."""
+        if self.motion is Motion.MOVING:
             self.goal = replace(self.goal, position=position)
 
     def update(self, position: float, time_s: float) -> Drive:

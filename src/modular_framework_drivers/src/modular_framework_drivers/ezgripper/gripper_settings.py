@@ -40,7 +40,7 @@ class GripperSettings:
     poll_period_s: float = 0.02
     start_position: float = 0.0
     start_torque: int = FULL_TORQUE // 2
-    link_timeout_s: float = 0.15
+    link_timeout_s: float = 0.1
     reconnect_period_s: float = 0.5
     fault_pause_s: float = 2.0
     rules: GripRules = field(default_factory=GripRules)
@@ -52,7 +52,7 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
     Args:
         connection: namespace of port_name, baudrate, servo_ids and manipulator_name.
         behaviour: namespace of the others: poll_rate [1/s] 50, start_position [rad] 0, hold_torque [0 to 1023] 400,
-            position_tolerance [rad] 0.03, stall_time [s] 0.25, link_timeout [s] 0.15.
+            position_tolerance [rad] 0.03, stall_time [s] 0.25, link_timeout [s] 0.1.
 
     Raises:
         ParameterError: tells all that is wrong.
@@ -84,7 +84,7 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
                       hold_torque=int(number("hold_torque", 400, TORQUE_MAX)))
     period_s = 1.0 / number("poll_rate", 50.0, 200.0, 1.0)
     start_position = number("start_position", 0.0, CLOSED_POSITION)
-    link_timeout_s = number("link_timeout", 0.15, 10.0)
+    link_timeout_s = number("link_timeout", 0.1, 10.0)
     if faults:
         raise ParameterError("; ".join(faults))
     name = str(connection.get_param("manipulator_name", "EzGripper"))

@@ -131,7 +131,7 @@ def main() -> int:
     Parameters, beside those of `GraspServer`: `/manipulator_controller_action_server_name` moveit_grasp_action_server:
     name of the action; `/port_name`, `/baudrate` 57600, `/servo_ids` [1], `/manipulator_name` EzGripper: how to reach
     the gripper; `~joint` ezgripper_knuckle_palm_L1_1; `~poll_rate` [1/s] 50; `~start_position` [rad] 0;
-    `~hold_torque` [0 to 1023] 400; `~stall_time` [s] 0.25; `~link_timeout` [s] 0.15. A goal's
+    `~hold_torque` [0 to 1023] 400; `~stall_time` [s] 0.25; `~link_timeout` [s] 0.1. A goal's
     `max_torque` is in units of the servo, of which no more than 800 are used.
 
     Publishers: `joint_states`.
