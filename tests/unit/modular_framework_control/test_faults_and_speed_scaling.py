@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What controllers do while their hardware cannot follow, and while it lets itself be moved only slowly or not at all."""
+"""What controllers do while their hardware cannot follow, and while it lets itself be moved slowly or not at all."""
 from __future__ import annotations
 
 import math
@@ -31,7 +31,7 @@ ZEROS = (0.0, 0.0)
 
 
 class FaultyRobotHW(MockRobotHW):
-    """Fake hardware that can be paused, slowed down and stopped by a fault, during which somebody may move it by hand."""
+    """Fake hardware that can be slowed down, paused, stopped by a fault, and moved by hand."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -152,7 +152,7 @@ class JointTrajectoryController(Controller):
         if not self._running:
             raise ControllerError("the controller is not running; nothing is desired")
         asked_s, known_from_s = self._clock.at(time_s), self._plan.known_from_s
-        if known_from_s is None or asked_s < known_from_s:
+        if known_from_s is None or asked_s < known_from_s - SHORTEST_SEGMENT_S:
             raise ControllerError(f"got {time_s:.9g} s, which is before the motion under way began; ask for times from "
                                   f"{time_s - asked_s + (known_from_s or 0.0):.9g} s on")
         return self._plan.sample(asked_s)
