@@ -167,6 +167,10 @@ class UrEmulator:
         """Pull the red button; the arm must be powered on and its brakes released afterwards."""
         self.controller.release_emergency_stop()
 
+    def order_power_off(self) -> None:
+        """Switch the arm off."""
+        self.controller.power_off()
+
     def order_power_on(self) -> None:
         """Power the arm and release its brakes."""
         self.controller.brake_release()
