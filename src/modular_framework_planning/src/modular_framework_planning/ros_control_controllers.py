@@ -22,8 +22,8 @@ from modular_framework_planning.ros_controllers import ActionControllers
 LIST_SERVICE = "controller_manager/list_controllers"
 KEPT_S = 1.0
 # end of a controller's type -> kind and name of its action
-CONTROLLER_TYPES = {"/JointTrajectoryController": (TRAJECTORY, "follow_joint_trajectory"),
-                    "/GripperActionController": (GRIPPER, "gripper_cmd")}
+CONTROLLER_TYPES = {"JointTrajectoryController": (TRAJECTORY, "follow_joint_trajectory"),
+                    "GripperActionController": (GRIPPER, "gripper_cmd")}
 
 
 def spec_of(state: ControllerState, namespace: str = "/") -> ControllerSpec | None:
