@@ -21,6 +21,7 @@ import rospy
 import trimesh
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3, Vector3Stamped
 from moveit_commander import (
+    ConstraintsStorage,
     MoveGroupCommander,
     MoveGroupCommandInterpreter,
     MoveGroupInfoLevel,
@@ -192,9 +193,37 @@ def test_settings(arm: MoveGroupCommander) -> None:
     other.set_joint_value_target(READY)
     request = other.construct_motion_plan_request()
     assert (request.num_planning_attempts, request.allowed_planning_time, request.group_name) == (2, 4.0, "panda_arm")
-    with pytest.raises(MoveItCommanderException, match="database"):
+
+
+def test_path_constraints_by_name(arm: MoveGroupCommander, tmp_path: Path) -> None:
+    other = MoveGroupCommander("panda_arm")
+    with pytest.raises(MoveItCommanderException, match="MongoDB is not spoken"):
         other.set_constraints_database("localhost", 33829)
-    driven.add(("MoveGroupCommander", "set_constraints_database"))  # that it refuses is all it does
+    upright = Constraints(name="upright", orientation_constraints=[OrientationConstraint(link_name="panda_link8")])
+    storage = ConstraintsStorage(str(tmp_path / "warehouse.sqlite"))
+    storage.add_constraints(upright, "panda", "panda_arm")
+    storage.add_constraints(Constraints(name="elsewhere"), "panda", "hand")
+    other.set_constraints_database(str(tmp_path / "warehouse.sqlite"), 0)
+    assert other.get_known_constraints() == ["upright"]
+    other.set_path_constraints("upright")
+    assert other.get_path_constraints() == upright
+    with pytest.raises(MoveItCommanderException, match="there are: upright"):
+        other.set_path_constraints("elsewhere")
+    assert other.get_path_constraints() == upright, "a refused name changes nothing"
+
+
+def test_an_approximate_target_is_as_near_as_the_arm_gets(arm: MoveGroupCommander) -> None:
+    far = arm.get_current_pose()
+    far.pose.position.x, far.pose.position.y, far.pose.position.z = 2.0, 0.0, 0.333
+    with pytest.raises(MoveItCommanderException, match="NO_IK_SOLUTION"):
+        arm.set_joint_value_target(far)
+    arm.set_joint_value_target(far, True)
+    tip = arm._pose_of("", arm._state.message_of(dict(zip(arm._group_names(), arm.get_joint_value_target(),
+                                                           strict=True)))).pose.position
+    assert tip.x > 0.75 and abs(tip.y) < 0.1 and abs(tip.z - 0.333) < 0.2, "the arm is stretched toward the pose"
+    within = arm.get_current_pose()
+    arm.set_joint_value_target(within, True, arm.get_end_effector_link())
+    arm.set_joint_value_target(READY)
 
 
 def test_targets(arm: MoveGroupCommander) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Commands a move_group node: groups, planning scene and robot, over topics, services and actions only."""
+from moveit_commander.constraints_storage import ConstraintsStorage
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_commands import MoveGroupInfoLevel
 from moveit_commander.interpreter import MoveGroupCommandInterpreter
@@ -8,5 +9,6 @@ from moveit_commander.planning_scene_interface import PlanningSceneInterface
 from moveit_commander.robot import RobotCommander
 from moveit_commander.roscpp_initializer import roscpp_initialize, roscpp_shutdown
 
-__all__ = ["MoveGroupCommandInterpreter", "MoveGroupCommander", "MoveGroupInfoLevel", "MoveItCommanderException",
-           "PlanningSceneInterface", "RobotCommander", "roscpp_initialize", "roscpp_shutdown"]
+__all__ = ["ConstraintsStorage", "MoveGroupCommandInterpreter", "MoveGroupCommander", "MoveGroupInfoLevel",
+           "MoveItCommanderException", "PlanningSceneInterface", "RobotCommander", "roscpp_initialize",
+           "roscpp_shutdown"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Jacobian of a chain of joints, from the robot's description alone."""
+"""Jacobian and end of a chain of joints, from the robot's description alone."""
 from __future__ import annotations
 
 import math
@@ -34,6 +34,21 @@ def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_p
     Returns:
         Array of shape (6, movable joints): linear [m/s], then angular [rad/s].
     """
+    axes, turn, place = _walk(chain, positions)
+    point = place + turn @ np.asarray(reference_point, dtype=float)
+    columns = [np.concatenate([axis, np.zeros(3)]) if joint.kind == "prismatic"
+               else np.concatenate([np.cross(axis, point - origin), axis]) for joint, axis, origin in axes]
+    return np.column_stack(columns)
+
+
+def link_pose(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[Any, Any]:
+    """Rotation matrix and position [m] of the last link in the frame of the first joint's parent link."""
+    _, turn, place = _walk(chain, positions)
+    return turn, place
+
+
+def _walk(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[list[tuple[Joint, Any, Any]], Any, Any]:
+    """Each movable joint with its axis and origin, then rotation and position of the last link; in the base's frame."""
     turn, place = np.eye(3), np.zeros(3)
     axes: list[tuple[Joint, Any, Any]] = []
     for joint in chain:
@@ -47,7 +62,4 @@ def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_p
             place = place + axis * positions[joint.name]
         else:
             turn = turn @ _rotation(joint.axis, positions[joint.name])
-    point = place + turn @ np.asarray(reference_point, dtype=float)
-    columns = [np.concatenate([axis, np.zeros(3)]) if joint.kind == "prismatic"
-               else np.concatenate([np.cross(axis, point - origin), axis]) for joint, axis, origin in axes]
-    return np.column_stack(columns)
+    return axes, turn, place

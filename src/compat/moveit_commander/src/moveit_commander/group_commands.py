@@ -149,7 +149,7 @@ class GroupCommands:
                                "</group_state>"]))
 
     def database(self, words: Words) -> Answer:
-        """Names the database of constraints; there is none."""
+        """Chooses the file of constraints."""
         if words:
             self.group.set_constraints_database(words[0], int(number(words[1])) if len(words) > 1 else 33829)
         return info("Not connected to a database")

@@ -12,8 +12,10 @@ from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetPositionIK, GetPositionIKRequest
 from sensor_msgs.msg import JointState
 
+from moveit_commander import conversions
+from moveit_commander.approximate_kinematics import nearest_values, rotation_and_position
 from moveit_commander.exception import MoveItCommanderException
-from moveit_commander.group_connection import code_text
+from moveit_commander.group_connection import code_text, forward_kinematics
 from moveit_commander.group_settings import GroupSettings
 from moveit_commander.robot_model import group_values
 
@@ -148,15 +150,27 @@ class GroupJointTargets(GroupSettings):
         asked.robot_state.joint_state.name = list(self._joint_target)
         asked.robot_state.joint_state.position = list(self._joint_target.values())
         answer = self._servers.call("compute_ik", GetPositionIK, request)
+        if answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and approximate:
+            self._set_values(self._nearest_to(asked.ik_link_name, asked.pose_stamped))
+            return
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-            advice = ("approximate solutions are not offered over the wire" if approximate
-                      else "Is the pose within reach, and the IK solver functional?")
             raise MoveItCommanderException(f"Error setting joint target: service {self._servers.resolve('compute_ik')}"
-                                           f" answers {code_text(answer.error_code)}. {advice}")
+                                           f" answers {code_text(answer.error_code)}. Is the pose within reach, and "
+                                           "the IK solver functional?")
         found = answer.solution.joint_state
         wanted = set(self._group_names())
         self._set_values({name: value for name, value in zip(found.name, found.position, strict=True)
                           if name in wanted})
+
+    def _nearest_to(self, link: str, pose: PoseStamped) -> dict[str, float]:
+        """Joint values near the present target that bring a link as near to a pose as they can."""
+        start = {**self._state.positions(self._group_names()), **self._joint_target}
+        base = self._group.joints[0].parent
+        seen = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
+        base_turn, base_place = rotation_and_position(conversions.pose_to_list(seen))
+        turn, place = rotation_and_position(conversions.pose_to_list(pose.pose))
+        return nearest_values(self._model.chain(base, link), self._group.active_joints, start, self._model.complete,
+                              base_turn.T @ turn, base_turn.T @ (place - base_place))
 
 
 def _single_value(name: str, value: Any) -> float:

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 from moveit_msgs.msg import Constraints, RobotState, TrajectoryConstraints, WorkspaceParameters
 
+from moveit_commander.constraints_storage import ConstraintsStorage
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_connection import GroupConnection
 
-NO_DATABASE = ("constraints are not kept in a database here; give the moveit_msgs/Constraints message itself to "
-               "set_path_constraints")
+NO_DATABASE = ("no database of constraints is chosen: call set_constraints_database with the path of an SQLite file, "
+               "or give the moveit_msgs/Constraints message itself")
 
 
 class GroupSettings(GroupConnection):
@@ -36,6 +37,7 @@ class GroupSettings(GroupConnection):
         self._path_constraints = Constraints()
         self._trajectory_constraints = TrajectoryConstraints()
         self._support_surface = ""
+        self._storage: ConstraintsStorage | None = None
 
     def set_start_state_to_current_state(self) -> None:
         """Lets plans start where the robot is."""
@@ -86,27 +88,37 @@ class GroupSettings(GroupConnection):
         self._replanning = bool(value)
 
     def get_known_constraints(self) -> list[str]:
-        """Answers the names of constraints kept in a database: none, there is no database."""
-        return []
+        """Answers the names of the group's constraints in the database; none where no database is chosen."""
+        return [] if self._storage is None else self._storage.get_known_constraints(self._model.name, self._group.name)
 
     def set_constraints_database(self, host: str, port: int) -> None:
-        """Raises MoveItCommanderException: constraints are given as messages, not looked up in a database."""
-        raise MoveItCommanderException(f"Unable to use the database at {host}:{port}: {NO_DATABASE}")
+        """Chooses the database set_path_constraints takes names from.
+
+        Args:
+            host: path of an SQLite file, as MoveIt's plugin warehouse_ros_sqlite takes it; ConstraintsStorage fills it.
+            port: not needed for a file.
+
+        Raises:
+            MoveItCommanderException: it is no such file.
+        """
+        self._storage = ConstraintsStorage(host)
 
     def get_path_constraints(self) -> Constraints:
         """Answers what holds along the whole path."""
         return self._path_constraints
 
     def set_path_constraints(self, value: Constraints | str | None) -> None:
-        """Sets what holds along the whole path; None clears it.
+        """Sets what holds along the whole path, as a message or by its name in the database; None clears it.
 
         Raises:
-            MoveItCommanderException: a name was given, or something else than moveit_msgs/Constraints.
+            MoveItCommanderException: the database has no such name, or none is chosen, or the type is another one.
         """
         if value is None:
             self.clear_path_constraints()
         elif isinstance(value, Constraints):
             self._path_constraints = value
+        elif isinstance(value, str) and self._storage is not None:
+            self._path_constraints = self._storage.get_constraints(value, self._model.name, self._group.name)
         else:
             raise MoveItCommanderException(f"Unable to set path constraints {value!r}: {NO_DATABASE}")
 

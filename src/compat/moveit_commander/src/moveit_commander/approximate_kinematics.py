@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint values that bring a link as near to a pose as it gets, where inverse kinematics has no solution."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from moveit_commander.chain_jacobian import jacobian, link_pose
+from moveit_commander.robot_model import Joint
+
+STEPS = 200
+DAMPING = 0.02  # [m]; of the least squares: joints move gently where the arm is stretched
+WIDEST_STEP = 0.3  # [rad or m]
+STANDSTILL = 1e-6
+
+
+def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping[str, float],
+                   complete: Callable[[Mapping[str, float]], Mapping[str, float]], rotation: Any,
+                   position: Any) -> dict[str, float]:
+    """Moves joints within their bounds, by damped least squares, to the smallest pose error found on the way.
+
+    Args:
+        chain: joints from the base to the link, fixed ones included.
+        free: those that may move, none of them mimic.
+        start: positions of the robot's joints [rad or m].
+        complete: adds the positions of mimic joints.
+        rotation, position: pose of the link in the base's frame, shapes (3, 3) and (3,) [m].
+
+    Returns:
+        Positions of the free joints; the error adds metres and radians as inverse kinematics does.
+    """
+    movable = [joint.name for joint in chain if joint.movable]
+    values = {joint.name: joint.bounded(start[joint.name]) for joint in free}
+    best, least = dict(values), math.inf
+    for _ in range(STEPS):
+        whole = complete({**start, **values})
+        turn, place = link_pose(chain, whole)
+        error = np.concatenate([np.asarray(position) - place, _rotation_vector(rotation @ turn.T)])
+        if float(np.linalg.norm(error)) < least:
+            best, least = dict(values), float(np.linalg.norm(error))
+        full = jacobian(chain, whole, (0.0, 0.0, 0.0))
+        columns = np.column_stack([_column(full, movable, chain, joint) for joint in free])
+        step = columns.T @ np.linalg.solve(columns @ columns.T + DAMPING ** 2 * np.eye(6), error)
+        step *= min(1.0, WIDEST_STEP / max(float(np.abs(step).max()), STANDSTILL))
+        moved = {joint.name: min(max(values[joint.name] + float(way), joint.lower), joint.upper)
+                 if joint.kind != "continuous" else values[joint.name] + float(way)
+                 for joint, way in zip(free, step, strict=True)}
+        if max(abs(moved[name] - values[name]) for name in moved) < STANDSTILL:
+            break
+        values = moved
+    return best
+
+
+def _column(full: Any, movable: Sequence[str], chain: Sequence[Joint], joint: Joint) -> Any:
+    """How a joint, and those of the chain that mimic it, move the link."""
+    gains = {item.name: item.multiplier if item.leader == joint.name else 1.0 for item in chain
+             if joint.name in (item.name, item.leader)}
+    return sum((gain * full[:, movable.index(name)] for name, gain in gains.items() if name in movable), np.zeros(6))
+
+
+def rotation_and_position(pose: Sequence[float]) -> tuple[Any, Any]:
+    """Rotation matrix and position [m] of a pose [x, y, z, qx, qy, qz, qw]."""
+    return Rotation.from_quat(pose[3:]).as_matrix(), np.array(pose[:3])
+
+
+def _rotation_vector(turn: Any) -> Any:
+    """Axis times angle [rad] of a rotation matrix."""
+    return Rotation.from_matrix(turn).as_rotvec()
