@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
+from dynamic_reconfigure.client import Client
 from moveit_msgs.msg import (
     CollisionObject,
     MoveGroupAction,
@@ -182,3 +183,19 @@ def test_a_cancel_while_planning_ends_the_planning(client: Any) -> None:
     client.cancel_goal()
     assert client.wait_for_result(rospy.Duration(5.0)), "planning went on"
     assert client.get_result().error_code.val == MoveItErrorCodes.PREEMPTED and time.monotonic() - begun < 4.0
+
+
+def test_execution_is_adjusted_while_the_node_runs(client: Any, arm: FakeArm) -> None:
+    settings = Client("/move_group/trajectory_execution", timeout=5.0)
+    before = settings.get_configuration(timeout=5.0)
+    assert before["execution_velocity_scaling"] == 1.0 and before["allowed_execution_duration_scaling"] == 1.2
+    assert settings.update_configuration({"execution_velocity_scaling": 50.0})["execution_velocity_scaling"] == 10.0
+    settings.update_configuration({"execution_velocity_scaling": 4.0})
+    try:
+        result = ask(client, goal(**SLOW))
+    finally:
+        settings.update_configuration({"execution_velocity_scaling": 1.0})
+    planned, executed = (trajectory.joint_trajectory.points[-1].time_from_start.to_sec()
+                         for trajectory in (result.planned_trajectory, result.executed_trajectory))
+    assert result.error_code.val == OK and arm.positions[PAN] == pytest.approx(GOAL_PAN, abs=1e-6)
+    assert planned / 4.0 * 0.8 < executed < planned / 2.0, "four times as fast as planned"

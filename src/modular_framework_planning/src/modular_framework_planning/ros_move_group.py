@@ -38,6 +38,7 @@ from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
 from modular_framework_planning.ros_padding import load_padding
 from modular_framework_planning.ros_parameters import load_kinematics_settings, load_robot_model
 from modular_framework_planning.ros_pipelines import load_pipelines
+from modular_framework_planning.ros_reconfiguration import ExecutionReconfiguration
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
 
@@ -78,6 +79,7 @@ def advertise(context: MoveGroupContext) -> None:
     OctomapMonitor(context.monitor).connect()
     context.markers.show_scene(context.monitor.snapshot())
     context.execution.connect()
+    ExecutionReconfiguration(context.execution).connect()
     rospy.on_shutdown(context.execution.close)
     rospy.on_shutdown(context.pipelines.close)
     for capability in chosen_capabilities(CAPABILITIES):
