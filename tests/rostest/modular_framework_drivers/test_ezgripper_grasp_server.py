@@ -29,6 +29,7 @@ LAUNCH = """<launch>
   </include>
   <rosparam command="load" file="$(find modular_framework_api)/config/external_manipulator_connection.yaml"/>
   <param name="port_name" value="$(arg port)"/>
+  <param name="ezgripper_server/link_timeout" value="0.5"/>
   <rosparam>
     manipulator_controller_action_server_name: ezgripper_grasp
     package_manipulator_action_server: modular_framework_drivers

@@ -46,7 +46,8 @@ class TestEzGripper(RobotHWConformance):
             robot_hw.close()
 
     def make_robot_hw(self) -> RobotHW:
-        root = MappingNodeHandle({"hand": {"port_name": str(self._line.link), "start_position": 1.7}})
+        root = MappingNodeHandle({"hand": {"port_name": str(self._line.link), "start_position": 1.7,
+                                           "link_timeout": 0.4}})
         made = PacedEzGripper()
         self._made.append(made)
         assert made.init(root, root.child("hand"))

@@ -72,7 +72,8 @@ class Loop:
 
 
 def parameters(line: DynamixelLine) -> dict[str, Any]:
-    gripper = {"type": "modular_framework_drivers/EzGripperRobotHW", "start_position": 1.5, "hold_torque": 300}
+    gripper = {"type": "modular_framework_drivers/EzGripperRobotHW", "start_position": 1.5, "hold_torque": 300,
+               "link_timeout": 0.4}
     return {"port_name": str(line.link), "baudrate": 57600, "servo_ids": [1], "manipulator_name": "EzGripper",
             "hand": gripper, "grip": CONTROLLER}
 
@@ -122,7 +123,7 @@ def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_
     loop.controllers["grip"].submit(1.9, 0.1, ticket)
     loop.run(lambda: ticket.status is GoalStatus.ACTIVE)
     line.unplug()
-    loop.run(lambda: not ticket.open, 1.0)
+    loop.run(lambda: not ticket.open, 2.0)
     assert ticket.status is GoalStatus.ABORTED
     assert "EzGripper: port" in ticket.text
     assert "EzGripper: port" in loop.robot_hw.fault()
@@ -161,7 +162,7 @@ def test_beside_other_hardware_only_its_own_controllers_hear_of_its_faults(make_
     assert go(loop, 1.2).status is GoalStatus.SUCCEEDED
     line.unplug()
     took_s = loop.run(lambda: bool(robot_hw.faults()))
-    assert took_s < 1.0
+    assert took_s < 2.0
     assert [fault.joints for fault in robot_hw.faults()] == [frozenset({JOINT})]
     robot_hw.close()
 

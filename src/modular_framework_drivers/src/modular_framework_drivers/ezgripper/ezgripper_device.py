@@ -30,7 +30,7 @@ WARM = 70.0
 UNWATCHED_TORQUE = 100
 """What the maker lets an MX-64 hold with for any time [units of the servo]."""
 SILENT_S = 1.0
-"""A state as old as this is none [s]."""
+"""A state older than this and the time a servo has to answer is none [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class EzGripper:
         """The latest state; one that is too old has a fault that says so."""
         state = self._state
         age_s = time.monotonic() - state.stamp_s
-        if age_s > SILENT_S and not state.fault:
+        if age_s > SILENT_S + self.settings.link_timeout_s and not state.fault:
             return replace(state, fault=f"{self.settings.name}: nothing heard of the servos for {age_s:.1f} s")
         return state
 
