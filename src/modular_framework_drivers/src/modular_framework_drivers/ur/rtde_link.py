@@ -79,7 +79,7 @@ class RtdeLink:
         self._control_since_s = 0.0
         self._program_wanted = False
         self.state: ArmState | None = None
-        self.lost = "not connected yet"
+        self.lost = "the first attempt is under way"
         self.commanding = False
         self.program_failure = ""
         self.program_failed_s = 0.0
@@ -186,8 +186,8 @@ class RtdeLink:
 
     def _is_over(self, stream: _Stream, now_s: float) -> bool:
         if not stream.delivered and not stream.failed and now_s - stream.since_s > _CONNECT_TIMEOUT_S:
+            stream.failed = True
             self.lost = f"no state from the arm within {_CONNECT_TIMEOUT_S:g} s of connecting"
-            return True
         return stream.failed
 
     def _keep_program(self, now_s: float) -> None:

@@ -114,9 +114,11 @@ class UrArmHardware(RobotHW):
         self._fault = self._current_fault()
 
     def _take(self, state: ArmState) -> None:
+        known = self._link is not None and not self._link.lost
         for handle, position, velocity, current in zip(self._handles, state.positions, state.velocities,
                                                        state.currents, strict=True):
-            handle.state.position, handle.state.velocity, handle.state.effort = position, velocity, current
+            joint = handle.state
+            joint.position, joint.velocity, joint.effort = position, velocity if known else 0.0, current
         self._wrench.force = state.wrench[0], state.wrench[1], state.wrench[2]
         self._wrench.torque = state.wrench[3], state.wrench[4], state.wrench[5]
         playing = state.runtime_state == PROGRAM_PLAYING
@@ -190,6 +192,8 @@ class UrArmHardware(RobotHW):
         link = self._link
         if link is None or not link.lost:
             return ""
+        if link.state is None:
+            return f"no link to the arm at {self.address} yet: {link.lost}; it is tried again and again"
         return f"link to the arm at {self.address} lost: {link.lost}; it is being made again"
 
     def _robot_fault(self) -> str:
