@@ -214,8 +214,9 @@ def test_every_type_goes_to_its_own_key(message_type: str, key: str) -> None:
 
 def test_unknown_words_are_refused_when_a_state_is_made() -> None:
     for make in (lambda: Select("cup"), lambda: Plan("cup"), lambda: Plan("pose", starting_state_type="cup"),
-                 lambda: Grasp("cup"), lambda: AllowManipulatorCollisions(True, "cup")):
-        with pytest.raises(ValueError, match="cup"):
+                 lambda: Grasp("cup"), lambda: AllowManipulatorCollisions(True, "cup"),
+                 lambda: AllowManipulatorCollisions(True, "", links=["cup"])):
+        with pytest.raises(ValueError, match="cup|links are of use"):
             make()
 
 
@@ -391,6 +392,33 @@ def test_collisions_are_allowed_only_when_the_scene_takes_them() -> None:
     answer.success = False
     assert run(state)[0] == "fail"
     assert "apply_planning_scene" in state.reason
+    service.shutdown()
+
+
+def test_any_links_may_touch_objects_and_the_scene_hears_at_once_when_a_permission_ends() -> None:
+    scenes = []
+    service = rospy.Service("apply_planning_scene", ApplyPlanningScene,
+                            lambda request: scenes.append(request.scene) or ApplyPlanningSceneResponse(success=True))
+    rows = [AllowedCollisionEntry(enabled=[False, False]) for _ in range(2)]
+    call("set_init_acm", srv.SetInitACM, acm=AllowedCollisionMatrix(entry_names=["arm", "palm"], entry_values=rows))
+    call("update_acm_entry", srv.UpdateACMEntry, action=0, entry_name="crate")
+
+    def touching() -> set[str]:
+        matrix = scenes[-1].allowed_collision_matrix
+        row = matrix.entry_values[matrix.entry_names.index("crate__link")].enabled
+        return {name for name, allowed in zip(matrix.entry_names, row, strict=True) if allowed} - {"crate__link"}
+
+    assert run(AllowManipulatorCollisions(True, "object-collision", ["crate"], links=["arm"]))[0] == "success"
+    assert touching() == {"arm"}
+    unknown = AllowManipulatorCollisions(True, "object-collision", ["crate"], links=["army"])
+    assert run(unknown)[0] == "fail" and "modify_acm" in unknown.reason
+    seen = len(scenes)
+    call("update_acm_entry", srv.UpdateACMEntry, action=2, entry_name="")
+    assert len(scenes) == seen + 1 and touching() == set()
+    call("modify_acm", srv.ModifyACM, modification=0, robot_links=["arm", "palm"], allow_collision=True, publish=True)
+    matrix = scenes[-1].allowed_collision_matrix
+    assert matrix.entry_values[0].enabled[:2] == [False, True]
+    call("update_acm_entry", srv.UpdateACMEntry, action=1, entry_name="crate")
     service.shutdown()
 
 

@@ -156,3 +156,36 @@ def test_after_any_history_the_matrix_is_square_symmetric_and_forbidding_restore
     made.allow_self_collision(False)
     restored = made.allow_object_collision([], False).matrix
     assert [[restored.allowed(a, b) for b in NAMES] for a in NAMES] == [list(row) for row in reference().rows]
+
+
+def test_any_links_may_be_chosen_instead_of_the_manipulators() -> None:
+    made = manager()
+    made.add_object("box")
+    matrix = made.allow_object_collision(["box"], True, ["arm"]).matrix
+    assert matrix.allowed("arm", "box__link") and not matrix.allowed("palm", "box__link")
+    matrix = made.allow_self_collision(True, ["base", "finger_1"]).matrix
+    assert matrix.allowed("base", "finger_1") and not matrix.allowed("finger_1", "finger_2")
+    assert made.permissions() == {frozenset(("arm", "box__link")), frozenset(("base", "finger_1"))}
+    made.allow_object_collision([], False, ["arm"])
+    assert made.allow_self_collision(False, ["base", "finger_1", "arm"]).matrix.allowed("base", "arm")
+    assert made.permissions() == frozenset()
+
+
+def test_links_that_are_not_there_are_named_with_those_that_are() -> None:
+    for ask in (lambda: manager().allow_self_collision(True, ["plam"]),
+                lambda: manager().allow_object_collision([], True, ["plam"])):
+        with pytest.raises(AcmError, match="no link 'plam'; it has base, arm, palm.*did you mean 'palm'"):
+            ask()
+
+
+def test_a_permission_ends_with_its_object_and_with_a_new_beginning() -> None:
+    made = manager()
+    made.add_object("box")
+    made.allow_object_collision([], True)
+    assert len(made.permissions()) == 3
+    made.delete_object("box")
+    assert made.permissions() == frozenset()
+    made.allow_self_collision(True)
+    assert made.permissions() == {frozenset(("finger_1", "finger_2"))}
+    made.reinitialise()
+    assert made.permissions() == frozenset()

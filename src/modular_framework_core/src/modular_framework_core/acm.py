@@ -10,6 +10,8 @@ import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from modular_framework_core.task_constructor.faults import nearest
+
 LINK_SEPARATOR = "__"
 DEFAULT_LINK = "link"
 
@@ -206,69 +208,71 @@ class AcmManager:
         with self._lock:
             return AcmAnswer(self._matrix())
 
-    def allow_self_collision(self, allow: bool) -> AcmAnswer:
-        """Lets the links of the manipulator touch each other, or restores what the reference says.
+    def allow_self_collision(self, allow: bool, links: Sequence[str] = ()) -> AcmAnswer:
+        """Lets links touch each other, or restores what the reference says.
 
         Args:
             allow: False restores the reference.
+            links: Names of the links; none means those of the manipulator.
 
         Returns:
             The new matrix.
 
         Raises:
-            AcmError: There is no reference matrix.
+            AcmError: There is no reference matrix, or it has no such link.
         """
         with self._lock:
             initial, table = self._require_initial()
-            links = self._manipulator_links
-            for position, first in enumerate(links):
-                for second in links[position + 1:]:
+            chosen = self._chosen(links)
+            for position, first in enumerate(chosen):
+                for second in chosen[position + 1:]:
                     table.set(first, second, allow or bool(initial.allowed(first, second)))
-            return AcmAnswer(self._matrix(), self._link_warnings())
+            return AcmAnswer(self._matrix(), _link_warnings(chosen))
 
-    def allow_object_collision(self, objects: Iterable[str], allow: bool) -> AcmAnswer:
-        """Lets the manipulator touch objects, or restores what the reference says.
+    def allow_object_collision(self, objects: Iterable[str], allow: bool, links: Sequence[str] = ()) -> AcmAnswer:
+        """Lets links touch objects, or restores what the reference says.
 
         Args:
             objects: Models or ids; none means every object added so far.
             allow: False restores the reference.
+            links: Names of the links; none means those of the manipulator.
 
         Returns:
             The new matrix, with a warning for every name that matches nothing.
 
         Raises:
-            AcmError: There is no reference matrix.
+            AcmError: There is no reference matrix, or it has no such link.
         """
         with self._lock:
             initial, table = self._require_initial()
-            wanted = list(objects)
-            targets, unknown = self._match(wanted, table) if wanted else (list(self._objects), [])
+            chosen, wanted = self._chosen(links), list(objects)
+            targets, unknown = _match(wanted, table, chosen) if wanted else (list(self._objects), [])
             warnings = [f"No entry of the collision matrix belongs to the object '{name}'; add it first."
                         for name in unknown]
             if not wanted and not targets:
                 warnings.append("No object was added to the collision matrix; the manipulator may touch none.")
             for target in targets:
-                for link in self._manipulator_links:
+                for link in chosen:
                     if link != target:
                         table.set(link, target, allow or bool(initial.allowed(link, target)))
-            return AcmAnswer(self._matrix(), (*warnings, *self._link_warnings()))
+            return AcmAnswer(self._matrix(), (*warnings, *_link_warnings(chosen)))
 
-    def _match(self, wanted: list[str], table: _Table) -> tuple[list[str], list[str]]:
-        candidates = [name for name in table.names if name not in self._manipulator_links]
-        found: list[str] = []
-        unknown: list[str] = []
-        for name in wanted:
-            hits = [entry for entry in candidates if entry == name or entry.startswith(name + LINK_SEPARATOR)]
-            found.extend(hits)
-            if not hits:
-                unknown.append(name)
-        return list(dict.fromkeys(found)), unknown
+    def permissions(self) -> frozenset[frozenset[str]]:
+        """Returns the pairs that may touch now and may not by the reference."""
+        with self._lock:
+            if self._initial is None or self._table is None:
+                return frozenset()
+            names, reference = self._table.names, self._initial.rows  # its entries come first, objects after them
+            return frozenset(frozenset((names[i], names[j])) for i, row in enumerate(self._table.rows)
+                             for j in range(i) if row[j] and not (i < len(reference) and reference[i][j]))
 
-    def _link_warnings(self) -> tuple[str, ...]:
-        if self._manipulator_links:
-            return ()
-        return ("No link of the manipulator is known; set manipulator_links_indices or manipulator_prefix "
-                "and send the reference matrix again.",)
+    def _chosen(self, links: Sequence[str]) -> tuple[str, ...]:
+        initial, _ = self._require_initial()
+        for link in links:
+            if link not in initial.names:
+                raise AcmError(f"The collision matrix has no link '{link}'; it has {', '.join(initial.names)}"
+                               f"{nearest(link, initial.names)}")
+        return tuple(dict.fromkeys(links)) or self._manipulator_links
 
     def _require_initial(self) -> tuple[CollisionMatrix, _Table]:
         if self._initial is None or self._table is None:
@@ -304,3 +308,23 @@ def object_id(entry_name: str) -> str:
     if not entry_name:
         raise AcmError("entry_name is empty; give the name of the object.")
     return entry_name if LINK_SEPARATOR in entry_name else f"{entry_name}{LINK_SEPARATOR}{DEFAULT_LINK}"
+
+
+def _match(wanted: Sequence[str], table: _Table, links: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Finds the entries of objects, and the names that have none."""
+    candidates = [name for name in table.names if name not in links]
+    found: list[str] = []
+    unknown: list[str] = []
+    for name in wanted:
+        hits = [entry for entry in candidates if entry == name or entry.startswith(name + LINK_SEPARATOR)]
+        found.extend(hits)
+        if not hits:
+            unknown.append(name)
+    return list(dict.fromkeys(found)), unknown
+
+
+def _link_warnings(links: Sequence[str]) -> tuple[str, ...]:
+    if links:
+        return ()
+    return ("No link of the manipulator is known; set manipulator_links_indices or manipulator_prefix "
+            "and send the reference matrix again.",)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes the messages of a manager to a YAML file and reads them back, every number to the last bit.
 
-A message is one line of flow YAML that is JSON as well, as long as all its numbers are finite: a parser of JSON reads
-a plan fifty times as fast as one of YAML, which is kept for files that were written or changed by hand.
+A saved file is JSON, which is YAML too, one line a message: a parser of JSON reads a plan fifty times as fast as one of
+YAML, which is kept for files that were written or changed by hand.
 """
 from __future__ import annotations
 
 import io
 import json
-import math
 import os
+import re
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -107,44 +107,38 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
     return named, anonymous
 
 
+class _YamlLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """Reads numbers as JSON has them, too: YAML 1.1 takes 1e-07, NaN and Infinity for words."""
+
+
+_YamlLoader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+[eE][-+]?\d+|NaN|Infinity)$"),
+                                  [*"-+0123456789NI"])
+
+
 def _parsed(text: str) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError:
-        return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        return yaml.load(text, _YamlLoader)
 
 
-def flow_text(value: Any) -> str:
-    """Writes a message, or a value of one, as flow YAML."""
+def flow_text(message: Any) -> str:
+    """Writes a message as one line of JSON."""
+    return json.dumps(_plain(message), default=lambda value: value.tolist())  # NumPy's numbers and arrays
+
+
+def _plain(value: Any) -> Any:
     match value:
         case genpy.Message():
-            fields = [f'"{name}": {flow_text(getattr(value, name))}' for name in value.__slots__]
-            return f"{{{', '.join(fields)}}}"
+            return {name: _plain(getattr(value, name)) for name in value.__slots__}
         case genpy.TVal():
-            return f'{{"secs": {int(value.secs)}, "nsecs": {int(value.nsecs)}}}'
-        case float():
-            return _float_text(value)
-        case bytes() | list() | tuple():
-            return _list_text(value)
-        case _ if hasattr(value, "tolist"):  # of NumPy
-            return flow_text(value.tolist())
+            return {"secs": value.secs, "nsecs": value.nsecs}
+        case [genpy.Message() | genpy.TVal(), *_]:
+            return [_plain(item) for item in value]
+        case bytes():
+            return list(value)
         case _:
-            return json.dumps(value)
-
-
-def _list_text(values: Sequence[Any]) -> str:
-    if all(type(value) is float for value in values):
-        text = repr(list(values))  # of most numbers this is JSON already, in a tenth of the time
-        if not set(text) & set("eni"):
-            return text
-    return f"[{', '.join(map(flow_text, values))}]"
-
-
-def _float_text(value: float) -> str:
-    if not math.isfinite(value):
-        return ".nan" if math.isnan(value) else ".inf" if value > 0.0 else "-.inf"
-    text = float.__repr__(value)
-    return text if "." in text else text.replace("e", ".0e")  # YAML 1.1 takes 1e-07 for a word
+            return value
 
 
 def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any:

@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import rospy
-from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
+from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, PlanningScene
+from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
 from modular_framework_core.acm import AcmAnswer, AcmError, AcmManager, CollisionMatrix
 from modular_framework_core.managers.ros_simulated_objects import new_loose_objects
-from modular_framework_core.ros_calls import CallError
+from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_core.srv import (
     GetModifiedACM,
     GetModifiedACMRequest,
     GetModifiedACMResponse,
+    ModifyACM,
+    ModifyACMRequest,
+    ModifyACMResponse,
     SetInitACM,
     SetInitACMResponse,
     UpdateACMEntry,
@@ -23,6 +27,7 @@ from modular_framework_core.srv import (
 
 INDICES_PARAMETER = "manipulator_links_indices"
 PREFIX_PARAMETER = "manipulator_prefix"
+APPLY_TIMEOUT_S = 3.0
 
 
 def matrix_from_message(message: AllowedCollisionMatrix) -> CollisionMatrix:
@@ -45,6 +50,21 @@ def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
         default_entry_values=list(matrix.default_values))
 
 
+def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
+    """Gives a matrix to move_group, and waits until it plans with it.
+
+    Raises:
+        CallError: move_group is not there within this time [s], or does not take the matrix.
+    """
+    proxy = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
+    wait_for_service(proxy, timeout_s)
+    scene = PlanningScene(is_diff=True, allowed_collision_matrix=message)
+    scene.robot_state.is_diff = True
+    if not call_service(proxy, ApplyPlanningSceneRequest(scene=scene), timeout_s).success:
+        raise CallError(f"service '{proxy.resolved_name}' did not take the collision matrix of "
+                        f"{len(message.entry_names)} entries; its node logged the reason")
+
+
 class AcmServices:
     """The collision matrix manager behind its services.
 
@@ -55,8 +75,10 @@ class AcmServices:
         ``simulation`` (bool): True adds the loose objects of the simulation before a request about objects is served.
 
     Services:
-        ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM).
-    Services called in simulation: ``get_planning_scene``, ``gazebo/get_model_properties``.
+        ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM):
+        of the manipulator. ``modify_acm`` (ModifyACM): of any links.
+    Services called: ``apply_planning_scene`` when ``modify_acm`` asks for it, and when ``update_acm_entry`` takes a
+        permission back; in simulation ``get_planning_scene`` and ``gazebo/get_model_properties``.
     """
 
     def __init__(self) -> None:
@@ -68,7 +90,8 @@ class AcmServices:
         """Advertises the services."""
         self._services = [rospy.Service("set_init_acm", SetInitACM, self._set_init),
                           rospy.Service("update_acm_entry", UpdateACMEntry, self._update_entry),
-                          rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified)]
+                          rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified),
+                          rospy.Service("modify_acm", ModifyACM, self._modify_links)]
 
     def close(self) -> None:
         """Withdraws the services; may be called twice."""
@@ -90,11 +113,16 @@ class AcmServices:
             return SetInitACMResponse(success=False)
 
     def _update_entry(self, request: Any) -> UpdateACMEntryResponse:
+        before = self.manager.permissions()
         try:
             warning = self._apply_update(request.action, request.entry_name)
+            if before - self.manager.permissions():
+                apply_matrix(matrix_to_message(self.manager.current().matrix), APPLY_TIMEOUT_S)
         except AcmError as error:
             rospy.logerr("update_acm_entry: %s", error)
             return UpdateACMEntryResponse(success=False)
+        except CallError as error:
+            warning = f"move_group still has the collision matrix it had: {error}"
         if warning:
             rospy.logwarn("update_acm_entry: %s", warning)
         return UpdateACMEntryResponse(success=True)
@@ -133,6 +161,30 @@ class AcmServices:
             case _:
                 raise AcmError(f"got modification {request.modification}, allowed are NOTHING=0, "
                                "MANIPULATOR_SELF_COLLISION=1, MANIPULATOR_OBJECT_COLLISION=2")
+
+    def _modify_links(self, request: Any) -> ModifyACMResponse:
+        try:
+            answer = self._modified(request)
+            if request.publish:
+                apply_matrix(matrix_to_message(answer.matrix), APPLY_TIMEOUT_S)
+        except (AcmError, CallError) as error:
+            rospy.logerr("modify_acm: %s", error)
+            return ModifyACMResponse(success=False)
+        for warning in answer.warnings:
+            rospy.logwarn("modify_acm: %s", warning)
+        return ModifyACMResponse(success=True)
+
+    def _modified(self, request: Any) -> AcmAnswer:
+        match request.modification:
+            case ModifyACMRequest.ROBOT_SELF_COLLISION:
+                return self.manager.allow_self_collision(request.allow_collision, request.robot_links)
+            case ModifyACMRequest.ROBOT_OBJECT_COLLISION:
+                self._add_simulated_objects()
+                return self.manager.allow_object_collision(request.objects, request.allow_collision,
+                                                           request.robot_links)
+            case _:
+                raise AcmError(f"got modification {request.modification}, allowed are ROBOT_SELF_COLLISION=0, "
+                               "ROBOT_OBJECT_COLLISION=1")
 
     def _add_simulated_objects(self) -> None:
         """Adds what a world file or another node has put into the simulation since the last request."""

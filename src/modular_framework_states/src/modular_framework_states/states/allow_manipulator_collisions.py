@@ -6,17 +6,18 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import rospy
-from moveit_msgs.msg import PlanningScene
-from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.managers.ros_acm_services import apply_matrix
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
-from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest
+from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest, ModifyACM, ModifyACMRequest
 from modular_framework_states.manager_clients import ManagerError
 
 MODIFICATIONS = {"": GetModifiedACMRequest.NOTHING,
                  "self-collision": GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION,
                  "object-collision": GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION}
+OF_LINKS = {"self-collision": ModifyACMRequest.ROBOT_SELF_COLLISION,
+            "object-collision": ModifyACMRequest.ROBOT_OBJECT_COLLISION}
 FROM_USERDATA = "userdata"
 SERVICE_TIMEOUT_S = 10.0
 
@@ -29,6 +30,7 @@ class AllowManipulatorCollisions(FrameworkState):
         collision_type: self-collision, object-collision, or nothing to apply the matrix as it stands.
         objects: Names of the objects; none means all that are known: those that were added and, in simulation, every
             object that is free to move. ``userdata`` takes the object of ``selected_grasp``.
+        links: Names of links of the robot, instead of those of the manipulator.
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
         output_keys: Userdata that is written.
@@ -36,36 +38,31 @@ class AllowManipulatorCollisions(FrameworkState):
     """
 
     def __init__(self, allow: bool, collision_type: Literal["", "self-collision", "object-collision"] = "",
-                 objects: Sequence[str] | str = (),
+                 objects: Sequence[str] | str = (), links: Sequence[str] = (),
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if collision_type not in MODIFICATIONS:
             raise ValueError(f"AllowManipulatorCollisions: collision_type is '{collision_type}', allowed are "
                              f"{list(MODIFICATIONS)}")
-        self._modification, self._allow = MODIFICATIONS[collision_type], bool(allow)
+        if links and not collision_type:
+            raise ValueError("AllowManipulatorCollisions: links are of use with a collision_type only; give one")
+        self._type, self._allow, self._links = collision_type, bool(allow), list(links)
         self._objects = [objects] if isinstance(objects, str) else list(objects)
 
     def execute(self, userdata: Any) -> str:
-        """Fetches the changed matrix and applies it."""
-        get_matrix = rospy.ServiceProxy("get_modified_acm", GetModifiedACM)
-        apply_scene = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
+        """Has the matrix changed, and applies it."""
         try:
-            request = GetModifiedACMRequest(modification=self._modification, allow_collision=self._allow,
-                                            objects=self._named_objects(userdata))
-            for proxy in (get_matrix, apply_scene):
-                wait_for_service(proxy, SERVICE_TIMEOUT_S)
-            answer = call_service(get_matrix, request, SERVICE_TIMEOUT_S)
-            if not answer.success:
-                return self.fail(f"service '{get_matrix.resolved_name}' refused the change; its node logged the reason")
-            scene = PlanningScene(is_diff=True, allowed_collision_matrix=answer.acm)
-            scene.robot_state.is_diff = True
-            applied = call_service(apply_scene, ApplyPlanningSceneRequest(scene=scene), SERVICE_TIMEOUT_S)
+            objects = self._named_objects(userdata)
+            if self._links:
+                _ask("modify_acm", ModifyACM, ModifyACMRequest(OF_LINKS[self._type], self._links, objects, self._allow,
+                                                               True))
+                return self.succeed()
+            answer = _ask("get_modified_acm", GetModifiedACM,
+                          GetModifiedACMRequest(MODIFICATIONS[self._type], objects, self._allow))
+            apply_matrix(answer.acm, SERVICE_TIMEOUT_S)
         except (ManagerError, CallError) as error:
             return self.fail(str(error))
-        if not applied.success:
-            return self.fail(f"service '{apply_scene.resolved_name}' did not take the collision matrix of "
-                             f"{len(answer.acm.entry_names)} entries; its node logged the reason")
         return self.succeed()
 
     def _named_objects(self, userdata: Any) -> list[str]:
@@ -79,3 +76,13 @@ class AllowManipulatorCollisions(FrameworkState):
             raise ManagerError("userdata 'selected_grasp' names no object; select a grasp with an object_id first, or "
                                "give the objects by name")
         return [name]
+
+
+def _ask(name: str, service_type: Any, request: Any) -> Any:
+    """Calls a service of the collision matrix manager; raises CallError when it does not answer or refuses."""
+    proxy = rospy.ServiceProxy(name, service_type)
+    wait_for_service(proxy, SERVICE_TIMEOUT_S)
+    answer = call_service(proxy, request, SERVICE_TIMEOUT_S)
+    if not answer.success:
+        raise CallError(f"service '{proxy.resolved_name}' refused the change; its node logged the reason")
+    return answer
