@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -18,6 +19,8 @@ from modular_framework_control.gripper_action_controller import GripperTicket
 from modular_framework_control.hardware_interface import PositionJointInterface
 from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory_goal import TrajectoryGoal, TrajectoryTicket
 from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
@@ -26,6 +29,8 @@ from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGrip
 PERIOD_S = 0.008
 CONTROLLER = {"type": "position_controllers/GripperActionController", "joint": JOINT, "goal_tolerance": 0.03,
               "max_effort": 0.5, "stall_timeout": 0.3, "stall_velocity_threshold": 0.02}
+TRAJECTORY_CONTROLLER = {"type": "position_controllers/JointTrajectoryController", "joints": [JOINT],
+                         "constraints": {"goal_time": 0.5, JOINT: {"trajectory": 0.2, "goal": 0.03}}}
 
 
 @pytest.fixture(scope="module")
@@ -62,20 +67,21 @@ class Loop:
         return time.monotonic() - start_s
 
     def spawn(self, name: str) -> Any:
-        from threading import Thread
-
         self.manager.load_controller(name)
-        thread = Thread(target=self.manager.switch_controller, args=([name], []))
+        self.switch([name], [])
+        return self.controllers[name]
+
+    def switch(self, start: list[str], stop: list[str]) -> None:
+        thread = Thread(target=self.manager.switch_controller, args=(start, stop))
         thread.start()
         self.run(lambda: not thread.is_alive())
-        return self.controllers[name]
 
 
 def parameters(line: DynamixelLine) -> dict[str, Any]:
     gripper = {"type": "modular_framework_drivers/EzGripperRobotHW", "start_position": 1.5, "hold_torque": 300,
                "link_timeout": 0.4}
     return {"port_name": str(line.link), "baudrate": 57600, "servo_ids": [1], "manipulator_name": "EzGripper",
-            "hand": gripper, "grip": CONTROLLER}
+            "hand": gripper, "grip": CONTROLLER, "swing": TRAJECTORY_CONTROLLER}
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +119,20 @@ def test_an_object_stalls_it_and_is_held_with_the_effort_asked_for(line: Dynamix
     handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
     loop.run(lambda: handle.effort == pytest.approx(0.25, abs=0.01))
     assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
+
+
+def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loop: Loop) -> None:
+    line.remove_object()
+    go(loop, 1.5)
+    loop.manager.load_controller("swing")
+    loop.switch(["swing"], ["grip"])
+    ticket: TrajectoryTicket = TrajectoryTicket()
+    points = (TrajectoryPoint(0.5, (1.2,)), TrajectoryPoint(1.0, (1.7,)))
+    loop.controllers["swing"].submit(TrajectoryGoal(JointTrajectory((JOINT,), points)), ticket)
+    loop.run(lambda: not ticket.open)
+    assert ticket.status is GoalStatus.SUCCEEDED, ticket.text
+    assert line.fingers[0].opening == pytest.approx(2500 * (1 - 1.7 / 1.94), abs=60)
+    loop.switch(["grip"], ["swing"])
 
 
 def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_back(line: DynamixelLine,
