@@ -42,6 +42,7 @@ class FakeGripper:
         self.position = 0.0
         self.obstacle = float("inf")
         self.deaf = False
+        self.lag = 0
         self.max_effort = -1.0
         self.canceled = threading.Event()
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
@@ -51,8 +52,11 @@ class FakeGripper:
         threading.Thread(target=self._publish, daemon=True).start()
 
     def _publish(self) -> None:
+        seen = [self.position] * 20
         while not rospy.is_shutdown():
-            self._publisher.publish(JointState(name=["f"], position=[self.position], velocity=[0.0]))
+            seen = [*seen[1:], self.position]
+            now, before = seen[-1 - self.lag], seen[-2 - self.lag]
+            self._publisher.publish(JointState(name=["f"], position=[now], velocity=[(now - before) / 0.02]))
             time.sleep(0.02)
 
     def _move(self, goal: GripperCommandGoal) -> None:
@@ -112,6 +116,16 @@ def test_a_pregrasp_is_reached_and_watched(gripper: FakeGripper, client) -> None
     assert gripper.max_effort == pytest.approx(0.5 * 400 / 800 * 2.0)
     assert feedback
     assert feedback[0].name == ["f"]
+
+
+def test_joint_states_that_are_heard_late_do_not_make_a_posture_missed(gripper: FakeGripper, client) -> None:
+    gripper.position, gripper.obstacle, gripper.lag = 1.5, float("inf"), 5
+    time.sleep(0.2)
+    try:
+        state, flags, text, _ = send(client, GraspCommand.PRE_GRASP_STATE, grasp())
+    finally:
+        gripper.lag = 0
+    assert (state, flags) == (GoalStatus.SUCCEEDED, (True, False, False)), text
 
 
 def test_fingers_stopped_by_an_object_have_grasped_it_and_hold_it_afterwards(gripper: FakeGripper, client) -> None:

@@ -4,6 +4,7 @@ device's own driver."""
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -23,8 +24,8 @@ from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_core.grasp_server import GraspCommandError, Outcome
 from modular_framework_core.ros_calls import wait_for_action, wait_for_result, wait_until
 
-REST_SPEED = 0.02
-REST_TIME_S = 0.5
+REST_SPEED = 0.02  # [rad/s or m/s]
+REST_TIMEOUT_S = 1.0
 
 
 class JointMonitor:
@@ -37,21 +38,32 @@ class JointMonitor:
         self._lock = threading.Lock()
         self._positions: dict[str, float] = {}
         self._velocities: dict[str, float] = {}
+        self._heard: dict[str, float] = {}
         self._subscriber: rospy.Subscriber | None = None
 
     def connect(self) -> None:
         """Starts listening."""
-        self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10)
+        self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=1)
 
     def positions(self, names: Mapping[str, float] | list[str]) -> dict[str, float]:
         """Returns the positions of the joints that were heard of."""
         with self._lock:
             return {name: self._positions[name] for name in names if name in self._positions}
 
-    def at_rest(self, names: Mapping[str, float]) -> bool:
-        """Returns whether every joint is slower than a crawl; a joint without a speed counts as resting."""
+    def wait_for_rest(self, motion: Motion) -> bool:
+        """Waits until every joint was heard of once more and is slower than a crawl; False when that takes too long.
+
+        A controller ends a goal some milliseconds before the joints' last positions are heard, and a finger may still
+        move on within the goal's tolerance. A joint without a speed counts as resting.
+        """
+        begun = time.monotonic()
+        wait_until(lambda: motion.stop_requested() or self._at_rest_since(motion.targets, begun), REST_TIMEOUT_S)
+        return self._at_rest_since(motion.targets, begun)
+
+    def _at_rest_since(self, names: Mapping[str, float], begun: float) -> bool:
         with self._lock:
-            return all(abs(self._velocities.get(name, 0.0)) < REST_SPEED for name in names)
+            return all(self._heard.get(name, 0.0) > begun and abs(self._velocities.get(name, 0.0)) < REST_SPEED
+                       for name in names)
 
     def message(self, names: Mapping[str, float]) -> JointState:
         """Makes a joint state message of some joints."""
@@ -64,6 +76,7 @@ class JointMonitor:
         with self._lock:
             self._positions.update(zip(message.name, message.position, strict=False))
             self._velocities.update(zip(message.name, message.velocity, strict=False))
+            self._heard.update(dict.fromkeys(message.name, time.monotonic()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +135,8 @@ class GripperDriver:
         if result is None or not (result.stalled or result.reached_goal):
             raise GraspCommandError(f"controller action '{self._action}' gave up: "
                                     f"{self._client.get_goal_status_text() or 'no reason given'}")
-        positions = monitor.positions(motion.targets) or {name: result.position}
+        positions = monitor.positions(motion.targets) if monitor.wait_for_rest(motion) else {
+            name: result.position}
         return Outcome(positions, bool(result.stalled), f"the controller stopped at {result.position:.4f}")
 
 
@@ -157,9 +171,9 @@ class TrajectoryDriver:
         if status == GoalStatus.REJECTED:
             raise GraspCommandError(f"controller action '{self._action}' rejected the posture: "
                                     f"{result.error_string if result else self._client.get_goal_status_text()}")
-        wait_until(lambda: monitor.at_rest(motion.targets), REST_TIME_S)
-        return Outcome(monitor.positions(motion.targets), status != GoalStatus.SUCCEEDED and
-                       monitor.at_rest(motion.targets), result.error_string if result else "")
+        rests = monitor.wait_for_rest(motion)
+        return Outcome(monitor.positions(motion.targets), status != GoalStatus.SUCCEEDED and rests,
+                       result.error_string if result else "")
 
 
 def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], duration_s: float) -> ManipulatorDriver:
