@@ -78,6 +78,7 @@ def test_the_first_task_of_the_guide_plans(framework: Launch) -> None:
     (GUIDE_TASKS / "mock_trajectory.yaml", "sm_successful", "stability_pose"),
     (GUIDE_TASKS / "nested_initial_pose.yaml", "success", "initial_pose"),
     (OWN_TASKS / "motion_and_more.yaml", "done", "stability_pose"),
+    (OWN_TASKS / "as_the_original_generated.py", "sm_successful", "initial_pose"),
     (API / "task_constructor_scripts" / "pick_and_hold.yaml", "successful_pipeline", "stability_pose"),
 ], ids=lambda value: value.stem if isinstance(value, Path) else "")
 def test_the_task_runs_and_the_arm_is_where_it_leads(session: RosSession, framework: Launch, script: Path,
