@@ -3,12 +3,12 @@
 """A state machine with the imports and the set-up of those that the original framework generated."""
 import actionlib
 import rospy
-from modular_framework_core.states.move import Move
-from modular_framework_core.states.plan import Plan
 from sr_robot_commander.sr_arm_commander import SrArmCommander
 
 import smach
 from modular_framework_core.msg import GraspAction
+from modular_framework_core.states.move import Move
+from modular_framework_core.states.plan import Plan
 
 
 class AsTheOriginalGenerated(smach.StateMachine):
@@ -18,8 +18,8 @@ class AsTheOriginalGenerated(smach.StateMachine):
         smach.StateMachine.__init__(self, outcomes=list(outcomes))
         with self:
             smach.StateMachine.add(
-                "PlanMotion", Plan(target_state_type="joint_state", target_state_name="initial_pose", plan_name="to_init",
-                                   outcomes=["success", "fail"], io_keys=["arm_commander"]),
+                "PlanMotion", Plan(target_state_type="joint_state", target_state_name="initial_pose",
+                                   plan_name="to_init", outcomes=["success", "fail"], io_keys=["arm_commander"]),
                 transitions={"success": "MoveInit", "fail": "sm_failed"})
             smach.StateMachine.add("MoveInit", Move(plan_name="to_init", io_keys=["arm_commander"]),
                                    transitions={"success": "sm_successful", "fail": "sm_failed"})
