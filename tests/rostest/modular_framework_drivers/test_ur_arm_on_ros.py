@@ -33,11 +33,12 @@ LAUNCH = """<launch>
   <rosparam subst_value="true">
     robot_hardware: [ur_robot_hw]
     ur_robot_hw: {type: modular_framework_drivers/UrArmRobotHW, robot_ip_address: $(arg address),
-                  topic_to_wait_for: arm_ready, link_timeout: 0.5}
+                  topic_to_wait_for: arm_ready, link_timeout: 1.0}
     joint_state_controller: {type: joint_state_controller/JointStateController, publish_rate: 50}
     arm_controller:
       type: position_controllers/JointTrajectoryController
       joints: [shoulder_pan_joint, shoulder_lift_joint, elbow_joint, wrist_1_joint, wrist_2_joint, wrist_3_joint]
+      constraints: {goal_time: 0.6, stopped_velocity_tolerance: 0.05}
   </rosparam>
   <node name="robot_hw" pkg="modular_framework_control" type="robot_hw" output="screen"/>
   <node name="spawner" pkg="controller_manager" type="spawner" output="screen"

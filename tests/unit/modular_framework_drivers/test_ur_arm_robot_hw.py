@@ -31,7 +31,7 @@ class Rig:
     def __init__(self, arm: EmulatedArm, **parameters: Any) -> None:
         self.arm = arm
         self.hw = UrArmHardware()
-        values = {"robot_ip_address": arm.address, "link_timeout": 0.5, **parameters}
+        values = {"robot_ip_address": arm.address, "link_timeout": 1.0, **parameters}
         assert self.hw.init(MappingNodeHandle({}), MappingNodeHandle(values, "/arm_hw"))
         self._next_s = time.monotonic()
 

@@ -238,8 +238,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--unlock-delay", type=float, default=5.0, help="of a protective stop [s]")
     parser.add_argument("--command-port", type=int, default=COMMAND_PORT)
     parser.add_argument("--positions", type=float, nargs=JOINTS, default=HOME, help="of the joints [rad]")
+    parser.add_argument("--quiet", action="store_true", help="say only what is wrong")
     options = parser.parse_args(arguments)
-    logging.basicConfig(level=logging.INFO)
+    logging.basicConfig(level=logging.WARNING if options.quiet else logging.INFO)
     emulator = UrEmulator(options.address, options.model, options.positions, options.unlock_delay,
                           options.command_port)
     for number in (signal.SIGINT, signal.SIGTERM):

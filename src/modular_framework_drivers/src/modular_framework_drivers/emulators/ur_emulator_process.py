@@ -33,7 +33,7 @@ class EmulatedArm:
         draw = random.Random(os.urandom(8))    # 127.x.y.z is this machine; nobody else's test draws the same
         self.address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
         self._process = subprocess.Popen(
-            [sys.executable, "-m", _MODULE, "--address", self.address, "--model", model,
+            [sys.executable, "-m", _MODULE, "--quiet", "--address", self.address, "--model", model,
              "--unlock-delay", str(unlock_delay_s), "--positions", *map(str, positions)],
             stdout=subprocess.PIPE, text=True)
         if self._process.stdout is None or self._process.stdout.readline() != "ready\n":

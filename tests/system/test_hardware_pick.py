@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The real-robot branch of the framework, on devices in software: `simulation:=false` picks an object and holds it."""
+from __future__ import annotations
+
+import csv
+import json
+import os
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from ros_session import RosSession, free_port
+
+TASK_TIMEOUT_S = 240.0
+WRAPPER = """<launch>
+  <arg name="arm_address"/>
+  <arg name="port"/>
+  <include file="$(find modular_framework_api)/launch/start_framework.launch">
+    <arg name="simulation" value="false"/>
+    <arg name="connection_file" value="connection_emulators.yaml"/>
+    <arg name="task_constructor_script" value="pick_and_hold.yaml"/>
+    <arg name="generated_state_machine_name" value="pick_and_hold.py"/>
+    <arg name="gui" value="false"/>
+    <arg name="rviz" value="false"/>
+    <arg name="end_with_task" value="true"/>
+  </include>
+  <param name="ur_robot_hw/robot_ip_address" value="$(arg arm_address)"/>
+  <param name="ezgripper_robot_hw/port_name" value="$(arg port)"/>
+</launch>"""
+
+# Runs as a node of its own and prints the points of every trajectory that the arm was to follow.
+WATCHER = """
+import json, sys, time
+import rosgraph, rospy
+from control_msgs.msg import FollowJointTrajectoryActionGoal
+while not rosgraph.is_master_online():
+    time.sleep(0.05)
+rospy.init_node("watcher", anonymous=True, disable_signals=True)
+plans = []
+def remember(message):
+    trajectory = message.goal.trajectory
+    order = sorted(range(6), key=lambda joint: JOINTS.index(trajectory.joint_names[joint]))
+    plans.append([[point.positions[joint] for joint in order] for point in trajectory.points])
+JOINTS = [name + "_joint" for name in "shoulder_pan shoulder_lift elbow wrist_1 wrist_2 wrist_3".split()]
+rospy.Subscriber("/arm_trajectory_controller/follow_joint_trajectory/goal", FollowJointTrajectoryActionGoal, remember)
+sys.stdin.read()
+print(json.dumps(plans))
+"""
+
+
+def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tmp_path: Path) -> None:
+    draw = random.Random(os.urandom(8))
+    address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+    port, path_log = tmp_path / "gripper", tmp_path / "path.csv"
+    watcher = subprocess.Popen([sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE,
+                               stdout=subprocess.PIPE, text=True)
+    try:
+        emulators = session.launch_package("modular_framework_drivers", "emulators.launch", arm_address=address,
+                                           arm_log=path_log, gripper_port=port, gripper_object=1.3,
+                                           gripper_command_port=free_port())
+        framework = session.launch(WRAPPER, arm_address=address, port=port)
+        framework.wait(TASK_TIMEOUT_S)
+        plans = json.loads(watcher.communicate(timeout=20)[0].splitlines()[-1])
+    finally:
+        watcher.kill()
+    log = framework.log()
+    assert "Task 'pick_and_hold' ended with outcome 'successful_pipeline': SUCCEEDED" in log, log
+    assert emulators.alive(), emulators.log()
+    emulators.stop()
+    commanded, actual = read_path(path_log)
+    assert len(plans) >= 4, "to the pregrasp, to the grasp, up, to where the object is held"
+    for plan in plans:
+        assert max(distance_to_path(np.array(point), commanded) for point in plan) < 1e-3
+    planned = np.concatenate([np.array(plan) for plan in plans])
+    moved = commanded[np.r_[True, np.any(np.diff(commanded, axis=0) != 0.0, axis=1)]]
+    assert max(distance_to_path(point, planned) for point in moved[::5]) < 0.02      # curves between a plan's points
+    assert np.max(np.abs(actual - commanded)) < 0.15                                 # the arm's lag
+
+
+def read_path(log: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Commanded and actual joint positions of every cycle that the arm's controller logged, shape (cycles, 6)."""
+    with log.open() as file:
+        rows = np.array([[float(value) for value in row] for row in list(csv.reader(file))[1:]])
+    return rows[:, 2:8], rows[:, 8:14]
+
+
+def distance_to_path(point: np.ndarray, path: np.ndarray) -> float:
+    """Distance of joint positions to the polyline through others [rad]."""
+    starts, ways = path[:-1], np.diff(path, axis=0)
+    lengths = np.maximum(np.einsum("ij,ij->i", ways, ways), 1e-18)
+    shares = np.clip(np.einsum("ij,ij->i", point - starts, ways) / lengths, 0.0, 1.0)
+    return float(np.min(np.linalg.norm(starts + shares[:, None] * ways - point, axis=1)))
