@@ -38,6 +38,8 @@ class AllowedCollisionMatrix:
 
 
 def _default(defaults: Mapping[str, bool], first: str, second: str) -> bool:
+    if not defaults:
+        return False
     verdicts = [defaults[name] for name in (first, second) if name in defaults]
     return bool(verdicts) and all(verdicts)
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modular_framework_planning.collision_bodies import (
     ATTACHED,
@@ -22,13 +23,9 @@ from modular_framework_planning.collision_bodies import (
     watched_pairs,
 )
 from modular_framework_planning.collision_world import CompiledWorld, compile_world
-from modular_framework_planning.compiled_collision import (
-    MOST_UNDECIDED,
-    World,
-    check_polyline,
-    surrounded_pair_at,
-)
+from modular_framework_planning.compiled_collision import World, surrounded_pair_at
 from modular_framework_planning.compiled_distance import CLEAR, TOUCHING
+from modular_framework_planning.compiled_paths import MOST_UNDECIDED, check_polyline, sample_at
 from modular_framework_planning.exact_collision import Contact, ExactCollision
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import RobotModel
@@ -36,6 +33,7 @@ from modular_framework_planning.spatial import Array
 
 __all__ = ["ATTACHED", "LINK", "WORLD", "Body", "CollisionChecker", "Contact"]
 DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may look through numerical noise
+EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can tell about
 
 
 class CollisionChecker:
@@ -98,23 +96,44 @@ class CollisionChecker:
             step: distance of the samples [rad or m].
             first: number of the first sample that has to be free: 1 leaves the first vertex out.
         """
-        status, count, states = check_polyline(np.ascontiguousarray(vertices, dtype=float), step, first,
-                                               self._undecided, *self._compiled.arguments)
-        if status == TOUCHING:
-            return False
-        if status != CLEAR and not self._decide(states, first, count):
-            return False
-        if not (self._tolerated or self._compiled.uncompiled):
-            return True
-        return all(self._rest_is_free(state) for state in states[first:])
+        return self._colliding_sample(np.ascontiguousarray(vertices, dtype=float), step, first, -1)[0] < 0
 
-    def _decide(self, states: Array, first: int, count: int) -> bool:
-        """Asks the exact check what the bounds left open."""
+    def first_collision(self, vertices: Array, step: float) -> Array | None:
+        """Returns the first colliding sample along straight pieces, as path_is_free looks at them, or None."""
+        path, last, found = np.ascontiguousarray(vertices, dtype=float), -1, None
+        while True:
+            number, numbers = self._colliding_sample(path, step, 0, last)
+            if number < 0:
+                return found
+            found, last = sample_at(path, numbers, number), number - 1
+            if last < 0:
+                return found
+
+    def _colliding_sample(self, path: Array, step: float, first: int, last: int) -> tuple[int, NDArray[np.int64]]:
+        """Returns the number of a colliding sample or -1, and the numbers of the samples at the vertices."""
+        status, count, numbers = check_polyline(path, step, first, last, self._undecided, *self._compiled.arguments)
+        if status == TOUCHING:
+            return count, numbers
+        end = int(numbers[-1]) if last < 0 else last
+        if status != CLEAR:
+            number = self._decide(path, numbers, range(first, end + 1), count)
+            if number >= 0:
+                return number, numbers
+        if self._tolerated or self._compiled.uncompiled:
+            for number in range(end, first - 1, -max(1, int(EXACT_STEP / step))):
+                if not self._rest_is_free(sample_at(path, numbers, number)):
+                    return number, numbers
+        return -1, numbers
+
+    def _decide(self, path: Array, numbers: NDArray[np.int64], samples: range, count: int) -> int:
+        """Asks the exact check what the bounds left open; returns the number of a sample that touches, or -1."""
         if count > MOST_UNDECIDED:
-            return not any(self._exact.touches(state, self._moving) for state in states[first:])
+            return next((number for number in samples
+                         if self._exact.touches(sample_at(path, numbers, number), self._moving)), -1)
         members = self._compiled.members
-        return not any(self._exact.touches(states[state], (self._moving[number] for number in members[pair]))
-                       for state, pair in self._undecided[:count].tolist())
+        return next((number for number, pair in self._undecided[:count].tolist()
+                     if self._exact.touches(sample_at(path, numbers, number),
+                                            (self._moving[member] for member in members[pair]))), -1)
 
     def _rest_is_free(self, positions: Array) -> bool:
         """Whether tolerated contacts stay shallow and pairs without bounds apart."""

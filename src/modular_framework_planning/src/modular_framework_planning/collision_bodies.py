@@ -84,18 +84,20 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
         moving: joints that will move, as places in a position vector; all by default.
     """
     supports = _supports(scene.model, moving)
-    verdicts: dict[tuple[Body, Body], bool] = {}
+    verdicts: dict[tuple[str, str, str, str], bool] = {}
     result = []
     for first, one in enumerate(parts):
+        if one.body.kind == WORLD:
+            break  # the world comes last and cannot move against itself
         for second in range(first + 1, len(parts)):
             other = parts[second]
-            if one.body.kind == WORLD or (one.joint_id == other.joint_id
-                                          and ATTACHED not in (one.body.kind, other.body.kind)):
+            if one.joint_id == other.joint_id and ATTACHED not in (one.body.kind, other.body.kind):
                 continue  # rigid to each other: touching says nothing about a motion
-            key = (one.body, other.body)
-            if key not in verdicts:
-                verdicts[key] = _may_touch(scene, one.body, other.body)
-            if not verdicts[key]:
+            key = (one.body.kind, one.body.name, other.body.kind, other.body.name)
+            allowed = verdicts.get(key)
+            if allowed is None:
+                allowed = verdicts[key] = _may_touch(scene, one.body, other.body)
+            if not allowed:
                 result.append(WatchedPair(first, second, one.margin if other.body.kind == WORLD else 0.0,
                                           supports[one.joint_id] == supports[other.joint_id]))
     return result
@@ -104,7 +106,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
 def _may_touch(scene: PlanningScene, first: Body, second: Body) -> bool:
     if first.name == second.name and first.kind == second.kind:
         return True
-    for held, other in ((first, second), (second, first)):
+    for held, other in ((first, second), (second, first)) if ATTACHED in (first.kind, second.kind) else ():
         if held.kind == ATTACHED and other.kind == LINK and (
                 other.name == held.link or other.name in held.touch_links):
             return True

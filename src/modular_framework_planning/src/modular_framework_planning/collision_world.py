@@ -124,14 +124,19 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
     scene = _add_others(model, parts, pairs, members, place)
     found: dict[tuple[int, int, float], list[int]] = {}
     uncompiled = []
+    orders: dict[tuple[int, int], tuple[int, int] | None] = {}
     for number, pair in enumerate(pairs):
-        ordered = _ordered(members, place[pair.first], place[pair.second])
+        both = place[pair.first], place[pair.second]
+        if both not in orders:
+            orders[both] = _ordered(members, *both)
+        ordered = orders[both]
         if ordered is None:
             uncompiled.append(number)
         else:
             found.setdefault((*ordered, pair.margin), []).append(number)
     world = _arrays(model, members, robot, scene, list(found))
-    keys = tuple(_table_key(world, number) for number in range(len(found)))
+    keys = tuple(None if scenic else _table_key(world, number)
+                 for number, scenic in enumerate(world.scenic[world.pairs].any(axis=1).tolist()))
     chosen = tuple(key for key in keys if key is not None)
     tables, joints = _tables(model, groups, chosen)
     numbers = iter(range(len(chosen)))
@@ -203,11 +208,11 @@ def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, 
 
 
 def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
-    """Returns roots and joints (one or two) of a pair of links of which one hangs on the other, or None."""
+    """Returns roots and joints (one or two) of a pair of links, where one hangs on the other, or None."""
     first, second = (int(number) for number in world.pairs[pair])
     if world.joints[first] > world.joints[second]:
         first, second = second, first
-    if world.scenic[first] or world.scenic[second] or world.margins[pair] > 0.0:
+    if world.margins[pair] > 0.0:
         return None
     between: list[int] = []
     joint = int(world.joints[second])

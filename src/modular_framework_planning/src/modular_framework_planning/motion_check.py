@@ -17,6 +17,7 @@ class MotionChecker:
         self._checker = checker
         self._indices = indices
         self._rest = np.array(rest, dtype=float)
+        self._state, self._edge = self._rest[None].copy(), np.tile(self._rest, (2, 1))
         model = checker.model
         members = {int(number) for number in indices}
         self._members = members if any(leader in members for _, leader, _, _ in model.mimics) else set()
@@ -29,30 +30,26 @@ class MotionChecker:
 
     def state_is_free(self, values: Array) -> bool:
         """Whether the state is free of collisions."""
-        return self._checker.is_free(self.whole(values))
+        if self._members:
+            return self._checker.is_free(self.whole(values))
+        self._state[0, self._indices] = values
+        return self._checker.path_is_free(self._state, 1.0)
 
     def edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         """Whether the straight motion is free at samples at most `step` [rad or m, any joint] apart.
 
         The start itself is not looked at, the end is.
         """
-        return self._checker.path_is_free(self.whole_path(np.array([start, end])), step, 1)
+        if self._members:
+            return self._checker.path_is_free(self.whole_path(np.array([start, end])), step, 1)
+        edge = self._edge
+        edge[0, self._indices], edge[1, self._indices] = start, end
+        return self._checker.path_is_free(edge, step, 1)
 
     def first_collision(self, polyline: Array, step: float) -> Array | None:
         """Returns the first colliding sample along straight pieces (start included), or None."""
-        if self._checker.path_is_free(self.whole_path(polyline), step):
-            return None
-        if not self.state_is_free(polyline[0]):
-            return polyline[0]
-        for start, end in zip(polyline[:-1], polyline[1:], strict=True):
-            if self.edge_is_free(start, end, step):
-                continue
-            count = max(1, int(np.ceil(float(np.abs(end - start).max()) / step)))
-            for number in range(1, count + 1):
-                values = start + number / count * (end - start)
-                if not self.state_is_free(values):
-                    return values
-        return None
+        found = self._checker.first_collision(self.whole_path(polyline), step)
+        return None if found is None else found[self._indices]
 
     def whole_path(self, path: Array) -> Array:
         """Returns positions of the whole robot for joint vectors of the group, shape (n, joints)."""

@@ -55,7 +55,7 @@ class OmplPlanner:
         start, goals = problem.start_values, problem.goal_states()
         step = edge_step(problem)
         for goal in goals:
-            if problem.edge_is_valid(start, goal, step):
+            if problem.edge_is_valid(start, goal, problem.settings.finest_step):
                 return PlannedPath(np.vstack([start, goal]))
         if problem.constraints is not None and constraints_are_tight(problem):
             return ConstrainedSearch(problem, step).run()
@@ -92,7 +92,7 @@ def edge_step(problem: PlanningProblem) -> float:
             raise PlanningError(ErrorCode.PLANNING_FAILED, f"{key} of group '{problem.group.name}' is '{value}'; it "
                                 "must be a number above 0") from error
         step = min(step, size) if size > 0.0 else step
-    return max(step, problem.settings.motion_step)
+    return max(step, problem.settings.finest_step)
 
 
 class _EdgeValidator(ob.MotionValidator):
@@ -198,13 +198,12 @@ class _Search:
         if self._problem.cancelled() and self._condition is not None:
             self._condition.terminate()
             return False
-        return bool(self._problem.state_is_valid(np.array(state[0:self._count])))
+        return self._problem.state_is_valid(np.array(state[0:self._count]))
 
     def edge_is_valid(self, first: Any, second: Any) -> bool:
         """Whether the straight motion between two OMPL states is free and keeps the constraints."""
         self.states += 1
-        return bool(self._problem.edge_is_valid(np.array(first[0:self._count]), np.array(second[0:self._count]),
-                                                self._step))
+        return self._problem.edge_is_valid(np.array(first[0:self._count]), np.array(second[0:self._count]), self._step)
 
     def _state(self, information: Any, values: Array) -> Any:
         state = information.allocState()

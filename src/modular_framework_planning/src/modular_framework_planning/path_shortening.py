@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from bisect import bisect_right
 from collections.abc import Callable
 
 import numpy as np
@@ -34,8 +35,8 @@ def drop_vertices(path: Array, edge_is_free: EdgeTest, deadline: float) -> Array
 
 
 def _point_at(path: Array, lengths: Array, position: float) -> tuple[int, Array]:
-    number = int(np.clip(np.searchsorted(lengths, position, side="right") - 1, 0, len(path) - 2))
-    span = lengths[number + 1] - lengths[number]
+    number = min(max(bisect_right(lengths, position) - 1, 0), len(path) - 2)
+    span = float(lengths[number + 1] - lengths[number])
     share = 0.0 if span <= 0.0 else (position - lengths[number]) / span
     return number, path[number] + share * (path[number + 1] - path[number])
 

@@ -29,7 +29,6 @@ from modular_framework_planning.spatial import Array
 from modular_framework_planning.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
-FINE_STEPS = 2.5  # shortening looks at states this many times further apart than the last check does
 BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 CheckerSource = Callable[..., CollisionChecker]
@@ -121,7 +120,8 @@ class PlanningPipeline:
 
     def _steps(self) -> tuple[float, ...]:
         """Edge steps of the search; a motion that fails the last check is searched again with the next."""
-        return self.settings.search_step, 0.4 * self.settings.search_step, self.settings.motion_step
+        finest = self.settings.finest_step
+        return self.settings.search_step, 0.4 * self.settings.search_step, finest, finest
 
     def _checked(self, problem: PlanningProblem, path: PlannedPath,
                  begun: float) -> tuple[str, PlanningAnswer | None]:
@@ -245,12 +245,12 @@ def _require_start(problem: PlanningProblem) -> None:
 
 
 def _shortened(problem: PlanningProblem, path: Array) -> Array:
-    """Shortens a path; what it accepts was also looked at on the fine grid."""
+    """Shortens a path; what it accepts was looked at as finely as the last check looks."""
     now = time.monotonic()
     limit = min(max(problem.deadline_s, now + 0.05), now + MAX_SHORTENING_S)
     if problem.repeatable:
         limit = math.inf
-    fine = min(problem.step, FINE_STEPS * problem.settings.motion_step)
+    fine = problem.settings.finest_step
 
     def edge(first: Array, second: Array) -> bool:
         return problem.edge_is_valid(first, second, fine)

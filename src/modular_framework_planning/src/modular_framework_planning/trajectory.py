@@ -53,13 +53,22 @@ class Trajectory:
         if len(self.times) < 2:
             still = np.zeros((len(times), self.positions.shape[1]))
             return still + self.positions[0], still, still, still
-        segment = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
-        t = (np.clip(times, self.times[0], self.times[-1]) - self.times[segment])[:, None]
-        c0, c1, c2, c3, c4, c5 = np.moveaxis(self.coefficients()[segment], 1, 0)
+        t, (c0, c1, c2, c3, c4, c5) = self._pieces_at(times)
         return (c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
                 c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
                 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
                 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
+
+    def positions_at(self, times: Array) -> Array:
+        """Returns positions of the curve at some times, shape (m, joints); the motion has two points at least."""
+        t, (c0, c1, c2, c3, c4, c5) = self._pieces_at(times)
+        return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))  # type: ignore[no-any-return]
+
+    def _pieces_at(self, times: Array) -> tuple[Array, Array]:
+        """Returns times since the point before, shape (m, 1), and the coefficients there, shape (6, m, joints)."""
+        segment = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        since = (np.clip(times, self.times[0], self.times[-1]) - self.times[segment])[:, None]
+        return since, np.moveaxis(self.coefficients()[segment], 1, 0)
 
     def sample_times(self, period_s: float = SAMPLE_PERIOD_S) -> Array:
         """Returns even times from start to end, both included, at most `period_s` apart."""
@@ -75,18 +84,20 @@ class Trajectory:
         counts = np.maximum(1, np.ceil(reach / step)).astype(int)
         places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         times = np.repeat(self.times[:-1], counts) + places * np.repeat(np.diff(self.times) / counts, counts)
-        return np.vstack([self.at(times)[0], self.positions[-1:]])
+        return np.vstack([self.positions_at(times), self.positions[-1:]])
 
     def chords(self, first: int = 0) -> list[Array]:
         """Returns polylines of points, from number `first` on, between which the curve leaves the straight way.
 
         A controller that does without velocities goes straight from point to point.
         """
+        if len(self.times) < 2:
+            return []
         spans, ways = np.diff(self.times), np.diff(self.positions, axis=0)
         lengths = np.maximum((ways**2).sum(axis=1), 1e-30)
         is_bent = np.zeros(len(spans), dtype=bool)
         for share in (1.0 / 3.0, 2.0 / 3.0):
-            offsets = self.at(self.times[:-1] + share * spans)[0] - self.positions[:-1]
+            offsets = self.positions_at(self.times[:-1] + share * spans) - self.positions[:-1]
             along = ((offsets * ways).sum(axis=1) / lengths)[:, None] * ways
             is_bent |= np.abs(offsets - along).max(axis=1, initial=0.0) > STRAIGHT
         bent = first + np.flatnonzero(is_bent[first:])
