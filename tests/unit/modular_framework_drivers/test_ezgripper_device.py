@@ -291,6 +291,14 @@ def test_a_wrong_baud_rate_is_named(make_gripper: MakeGripper) -> None:
     until(lambda: "at 115200 baud does not answer" in gripper.state().fault)
 
 
+def test_a_servo_of_another_model_is_not_used(make_gripper: MakeGripper) -> None:
+    line, gripper = make_gripper()
+    line.fingers[0].servo.set(mx64.MODEL_NUMBER, 12)
+    gripper.start()
+    until(lambda: "servo 1 is model 12; expected 310 (MX-64), 320 (MX-106)" in gripper.state().fault)
+    assert line.fingers[0].servo.get(mx64.TORQUE_ENABLE) == 0
+
+
 def test_two_servos_move_as_one_joint(make_gripper: MakeGripper) -> None:
     line, gripper = make_gripper(1, 2)
     gripper.start()

@@ -86,7 +86,7 @@ def test_held_is_held_until_the_goal_is_to_let_go() -> None:
     assert fingers.run(0.5) is Motion.HOLDING
     assert fingers.drive == Drive(None, 200, 1)
     fingers.go(fingers.position, 200)  # as a controller does that holds where it measured
-    assert fingers.grip.motion is Motion.HOLDING
+    assert fingers.run(0.5) is Motion.HOLDING
     fingers.go(0.4)
     assert fingers.run(1.0) is Motion.REACHED
     assert fingers.position == pytest.approx(0.4, abs=0.03)
@@ -102,6 +102,17 @@ def test_what_gives_way_is_followed_and_lost_at_the_goal() -> None:
     fingers.high = 9.0
     assert fingers.run(1.0) is Motion.REACHED
     assert fingers.position == pytest.approx(1.5, abs=0.03)
+
+
+def test_fingers_told_to_stay_do_not_go_far_when_what_they_hold_is_taken() -> None:
+    fingers = Fingers(0.2, 1.5)
+    fingers.high = 0.9
+    fingers.run(2.0)
+    fingers.go(fingers.position)
+    fingers.run(0.5)
+    fingers.high = 9.0
+    assert fingers.run(1.0) is Motion.REACHED
+    assert fingers.position == pytest.approx(0.9, abs=0.06)
 
 
 def test_fingers_pushed_away_come_back() -> None:

@@ -82,13 +82,15 @@ class Grip:
         self.goal = goal
         self.motion = Motion.MOVING
         self._direction = 1
+        self._free_beyond = goal.position
         self._rest_position = math.nan
         self._rest_since_s = 0.0
 
     def retarget(self, goal: Goal, position: float, time_s: float) -> None:
         """Take a new goal.
 
-        Whoever holds something goes on holding it, with the new goal's torque, unless the goal is to let go.
+        Whoever holds something goes on holding it, with the new goal's torque, unless the goal is to let go; to stay
+        where one is, as a controller commands that holds its joints, is not.
 
         Args:
             goal: where to go now.
@@ -96,8 +98,10 @@ class Grip:
             time_s: now [s].
         """
         before, self.goal = self.goal, goal
-        lets_go = (goal.position - position) * self._direction < -self._rules.position_tolerance
-        if self.motion is Motion.HOLDING and not lets_go:
+        ahead, tolerance = (goal.position - position) * self._direction, self._rules.position_tolerance
+        if self.motion is Motion.HOLDING and ahead >= -tolerance:
+            slack = tolerance if ahead <= tolerance else 0.0
+            self._free_beyond = goal.position + self._direction * slack
             return
         turned = (goal.position - position) * (before.position - position) < 0.0
         jumped = abs(goal.position - before.position) > self._rules.position_tolerance
@@ -116,7 +120,7 @@ class Grip:
         still_s = time_s - self._rest_since_s
         error = self.goal.position - position
         arrived = abs(error) <= self._rules.position_tolerance
-        free_again = self.motion is Motion.HOLDING and error * self._direction <= 0.0
+        free_again = self.motion is Motion.HOLDING and (self._free_beyond - position) * self._direction <= 0.0
         pushed_away = self.motion is Motion.REACHED and not arrived
         if free_again or pushed_away:
             self._begin(position, time_s)
@@ -124,6 +128,7 @@ class Grip:
             self.motion = Motion.REACHED
         elif self.motion is Motion.MOVING and not arrived and still_s >= self._rules.stall_s:
             self.motion, self._direction = Motion.HOLDING, 1 if error > 0.0 else -1
+            self._free_beyond = self.goal.position
         return self._drive()
 
     def _begin(self, position: float, time_s: float) -> None:

@@ -99,7 +99,11 @@ class GripperServos:
             GripperError: one is something else than an MX-64 or MX-106.
         """
         for servo in self._servos:
-            self._bus.model_number(servo.servo_id)
+            model = self._bus.model_number(servo.servo_id)
+            if model not in mx64.MODELS:
+                known = ", ".join(f"{number} ({name})" for number, name in mx64.MODELS.items())
+                raise GripperError(f"servo {servo.servo_id} is model {model}; expected {known} with protocol 1.0; "
+                                   "check servo_ids")
             for register in LIMIT_REGISTERS:
                 self._ensure(servo, register, mx64.MULTI_TURN_LIMIT)
             self._ensure(servo, mx64.MULTI_TURN_OFFSET, 0)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 MODEL_NUMBER_MX64 = 310
+MODELS = {MODEL_NUMBER_MX64: "MX-64", 320: "MX-106"}
+"""Servos the gripper is sold with; their tables agree in what is used of them."""
 TICKS_PER_TURN = 4096
 SPEED_UNIT_TICKS_S = 0.114 / 60.0 * TICKS_PER_TURN
 """One unit of the speed registers, 0.114 turns a minute [ticks/s]."""
