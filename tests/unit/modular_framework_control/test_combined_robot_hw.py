@@ -17,11 +17,9 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.joint_limits import JointLimits
 from modular_framework_control.mock_robot_hw import MockRobotHW
 from modular_framework_control.node_handle import MappingNodeHandle, NodeHandle
 from modular_framework_control.robot_hw import RobotHW, SwitchState
-from modular_framework_control.robot_hw_conformance import RobotHWConformance
 
 MOCK = "modular_framework_control/MockRobotHW"
 PARAMETERS: dict[str, Any] = {
@@ -38,18 +36,6 @@ def combined(parameters: dict[str, Any] = PARAMETERS, make: Callable[[str], Robo
     root = MappingNodeHandle(parameters)
     assert robot_hw.init(root, root)
     return robot_hw
-
-
-class TestCombinationOfTwoMocks(RobotHWConformance):
-    """The conformance suite on an arm and a gripper."""
-
-    settle_s = 0.2
-
-    def make_robot_hw(self) -> CombinedRobotHW:
-        return combined()
-
-    def limits(self) -> dict[str, JointLimits]:
-        return dict.fromkeys(("shoulder", "elbow", "finger"), JointLimits(-1.0, 1.0, 2.0))
 
 
 class Recorder(RobotHW):

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fake hardware passes the suite of all hardware, and does exactly what it is told."""
+"""Fake hardware does exactly what it is told."""
 from __future__ import annotations
 
 import pytest
 
 from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.joint_limits import JointLimits
 from modular_framework_control.mock_robot_hw import MockRobotHW
 from modular_framework_control.node_handle import MappingNodeHandle
-from modular_framework_control.robot_hw_conformance import RobotHWConformance
 
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>
@@ -18,33 +16,26 @@ PARAMETERS = {"robot_description": URDF,
               "joint_limits": {"elbow": {"has_position_limits": True, "min_position": -2.0, "max_position": 2.0}}}
 
 
-class TestMockRobotHW(RobotHWConformance):
-    """The conformance suite on fake hardware."""
+def make_robot_hw() -> MockRobotHW:
+    robot_hw = MockRobotHW()
+    root = MappingNodeHandle(PARAMETERS)
+    assert robot_hw.init(root, root.child("hw"))
+    return robot_hw
 
-    settle_s = 0.2
 
-    def make_robot_hw(self) -> MockRobotHW:
-        robot_hw = MockRobotHW()
-        root = MappingNodeHandle(PARAMETERS)
-        assert robot_hw.init(root, root.child("hw"))
-        return robot_hw
+def test_it_starts_at_the_initial_positions() -> None:
+    assert make_robot_hw().get(PositionJointInterface).get_handle("shoulder").position == 0.5
 
-    def limits(self) -> dict[str, JointLimits]:
-        return {"shoulder": JointLimits(-1.0, 1.0, 2.0), "elbow": JointLimits(-2.0, 2.0, 3.0)}
 
-    def test_it_starts_at_the_initial_positions(self) -> None:
-        robot_hw = self.make_robot_hw()
-        assert robot_hw.get(PositionJointInterface).get_handle("shoulder").position == 0.5
-
-    def test_it_is_where_it_was_told_to_be_one_cycle_later(self) -> None:
-        robot_hw = self.make_robot_hw()
-        handle = robot_hw.get(PositionJointInterface).get_handle("shoulder")
-        robot_hw.read(0.0, 0.01)
-        handle.command = 0.51
-        robot_hw.write(0.0, 0.01)
-        robot_hw.read(0.01, 0.01)
-        assert handle.position == 0.51
-        assert handle.velocity == pytest.approx(1.0)
+def test_it_is_where_it_was_told_to_be_one_cycle_later() -> None:
+    robot_hw = make_robot_hw()
+    handle = robot_hw.get(PositionJointInterface).get_handle("shoulder")
+    robot_hw.read(0.0, 0.01)
+    handle.command = 0.51
+    robot_hw.write(0.0, 0.01)
+    robot_hw.read(0.01, 0.01)
+    assert handle.position == 0.51
+    assert handle.velocity == pytest.approx(1.0)
 
 
 def test_faulty_parameters_are_refused(caplog: pytest.LogCaptureFixture) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Asks the operating system to let the control loop run on time, where it permits that.
 
-What Python itself does against a steady loop is made small too: another thread gives the interpreter up after a fraction
-of a cycle, and what exists when the loop begins is never looked through for garbage again.
+What Python itself does against a steady loop is made small too: another thread gives the interpreter up after a
+fraction of a cycle, and what exists when the loop begins is never looked through for garbage again.
 """
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import resource
 import sys
 
 PRIORITY = 80
+HELPER_PRIORITY = 10
 _SWITCH_INTERVAL_S = 2e-4
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
@@ -24,21 +25,23 @@ def prepare_interpreter() -> None:
     gc.freeze()
 
 
-def run_in_real_time(priority: int = PRIORITY) -> list[str]:
-    """Run the calling thread, and none it starts, before all others (SCHED_FIFO), and keep the memory of the process from being swapped out.
+def run_in_real_time() -> list[str]:
+    """Run this process before ordinary ones, the calling thread before its others (SCHED_FIFO); keep its memory in RAM.
 
-    Args:
-        priority: 1 to 99.
+    The other threads go first too, as the loop waits while one of them holds Python's interpreter: an ordinary process
+    that takes the processor from that one would hold up the loop.
 
     Returns:
         What was not permitted and why; nothing when all was.
     """
     refused = []
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(HELPER_PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:
-        refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {priority} in limits.conf, "
-                       f"or docker run --cap-add SYS_NICE --ulimit rtprio={priority})")
+        refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "
+                       f"or docker run --cap-add SYS_NICE --ulimit rtprio={PRIORITY})")
     reason = _lock_memory()
     if reason:
         refused.append(f"locking of memory ({reason}; allow it with memlock unlimited in limits.conf, "

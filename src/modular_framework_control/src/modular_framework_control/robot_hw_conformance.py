@@ -2,11 +2,13 @@
 """One suite of tests for every `RobotHW`: what controllers rely on, whatever the hardware is.
 
 Subclass `RobotHWConformance` in a test module under a name that begins with Test and say how the hardware is made;
-pytest finds the rest.
+pytest finds the rest. Hardware that takes long to make may be handed out again by `make_robot_hw`, unless
+`close_after_test` is True.
 """
 from __future__ import annotations
 
 import math
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
@@ -18,7 +20,7 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
 )
 from modular_framework_control.joint_limits import JointLimits
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.robot_hw import RobotHW, SwitchState
 
 
 class RobotHWConformance(ABC):
@@ -27,41 +29,69 @@ class RobotHWConformance(ABC):
     Attributes:
         period_s: cycle of the control loop [s].
         settle_s: how long a joint may take for a step of `step` [s].
+        ready_s: how long the hardware may take until it has no fault [s].
         step: size of the steps [rad|m].
         tolerance: how near a joint must come, and how far an idle one may stray [rad|m].
+        real_time: whether the hardware moves by itself, so that each cycle must take its time.
+        close_after_test: whether what `make_robot_hw` gave is closed after each test.
     """
 
     period_s = 0.004
     settle_s = 2.0
+    ready_s = 20.0
     step = 0.05
     tolerance = 0.01
+    real_time = False
+    close_after_test = True
 
     @abstractmethod
     def make_robot_hw(self) -> RobotHW:
-        """New, initialised hardware, at rest, with room to move in every joint."""
+        """Initialised hardware, at rest, with room to move in every joint."""
 
     @abstractmethod
     def limits(self) -> Mapping[str, JointLimits]:
         """Limits of the joints of that hardware, by name."""
 
-    def _run(self, robot_hw: RobotHW, goals: Mapping[str, float], start_s: float, duration_s: float) -> float:
-        """Run the loop, commanding `goals` in every cycle as controllers do; returns the time it ends [s]."""
-        cycles = round(duration_s / self.period_s)
-        handles = robot_hw.get(PositionJointInterface).handles
-        for cycle in range(cycles):
-            time_s = start_s + cycle * self.period_s
-            robot_hw.read(time_s, self.period_s)
-            for handle in handles:
-                handle.command = goals[handle.name]
-            robot_hw.write(time_s, self.period_s)
-        end_s = start_s + cycles * self.period_s
-        robot_hw.read(end_s, self.period_s)
-        return end_s
+    def advance(self, period_s: float) -> None:
+        """What happens between two cycles: time passes, in hardware that moves by itself; physics go on, elsewhere."""
+        if self.real_time:
+            time.sleep(period_s)
+
+    def setup_method(self) -> None:
+        """Called by pytest before each test."""
+        self._made: list[RobotHW] = []
+        self._time_s = 0.0
+
+    def teardown_method(self) -> None:
+        """Called by pytest after each test."""
+        if self.close_after_test:
+            for robot_hw in self._made:
+                robot_hw.close()
+
+    def _cycle(self, robot_hw: RobotHW, goals: Mapping[str, float] | None = None) -> None:
+        """Read, command as controllers do (where they are, without `goals`), write; then time passes."""
+        robot_hw.read(self._time_s, self.period_s)
+        for handle in robot_hw.get(PositionJointInterface).handles:
+            handle.command = handle.position if goals is None else goals[handle.name]
+        robot_hw.write(self._time_s, self.period_s)
+        self._time_s += self.period_s
+        self.advance(self.period_s)
+
+    def _run(self, robot_hw: RobotHW, goals: Mapping[str, float], duration_s: float) -> None:
+        for _ in range(round(duration_s / self.period_s)):
+            self._cycle(robot_hw, goals)
+        robot_hw.read(self._time_s, self.period_s)
 
     def _ready(self) -> tuple[RobotHW, list[JointHandle]]:
-        """Hardware that has been read once and told to stay where it is."""
+        """Hardware without a fault that has been told to stay where it is."""
         robot_hw = self.make_robot_hw()
-        robot_hw.read(0.0, self.period_s)
+        self._made.append(robot_hw)
+        robot_hw.read(self._time_s, self.period_s)
+        cycles = 0
+        while robot_hw.faults():
+            assert cycles * self.period_s < self.ready_s, list(robot_hw.faults())
+            self._cycle(robot_hw)
+            cycles += 1
         handles = robot_hw.get(PositionJointInterface).handles
         for handle in handles:
             handle.command = handle.position
@@ -73,7 +103,7 @@ class RobotHWConformance(ABC):
         return up if up <= limit.max_position else handle.position - self.step
 
     def test_the_constructor_needs_no_arguments(self) -> None:
-        assert isinstance(type(self.make_robot_hw())(), RobotHW)
+        assert isinstance(type(self._ready()[0])(), RobotHW)
 
     def test_commanded_joints_share_their_state_with_the_state_interface(self) -> None:
         robot_hw, handles = self._ready()
@@ -90,39 +120,55 @@ class RobotHWConformance(ABC):
             limit = limits[handle.name]
             assert limit.min_position - self.tolerance <= handle.position <= limit.max_position + self.tolerance
 
+    def test_at_rest_it_has_no_fault(self) -> None:
+        robot_hw, handles = self._ready()
+        self._run(robot_hw, {handle.name: handle.position for handle in handles}, 0.1)
+        assert robot_hw.fault() == "" and not robot_hw.faults()
+
     def test_told_to_stay_it_stays(self) -> None:
         robot_hw, handles = self._ready()
         before = {handle.name: handle.position for handle in handles}
-        self._run(robot_hw, before, 0.0, 0.5)
+        self._run(robot_hw, before, 0.5)
         assert all(abs(handle.position - before[handle.name]) <= self.tolerance for handle in handles)
 
     def test_each_joint_follows_its_command_and_the_others_stay(self) -> None:
         robot_hw, handles = self._ready()
         goals = {handle.name: handle.position for handle in handles}
-        time_s = self._run(robot_hw, goals, 0.0, 0.1)
+        self._run(robot_hw, goals, 0.1)
         for moved in handles:
             goals[moved.name] = self._target(moved)
-            time_s = self._run(robot_hw, goals, time_s, self.settle_s)
+            self._run(robot_hw, goals, self.settle_s)
             for handle in handles:
                 assert abs(handle.position - goals[handle.name]) <= self.tolerance, (moved.name, handle)
 
     def test_velocity_has_the_sign_of_the_motion(self) -> None:
         robot_hw, handles = self._ready()
+        goals = {handle.name: handle.position for handle in handles}
         for handle in handles:
-            start, target = handle.position, self._target(handle)
-            seen = 0.0
-            for cycle in range(round(self.settle_s / self.period_s)):
-                handle.command = target
-                robot_hw.write(cycle * self.period_s, self.period_s)
-                robot_hw.read((cycle + 1) * self.period_s, self.period_s)
+            start, seen = handle.position, 0.0
+            goals[handle.name] = self._target(handle)
+            for _ in range(round(self.settle_s / self.period_s)):
+                self._cycle(robot_hw, goals)
+                robot_hw.read(self._time_s, self.period_s)
                 seen = max(seen, handle.velocity, key=abs)
             assert seen * (handle.position - start) > 0.0, handle
 
+    def test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows(self) -> None:
+        robot_hw, handles = self._ready()
+        goals = {handle.name: self._target(handle) for handle in handles}
+        windows = [[handle.position for handle in handles]]
+        for _ in range(round(self.settle_s / self.period_s)):
+            self._cycle(robot_hw, goals)
+            windows.append([handle.position for handle in handles])
+        for before, after in zip(windows, windows[5:], strict=False):
+            for handle, one, other in zip(handles, before, after, strict=True):
+                fastest = self.limits()[handle.name].max_velocity
+                assert abs(other - one) <= 1.5 * fastest * 5 * self.period_s + self.tolerance, handle
+
     def test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them(self) -> None:
         robot_hw, handles = self._ready()
-        time_s = 0.0
         for command in (1e9, -1e9, math.inf, math.nan):
-            time_s = self._run(robot_hw, {handle.name: command for handle in handles}, time_s, 0.1)
+            self._run(robot_hw, {handle.name: command for handle in handles}, 0.1)
             for handle in handles:
                 limit = self.limits()[handle.name]
                 assert math.isfinite(handle.position)
@@ -130,8 +176,8 @@ class RobotHWConformance(ABC):
 
     def test_a_cycle_without_time_is_survived(self) -> None:
         robot_hw, handles = self._ready()
-        robot_hw.write(0.0, 0.0)
-        robot_hw.read(0.0, 0.0)
+        robot_hw.write(self._time_s, 0.0)
+        robot_hw.read(self._time_s, 0.0)
         assert all(math.isfinite(handle.velocity) for handle in handles)
 
     def test_two_controllers_may_not_claim_one_joint(self) -> None:
@@ -142,3 +188,21 @@ class RobotHWConformance(ABC):
         assert robot_hw.check_for_conflict([one]) == ""
         assert name in robot_hw.check_for_conflict([one, other])
         assert robot_hw.prepare_switch([one], []) is True
+
+    def test_switches_are_done_and_leave_it_where_it_is(self) -> None:
+        robot_hw, handles = self._ready()
+        before = {handle.name: handle.position for handle in handles}
+        claim = (InterfaceResources(PositionJointInterface.type_name, frozenset(before)),)
+        info = ControllerInfo("one", "some/Type", claim)
+        for start, stop in (([info], []), ([], [info])):
+            assert robot_hw.prepare_switch(start, stop) is True
+            robot_hw.do_switch(start, stop)
+            assert robot_hw.switch_result() is robot_hw.switch_result(info) is SwitchState.DONE
+            self._run(robot_hw, before, 0.2)
+        assert all(abs(handle.position - before[handle.name]) <= self.tolerance for handle in handles)
+
+    def test_it_may_be_closed_twice(self) -> None:
+        robot_hw, _ = self._ready()
+        if self.close_after_test:
+            robot_hw.close()
+            robot_hw.close()

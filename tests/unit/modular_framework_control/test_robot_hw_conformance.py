@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One suite over every hardware: fake, simulated, a UR arm and an EZGripper against their emulators, and two as one."""
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+
+from modular_framework_control.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.joint_limits import JointLimits
+from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.robot_hw_conformance import RobotHWConformance
+from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
+from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
+from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
+from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
+from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
+from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics_world import PhysicsWorld
+from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.robot_body import RobotBody
+from modular_framework_simulation.robot_description import read_robot
+from modular_framework_simulation.sdf_resources import no_packages
+
+URDF = """<robot name="r">
+<joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>
+<joint name="elbow" type="continuous"><limit velocity="3" effort="10"/></joint></robot>"""
+LIMITED = {"has_position_limits": True, "min_position": -1.0, "max_position": 1.0, "has_velocity_limits": True,
+           "max_velocity": 2.0}
+ROBOT = """<robot name="lab"><link name="base"/>
+{links}
+</robot>"""
+LINK = """
+<link name="{name}_link"><inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+</inertial></link>
+<joint name="{name}" type="{kind}"><parent link="base"/><child link="{name}_link"/><axis xyz="0 0 1"/>
+  <limit lower="-0.5" upper="0.5" velocity="2" effort="100"/></joint>
+<transmission name="{name}_drive"><type>transmission_interface/SimpleTransmission</type><joint name="{name}">
+  <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint></transmission>"""
+
+
+class TestMock(RobotHWConformance):
+    """The fake hardware, with limits of the description and of parameters."""
+
+    settle_s = 0.2
+
+    def make_robot_hw(self) -> MockRobotHW:
+        robot_hw = MockRobotHW()
+        root = MappingNodeHandle({
+            "robot_description": URDF, "joint_limits": {"elbow": {**LIMITED, "max_velocity": 3.0}},
+            "hw": {"joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}}})
+        assert robot_hw.init(root, root.child("hw"))
+        return robot_hw
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return {"shoulder": JointLimits(-1.0, 1.0, 2.0), "elbow": JointLimits(-1.0, 1.0, 3.0)}
+
+
+class TestPyBullet(RobotHWConformance):
+    """A lift and a turntable in the simulated world."""
+
+    settle_s = 0.6
+    test_the_constructor_needs_no_arguments = None  # type: ignore[assignment]  # the simulation makes it, not a `type`
+
+    @pytest.fixture(autouse=True)
+    def world_of_it(self, tmp_path: Path) -> Iterator[None]:
+        self._parts = ConvexParts(tmp_path)
+        self._world = PhysicsWorld(PhysicsSettings(), self._parts, (0.0, 0.0, -9.81))
+        yield
+        self._world.close()
+
+    def make_robot_hw(self) -> PyBulletRobotHW:
+        joints = (("lift", "prismatic"), ("turn", "revolute"))
+        links = "".join(LINK.format(name=name, kind=kind) for name, kind in joints)
+        body = RobotBody(self._world, read_robot(ROBOT.format(links=links), no_packages, self._parts, False), "lab",
+                         Pose(), {})
+        robot_hw = PyBulletRobotHW(body)
+        assert robot_hw.init(MappingNodeHandle(), MappingNodeHandle())
+        return robot_hw
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return {name: JointLimits(-0.5, 0.5, 2.0) for name in ("lift", "turn")}
+
+    def advance(self, period_s: float) -> None:
+        for _ in range(round(period_s / self._world.settings.time_step_s)):
+            self._world.step()
+
+
+class TestUrArm(RobotHWConformance):
+    """A UR5 in software, at the end of the unmodified ur-rtde client."""
+
+    period_s = 0.008
+    settle_s = 0.4
+    real_time = True
+    close_after_test = False
+    arm: ClassVar[UrArmHardware]
+
+    @pytest.fixture(autouse=True, scope="class")
+    @classmethod
+    def arm_of_all(cls) -> Iterator[None]:
+        emulator = EmulatedArm()
+        robot_hw = cls.arm = UrArmHardware()
+        settings = {"robot_ip_address": emulator.address, "link_timeout": 0.5}
+        assert robot_hw.init(MappingNodeHandle({}), MappingNodeHandle(settings, "/arm_hw"))
+        yield
+        robot_hw.close()
+        robot_hw.close()
+        emulator.close()
+
+    def make_robot_hw(self) -> RobotHW:
+        return self.arm
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return dict.fromkeys(JOINT_NAMES, JointLimits(-6.4, 6.4, 3.2))
+
+
+class TestEzGripper(RobotHWConformance):
+    """A gripper whose servo is emulated on a pseudo-terminal."""
+
+    period_s = 0.008
+    settle_s = 0.6
+    real_time = True
+    close_after_test = False
+    gripper: ClassVar[EzGripperRobotHW]
+
+    @pytest.fixture(autouse=True, scope="class")
+    @classmethod
+    def gripper_of_all(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+        finger = Finger(DynamixelServo(), FingerModel(top_speed=12000.0, time_constant_s=0.015), opening=200.0)
+        line = DynamixelLine([finger], tmp_path_factory.mktemp("line") / "gripper")
+        line.connect()
+        root = MappingNodeHandle({"hand": {"port_name": str(line.link), "start_position": 1.7}})
+        robot_hw = cls.gripper = EzGripperRobotHW()
+        assert robot_hw.init(root, root.child("hand"))
+        yield
+        robot_hw.close()
+        robot_hw.close()
+        line.close()
+
+    def make_robot_hw(self) -> RobotHW:
+        return self.gripper
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return {JOINT: JointLimits(0.0, 1.94)}
+
+
+class TestCombination(RobotHWConformance):
+    """An arm and a gripper as one robot."""
+
+    settle_s = 0.2
+
+    def make_robot_hw(self) -> CombinedRobotHW:
+        root = MappingNodeHandle({
+            "robot_hardware": ["arm", "gripper"],
+            "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
+            "gripper": {"type": "lab/Mock", "joints": ["finger"]},
+            "joint_limits": dict.fromkeys(("shoulder", "elbow", "finger"), LIMITED)})
+        robot_hw = CombinedRobotHW(lambda name: {"lab/Mock": MockRobotHW}[name]())
+        assert robot_hw.init(root, root)
+        return robot_hw
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return dict.fromkeys(("shoulder", "elbow", "finger"), JointLimits(-1.0, 1.0, 2.0))
