@@ -2,7 +2,13 @@
 """Trajectory controllers for joints whose own control takes more of a trajectory than its positions."""
 from __future__ import annotations
 
-from modular_framework_control.hardware_interface import PosVelAccJointInterface, PosVelJointInterface
+from typing import Any, ClassVar
+
+from modular_framework_control.hardware_interface import (
+    HardwareInterface,
+    PosVelAccJointInterface,
+    PosVelJointInterface,
+)
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
 from modular_framework_control.trajectory import ACCELERATION, VELOCITY, Array
 
@@ -10,7 +16,7 @@ from modular_framework_control.trajectory import ACCELERATION, VELOCITY, Array
 class PosVelJointTrajectoryController(JointTrajectoryController):
     """pos_vel_controllers/JointTrajectoryController: commands position [rad|m] and velocity [rad/s|m/s]."""
 
-    interface_class = PosVelJointInterface
+    interface_class: ClassVar[type[HardwareInterface[Any]]] = PosVelJointInterface
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
         super()._command(desired, error, period_s)
