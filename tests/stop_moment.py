@@ -99,6 +99,7 @@ def stop_a_pick(moment_s: float, after: str = "first state running") -> Stop | N
         _until(launch, after, START_TIMEOUT_S)
         time.sleep(moment_s)
         if LAST_WORD in launch.log() or not launch.alive():
+            _tell_failure(launch.log())
             return None
         pressed = time.monotonic()
         os.killpg(launch.process.pid, signal.SIGINT)
@@ -112,6 +113,13 @@ def stop_a_pick(moment_s: float, after: str = "first state running") -> Stop | N
         watcher.kill()
         watcher.wait()
         session.stop()
+
+
+def _tell_failure(log: str) -> None:
+    """Prints why a pick had ended before its moment, unless it had succeeded: that is worth a look, too."""
+    if "SUCCEEDED" not in log:
+        reasons = [line for line in log.splitlines() if line.startswith(("Task ", "  "))] or log.splitlines()[-20:]
+        print("a pick failed by itself:", *reasons, sep="\n", file=sys.stderr, flush=True)
 
 
 def _stop(moment_s: float, log: str, pressed: float, last_word_s: float, launch_s: float, speeds: Path,
