@@ -64,6 +64,16 @@ def test_an_unknown_name_is_answered_with_the_known_ones_and_the_faults(lab: Cal
         index.load("lab_arms/LabArm", RobotHW)
 
 
+def test_a_module_that_was_changed_is_imported_anew_after_a_reload(lab: Callable[..., PluginIndex],
+                                                                  tmp_path: Path) -> None:
+    index = lab(("lab_arms/Tool", "Tool", ROBOT_HW_BASE), module="lab_arms_tool")
+    for length in ("short", "a good deal longer"):
+        (tmp_path / "lab_arms_tool.py").write_text(f"{MODULE}\nclass Tool(RobotHW):\n    length = {length!r}\n")
+        index.reload()
+        assert index.load("lab_arms/Tool", RobotHW).length == length
+        assert index.load("lab_arms/Tool", RobotHW) is index.load("lab_arms/Tool", RobotHW)
+
+
 @pytest.mark.parametrize(("cls", "module", "words"), [
     ("Absent", "lab_arms_hw", "AttributeError"),
     ("LabArm", "lab_arms_absent", "ModuleNotFoundError"),

@@ -14,10 +14,12 @@ and the description names, per Python module, the classes in it:
 from __future__ import annotations
 
 import importlib
+import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 EXPORT_TAG = "modular_framework_control"
@@ -68,6 +70,7 @@ class PluginIndex:
         self._packages = packages if packages is not None else _packages_of_workspace
         self._found: dict[str, Plugin] | None = None
         self._faults: list[str] = []
+        self._stale: set[str] = set()
 
     @property
     def names(self) -> list[str]:
@@ -102,7 +105,7 @@ class PluginIndex:
                               f"<{EXPORT_TAG} plugin=\"${{prefix}}/plugins.xml\"/></export> in its package.xml")
         where = f"{plugin.class_name} of {plugin.module} (offered as {name} by {plugin.origin})"
         try:
-            loaded = getattr(importlib.import_module(plugin.module), plugin.class_name)
+            loaded = getattr(self._module(plugin.module), plugin.class_name)
         except Exception as error:  # a user's module may raise anything when it is imported
             raise PluginError(f"cannot load {where}: {type(error).__name__}: {error}") from error
         if not isinstance(loaded, type) or not issubclass(loaded, expected):
@@ -111,9 +114,15 @@ class PluginIndex:
         return loaded
 
     def reload(self) -> None:
-        """Look again at the next question, also for modules installed since the program started."""
+        """Look again at the next question, also for modules installed or changed since they were imported."""
+        self._stale |= {plugin.module for plugin in (self._found or {}).values()}
         self._found = None
         importlib.invalidate_caches()
+
+    def _module(self, name: str) -> ModuleType:
+        stale = name in self._stale and name in sys.modules
+        self._stale.discard(name)
+        return importlib.reload(sys.modules[name]) if stale else importlib.import_module(name)
 
     def _plugins(self) -> dict[str, Plugin]:
         if self._found is None:
