@@ -316,6 +316,15 @@ def test_fingers_that_do_not_come_to_a_stop_are_not_calibrated(make_gripper: Mak
     assert not gripper.state().ready
 
 
+def test_an_object_on_offer_does_not_spoil_the_calibration(make_gripper: MakeGripper) -> None:
+    line, gripper = make_gripper(start_position=1.6)
+    line.offer_object(1.77)
+    gripper.start()
+    until(lambda: gripper.state().ready)
+    state = arrive(gripper, 1.94, 300)
+    assert (state.motion, state.reading.position) == (Motion.HOLDING, pytest.approx(1.77, abs=0.05))
+
+
 def test_closed_it_leaves_the_fingers_with_little_torque(make_gripper: MakeGripper) -> None:
     line, gripper = make_gripper()
     gripper.start()

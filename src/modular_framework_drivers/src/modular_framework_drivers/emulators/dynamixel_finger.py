@@ -14,6 +14,8 @@ from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 STEP_S = 0.002
+SHUT_TICKS = 40
+ROOM_TICKS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +67,8 @@ class Finger:
         self.speed = 0.0
         self.temperature = self.model.room_temperature
         self.object_opening: float | None = None
+        self.offered_opening: float | None = None
+        self._was_shut = False
         self._duty = 0.0
         self._overloaded_s = 0.0
         self._left_s = 0.0
@@ -81,7 +85,14 @@ class Finger:
         while self._left_s >= STEP_S:
             self._left_s -= STEP_S
             self._step(STEP_S)
+        self._take_offered()
         self._publish()
+
+    def _take_offered(self) -> None:
+        """An object on offer comes between the fingers once they have been shut, as for calibration, and are open."""
+        self._was_shut |= self.opening < SHUT_TICKS
+        if self.offered_opening is not None and self._was_shut and self.opening > self.offered_opening + ROOM_TICKS:
+            self.object_opening, self.offered_opening = self.offered_opening, None
 
     def power_cycle(self) -> None:
         """The servo forgets how often its shaft has turned: the encoder knows one turn only."""

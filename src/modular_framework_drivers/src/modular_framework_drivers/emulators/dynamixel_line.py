@@ -19,7 +19,7 @@ from modular_framework_drivers.emulators.command_port import Command
 from modular_framework_drivers.emulators.dynamixel_finger import Finger
 from modular_framework_drivers.emulators.dynamixel_servo import BROADCAST, Instruction, PacketReader, answer_bus
 from modular_framework_drivers.ezgripper import mx64
-from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION, TRAVEL_TICKS
+from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 BAUDRATE_MARGIN = 0.03
@@ -90,7 +90,7 @@ class DynamixelLine:
         return {"plug": self.plug, "unplug": self.unplug, "power_on": self.power_on, "power_off": self.power_off,
                 "overload": self.overload, "heat": self.heat, "garbage": self.garbage, "delay": self.delay,
                 "lose": self.lose, "corrupt": self.corrupt, "id": self.change_id, "object": self.place_object,
-                "no_object": self.remove_object, "clear": self.clear, "state": self.state}
+                "offer_object": self.offer_object, "no_object": self.remove_object, "clear": self.clear, "state": self.state}
 
     # ---- commands ----
 
@@ -168,13 +168,19 @@ class DynamixelLine:
         """Puts an object between the fingers that they meet at a position of the knuckle joint [rad]."""
         with self._lock:
             for finger in self.fingers:
-                finger.object_opening = TRAVEL_TICKS * (1.0 - float(position) / CLOSED_POSITION)
+                finger.object_opening = ticks_from_joint(position)
+
+    def offer_object(self, position: float) -> None:
+        """Puts an object between the fingers as soon as they have been shut once, and are open."""
+        with self._lock:
+            for finger in self.fingers:
+                finger.offered_opening = ticks_from_joint(position)
 
     def remove_object(self) -> None:
         """Takes the object away."""
         with self._lock:
             for finger in self.fingers:
-                finger.object_opening = None
+                finger.object_opening = finger.offered_opening = None
 
     def clear(self) -> None:
         """Ends the faults of the line."""

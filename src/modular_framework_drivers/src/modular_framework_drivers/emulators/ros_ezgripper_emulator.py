@@ -24,7 +24,8 @@ class EzGripperEmulatorNode:
 
     Parameters: `~port_name`: path under which the serial port is found; `~baudrate` [bit/s] 57600 and `~servo_ids` [1]
     of the servos; `~position` [rad] 0.5: where the knuckle joint is at first; `~object` [rad] -1: position of the
-    knuckle joint at which an object stops the fingers, negative for none; `~command_port` 29900: orders and faults.
+    knuckle joint at which an object stops the fingers, once they have been shut and opened, negative for none;
+    `~command_port` 29900: orders and faults.
 
     Services (std_srvs/Trigger): `~<order>` for every order that needs no argument.
     """
@@ -38,7 +39,7 @@ class EzGripperEmulatorNode:
         self._line = DynamixelLine(fingers, Path(settings.port_name))
         held_at = read_number(handle, "object", -1.0, None)
         if held_at >= 0.0:
-            self._line.place_object(held_at)
+            self._line.offer_object(held_at)
         self._commands = CommandPort(self._line.commands, int(read_number(handle, "command_port", COMMAND_PORT)))
         self._services: list[rospy.Service] = []
 
