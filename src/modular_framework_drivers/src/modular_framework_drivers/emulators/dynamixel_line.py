@@ -90,7 +90,8 @@ class DynamixelLine:
         return {"plug": self.plug, "unplug": self.unplug, "power_on": self.power_on, "power_off": self.power_off,
                 "overload": self.overload, "heat": self.heat, "garbage": self.garbage, "delay": self.delay,
                 "lose": self.lose, "corrupt": self.corrupt, "id": self.change_id, "object": self.place_object,
-                "offer_object": self.offer_object, "no_object": self.remove_object, "clear": self.clear, "state": self.state}
+                "offer_object": self.offer_object, "no_object": self.remove_object, "clear": self.clear,
+                "state": self.state}
 
     # ---- commands ----
 
