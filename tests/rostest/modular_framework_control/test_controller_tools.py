@@ -24,7 +24,7 @@ LAUNCH = """
     controller_groups: {follow: [states, arm], teach: [states, jog]}
   </rosparam>
   <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>{joints: [shoulder]}</rosparam>
+    <rosparam>{joints: [shoulder, elbow]}</rosparam>
   </node>
 </launch>
 """
@@ -66,13 +66,13 @@ def wait_until(expected: dict[str, str]) -> None:
 
 def test_the_spawner_waits_spawns_and_cleans_up_at_its_end(tool: Callable[..., Any], tmp_path: Path) -> None:
     names = tmp_path / "controllers.yaml"
-    names.write_text("states: {}\narm: {}\n")
+    names.write_text("states: {}\narm: {}\nspare: {type: position_controllers/JointPositionController, joint: elbow}\n")
     process = tool("spawner", "--wait-for", "robot_ready", str(names))
     time.sleep(0.9)
     assert states() == {}
     ready = rospy.Publisher("robot_ready", Bool, queue_size=1, latch=True)
     ready.publish(True)
-    wait_until({"states": "running", "arm": "running"})
+    wait_until({"states": "running", "arm": "running", "spare": "running"})
     process.send_signal(signal.SIGINT)
     assert process.wait(10.0) == 0
     assert states() == {}
@@ -92,13 +92,15 @@ def test_an_unspawner_stops_and_starts_again_at_its_end(tool: Callable[..., Any]
 
 
 def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
-    assert run(tool("controller_manager", "spawn", "states")) == (0, "loaded and started: states\n")
+    assert run(tool("controller_manager", "list")) == (0, "No controllers are loaded in mechanism control\n")
+    assert run(tool("controller_manager", "spawn", "states")) == (0, "Loaded states\nStarted ['states'] successfully\n")
     code, output = run(tool("controller_manager", "list"))
     assert (code, output) == (0, "'states' - 'hardware_interface/JointStateInterface' ( running )\n")
     assert "position_controllers/JointTrajectoryController" in run(tool("controller_manager", "list-types"))[1]
     assert run(tool("controller_manager", "reload-libraries", "--restore"))[0] == 0
     assert states() == {"states": "running"}
-    assert run(tool("controller_manager", "kill", "states"))[0] == 0
+    assert run(tool("controller_manager", "kl", "states")) == (0, "Stopped ['states'] successfully\n"
+                                                               "Unloaded states successfully\n")
     assert states() == {}
 
 

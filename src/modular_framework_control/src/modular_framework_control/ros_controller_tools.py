@@ -15,6 +15,7 @@ import rospy
 import yaml
 from std_msgs.msg import Bool
 
+from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_controller_manager_client import (
     ControllerManagerClient,
     ControllerManagerClientError,
@@ -42,7 +43,10 @@ def unspawner_main() -> int:
 def controller_manager_main() -> int:
     """Ask the controller manager once: load, unload, start, stop, spawn, kill, list, list-types, reload-libraries."""
     parser = argparse.ArgumentParser(prog="controller_manager", description=controller_manager_main.__doc__)
-    parser.add_argument("command", choices=[*_PER_CONTROLLER, "list", "list-types", "reload-libraries"])
+    commands = [*_PER_CONTROLLER, "list", "list-types", "reload-libraries"]
+    parser.add_argument("command", choices=commands, type=lambda word: _SHORT_COMMANDS.get(word, word),
+                        metavar=f"{{{','.join(commands)}}}",
+                        help="also lc, lt, sp, kl for list, list-types, spawn, kill")
     parser.add_argument("--restore", action="store_true",
                         help="with reload-libraries: load and start again what was there before")
     _add_common(parser, names="*")
@@ -66,6 +70,7 @@ def _run(parser: argparse.ArgumentParser, name: str,
     rospy.init_node(name, anonymous=True, disable_signals=True)
     timeout_s = math.inf if arguments.no_timeout else arguments.timeout
     try:
+        arguments.files = [Path(argument) for argument in arguments.controllers if Path(argument).is_file()]
         arguments.controllers = names_of(arguments.controllers)
         action(ControllerManagerClient(arguments.namespace, timeout_s), arguments, ended)
     except ControllerManagerClientError as error:
@@ -101,6 +106,8 @@ def names_of(arguments: Sequence[str]) -> list[str]:
 def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
     if arguments.wait_for:
         _wait_for_topic(arguments.wait_for, math.inf if arguments.no_timeout else arguments.timeout, ended)
+    for path in arguments.files:
+        _set_parameters(path, arguments.namespace)
     loaded: list[str] = []
     try:
         for name in arguments.controllers:
@@ -112,6 +119,14 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
         _wait_for_end(ended)
     finally:
         _clean_up(client, loaded)
+
+
+def _set_parameters(path: Path, namespace: str) -> None:
+    """Make what a file says of its controllers their parameters."""
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    for name, parameters in content.items() if isinstance(content, dict) else ():
+        if isinstance(parameters, dict) and parameters:
+            rospy.set_param(join_names(rospy.resolve_name(namespace), name), parameters)
 
 
 def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
@@ -154,24 +169,15 @@ def _wait_for_topic(topic: str, timeout_s: float, ended: threading.Event) -> Non
     subscriber.unregister()
 
 
-def _kill(client: ControllerManagerClient, name: str) -> None:
-    client.switch([], [name])
-    client.unload(name)
-
-
-def _spawn_one(client: ControllerManagerClient, name: str) -> None:
-    client.load(name)
-    client.switch([name], [])
-
-
-_PER_CONTROLLER: dict[str, tuple[Callable[[ControllerManagerClient, str], None], str]] = {
-    "load": (lambda client, name: client.load(name), "loaded"),
-    "unload": (lambda client, name: client.unload(name), "unloaded"),
-    "start": (lambda client, name: client.switch([name], []), "started"),
-    "stop": (lambda client, name: client.switch([], [name]), "stopped"),
-    "spawn": (_spawn_one, "loaded and started"),
-    "kill": (_kill, "stopped and unloaded"),
-}
+_SHORT_COMMANDS = {"lc": "list", "lt": "list-types", "sp": "spawn", "kl": "kill"}
+_Step = tuple[Callable[[ControllerManagerClient, str], None], str, str]
+_LOAD: _Step = (lambda client, name: client.load(name), "Loaded {}", "loading {}")
+_UNLOAD: _Step = (lambda client, name: client.unload(name), "Unloaded {} successfully", "unloading {}")
+_START: _Step = (lambda client, name: client.switch([name], []), "Started ['{}'] successfully", "starting ['{}']")
+_STOP: _Step = (lambda client, name: client.switch([], [name]), "Stopped ['{}'] successfully", "stopping ['{}']")
+_PER_CONTROLLER: dict[str, tuple[_Step, ...]] = {
+    "load": (_LOAD,), "unload": (_UNLOAD,), "start": (_START,), "stop": (_STOP,), "spawn": (_LOAD, _START),
+    "kill": (_STOP, _UNLOAD)}
 
 
 def _command(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
@@ -179,27 +185,39 @@ def _command(client: ControllerManagerClient, arguments: argparse.Namespace, end
     if arguments.command in _PER_CONTROLLER:
         if not arguments.controllers:
             raise ControllerManagerClientError(f"{arguments.command}: name at least one controller")
-        action, done = _PER_CONTROLLER[arguments.command]
-        for name in arguments.controllers:
-            action(client, name)
-            print(f"{done}: {name}")
+        for action, done, failing in _PER_CONTROLLER[arguments.command]:
+            for name in arguments.controllers:
+                try:
+                    action(client, name)
+                except ControllerManagerClientError:
+                    print(f"Error when {failing.format(name)}")
+                    raise
+                print(done.format(name))
     elif arguments.command == "list":
-        for state in client.list_controllers():
-            interfaces = ", ".join(claim.hardware_interface for claim in state.claimed_resources)
-            print(f"'{state.name}' - '{interfaces}' ( {state.state} )")
+        _list(client)
     elif arguments.command == "list-types":
         print("\n".join(client.list_controller_types()))
     else:
         _reload(client, arguments.restore)
 
 
+def _list(client: ControllerManagerClient) -> None:
+    states = client.list_controllers()
+    if not states:
+        print("No controllers are loaded in mechanism control")
+    for state in states:
+        interfaces = "+".join(dict.fromkeys(claim.hardware_interface for claim in state.claimed_resources))
+        print(f"'{state.name}' - '{interfaces}' ( {state.state} )")
+
+
 def _reload(client: ControllerManagerClient, restore: bool) -> None:
+    print("Restore:", restore)
     before = client.list_controllers()
     client.reload_libraries(force_kill=True)
-    print("reloaded controller libraries")
+    print("Successfully reloaded libraries")
     if not restore:
         return
     for state in before:
         client.load(state.name)
     client.switch([state.name for state in before if state.state == "running"], [])
-    print(f"restored: {', '.join(state.name for state in before) or 'none'}")
+    print("Controllers restored to original state")
