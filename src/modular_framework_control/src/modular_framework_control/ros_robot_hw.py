@@ -30,8 +30,8 @@ class RobotHwNode:
     combined to one robot; without it, `~type` (MockRobotHW of this package) is one hardware, with private parameters.
     `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
     says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
-    itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that is
-    not permitted the log says so once, and the loop runs as it can.
+    itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that
+    is not permitted the log says so once, and the loop runs as it can.
 
     Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
     `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning. What
@@ -84,7 +84,7 @@ class RobotHwNode:
         self._robot_hw.close()
 
     def run(self) -> bool:
-        """Run the control loop until it is told to end; then stop all controllers, and tell the hardware what they left.
+        """Run the control loop until it is told to end; then stop all controllers and write what they leave.
 
         Returns:
             Whether it ended because it was told to; otherwise the log says why.
@@ -125,7 +125,7 @@ class RobotHwNode:
             late_s, missed = wait()
 
     def _wait_for_simulated_clock(self) -> tuple[float, int]:
-        """Wait until the simulated clock has gone on by a period, or has jumped back; it says nothing about lateness."""
+        """Wait until the simulated clock has gone on by a period, or has jumped back; lateness is not known."""
         begun_s = rospy.get_time()
         tick = rospy.rostime.get_rostime_cond()
         while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
