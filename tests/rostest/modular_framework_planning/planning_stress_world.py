@@ -91,13 +91,18 @@ def obstacle(message: CollisionObject) -> tuple[str, Any, float, np.ndarray]:
 
 def touched_bodies(checker: IndependentChecker, names: Sequence[str], path: np.ndarray, rest: Mapping[str, float],
                    objects: Mapping[str, CollisionObject], step: float) -> set[str]:
-    """Names of the bodies that touch another one somewhere along a path, looked at every `step` [rad]."""
+    """Names of the bodies that touch another one along a path, looked at every `step` [rad] and at its end."""
     checker.set_world([obstacle(item) for item in objects.values()])
     touched: set[str] = set()
-    for first, second in zip(path[:-1], path[1:], strict=True):
-        pieces = max(1, int(np.ceil(np.abs(second - first).max() / step)))
-        for share in np.arange(pieces + 1) / pieces:
-            state = dict(zip(names, first + share * (second - first), strict=True))
-            for pair in checker.collisions({**rest, **state}, first_only=False):
-                touched.update(pair if not objects.keys() & set(pair) else objects.keys() & set(pair))
+    for values in _samples(path, step):
+        state = {**rest, **dict(zip(names, values.tolist(), strict=True))}
+        for pair in checker.collisions(state, first_only=False):
+            touched.update(objects.keys() & set(pair) or pair)
     return touched
+
+
+def _samples(path: np.ndarray, step: float) -> np.ndarray:
+    """States along the straight pieces between vertices; from one to the next no joint moves further than `step`."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path, axis=0)).max(axis=1))])
+    at = np.linspace(0.0, lengths[-1], 1 + int(np.ceil(lengths[-1] / step)))
+    return np.column_stack([np.interp(at, lengths, column) for column in path.T])

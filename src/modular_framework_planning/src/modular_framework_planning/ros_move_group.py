@@ -33,6 +33,7 @@ from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.ros_execution import load_execution
+from modular_framework_planning.ros_many_clients import widen_backlog
 from modular_framework_planning.ros_markers import MarkerPublisher
 from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
 from modular_framework_planning.ros_padding import load_padding
@@ -91,6 +92,7 @@ def main() -> int:
     begun = time.monotonic()
     prepare()
     rospy.init_node("move_group")
+    widen_backlog()
     try:
         context = build_context()
     except PlanningError as error:
