@@ -2,6 +2,7 @@
 """Runs an emulated UR controller for tests and measurements: a process of its own at a loopback address of its own."""
 from __future__ import annotations
 
+import atexit
 import os
 import random
 import subprocess
@@ -36,6 +37,7 @@ class EmulatedArm:
             [sys.executable, "-m", _MODULE, "--quiet", "--address", self.address, "--model", model,
              "--unlock-delay", str(unlock_delay_s), "--positions", *map(str, positions)],
             stdout=subprocess.PIPE, text=True)
+        atexit.register(self.close)
         if self._process.stdout is None or self._process.stdout.readline() != "ready\n":
             raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")
 
