@@ -150,8 +150,8 @@ def world_with_cube(robot: Robot, items: list[PlannedItem], joined: Trajectory) 
             world = robot.scene.with_object(CollisionObject("cube", pose, ((Box(0.01, 0.01, 0.01),
                                                                             pin.SE3.Identity()),)))
             motion = MotionChecker(CollisionChecker(world, indices), indices, world.positions)
-            if all(motion.first_collision(item.answer.trajectory.curve(0.02), 0.02) is None for item in items) and (
-                    motion.first_collision(joined.curve(0.02), 0.02) is not None):
+            if all(motion.colliding_state(item.answer.trajectory.curve(0.02), 0.02) is None for item in items) and (
+                    motion.colliding_state(joined.curve(0.02), 0.02) is not None):
                 return world
     raise AssertionError("there is a place that only the short cut touches")
 

@@ -142,7 +142,7 @@ def test_chords_are_told_where_the_curve_leaves_them_and_nowhere_else() -> None:
 
 
 def test_last_check_sees_a_contact_half_a_milliradian_long() -> None:
-    def first_collision(line: np.ndarray, step: float) -> np.ndarray | None:
+    def colliding_state(line: np.ndarray, step: float) -> np.ndarray | None:
         for start, end in zip(line[:-1], line[1:], strict=True):
             count = int(np.ceil(np.abs(end - start).max() / step))
             for share in np.linspace(0.0, 1.0, count + 1):
@@ -154,7 +154,7 @@ def test_last_check_sees_a_contact_half_a_milliradian_long() -> None:
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
     checker = SimpleNamespace(contacts=lambda positions, include_fixed: [])
     problem = SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=checker, motion=SimpleNamespace(
-        first_collision=first_collision, whole=lambda values: values))
+        colliding_state=colliding_state, whole=lambda values: values))
     assert "0.00025 rad steps" in LastCheck().fault(problem, PlannedPath(motion.positions, motion))
-    problem.motion.first_collision = lambda line, step: None
+    problem.motion.colliding_state = lambda line, step: None
     assert LastCheck().fault(problem, PlannedPath(motion.positions, motion)) == ""

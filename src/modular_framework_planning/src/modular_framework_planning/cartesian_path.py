@@ -79,7 +79,7 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
     """
 
     def objection(before: Array, after: Array) -> str:
-        touching = motion.first_collision(np.vstack([before, after]), step)
+        touching = motion.colliding_state(np.vstack([before, after]), step)
         if touching is None:
             return ""
         contacts = checker.contacts(motion.whole(touching), include_fixed=False)

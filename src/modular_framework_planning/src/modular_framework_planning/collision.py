@@ -96,25 +96,20 @@ class CollisionChecker:
             step: distance of the samples [rad or m].
             first: number of the first sample that has to be free: 1 leaves the first vertex out.
         """
-        return self._colliding_sample(np.ascontiguousarray(vertices, dtype=float), step, first, -1)[0] < 0
+        return self._colliding_sample(np.ascontiguousarray(vertices, dtype=float), step, first)[0] < 0
 
-    def first_collision(self, vertices: Array, step: float) -> Array | None:
-        """Returns the first colliding sample along straight pieces, as path_is_free looks at them, or None."""
-        path, last, found = np.ascontiguousarray(vertices, dtype=float), -1, None
-        while True:
-            number, numbers = self._colliding_sample(path, step, 0, last)
-            if number < 0:
-                return found
-            found, last = sample_at(path, numbers, number), number - 1
-            if last < 0:
-                return found
+    def colliding_state(self, vertices: Array, step: float) -> Array | None:
+        """Returns a colliding sample along straight pieces, as path_is_free looks at them, or None."""
+        path = np.ascontiguousarray(vertices, dtype=float)
+        number, numbers = self._colliding_sample(path, step, 0)
+        return sample_at(path, numbers, number) if number >= 0 else None
 
-    def _colliding_sample(self, path: Array, step: float, first: int, last: int) -> tuple[int, NDArray[np.int64]]:
+    def _colliding_sample(self, path: Array, step: float, first: int) -> tuple[int, NDArray[np.int64]]:
         """Returns the number of a colliding sample or -1, and the numbers of the samples at the vertices."""
-        status, count, numbers = check_polyline(path, step, first, last, self._undecided, *self._compiled.arguments)
+        status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         if status == TOUCHING:
             return count, numbers
-        end = int(numbers[-1]) if last < 0 else last
+        end = int(numbers[-1])
         if status != CLEAR:
             number = self._decide(path, numbers, range(first, end + 1), count)
             if number >= 0:

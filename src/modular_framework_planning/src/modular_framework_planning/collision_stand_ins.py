@@ -7,7 +7,7 @@ stand-in encloses the body; where it is larger, a hit with it is not final and t
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -43,7 +43,7 @@ class StandIn:
     """What a geometry is checked as, in its own frame.
 
     Attributes:
-        triangles: corners of the surface, shape (m, 9) [m], or None.
+        corners: gives the corners of the surface's triangles, shape (m, 9) [m]; None for no surface.
         swell: radius of a ball around every point of the surface that belongs to it [m].
         surface_is_exact: whether the swollen surface is the geometry's own.
         kind, size: closed form, SURFACE for none; solid_is_exact: whether it is the geometry's own.
@@ -51,7 +51,7 @@ class StandIn:
         is_closed: whether the surface has an inside.
     """
 
-    triangles: Array | None
+    corners: Callable[[], Array] | None
     swell: float = 0.0
     surface_is_exact: bool = True
     kind: int = SURFACE
@@ -63,7 +63,7 @@ class StandIn:
     @cached_property
     def surface(self) -> Surfaces | None:
         """Sphere tree over the triangles; built when it is asked for, as most solids are checked in closed form."""
-        return None if self.triangles is None else _surface(self.triangles)
+        return None if self.corners is None else _surface(self.corners())
 
     @property
     def radius(self) -> float:
@@ -96,27 +96,27 @@ def stand_in(part: PlacedGeometry) -> StandIn:
 def _make(geometry: Any, source: Any) -> StandIn:
     if isinstance(source, Octree):
         points = np.tile(source.centers, 3)
-        return StandIn(points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
+        return StandIn(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
     match geometry:
         case coal.BVHModelBase():
             triangles = _mesh_triangles(geometry)
-            return StandIn(triangles, is_closed=_is_closed(triangles))
+            return StandIn(lambda: triangles, is_closed=_is_closed(triangles))
         case coal.Box():
             x, y, z = (float(value) for value in geometry.halfSide)
-            return StandIn(_box_triangles(x, y, z), kind=BOX, size=(x, y, z))
+            return StandIn(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
         case coal.Sphere():
-            return StandIn(np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
+            return StandIn(lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
                            size=(float(geometry.radius), 0.0, 0.0))
         case coal.Capsule():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
+            return StandIn(lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
                            kind=CAPSULE, size=(radius, half, 0.0))
         case coal.Cylinder():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(_prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0))
+            return StandIn(lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0))
         case coal.Cone():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(_prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
+            return StandIn(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
         case coal.Plane() | coal.Halfspace():
             normal = np.array(geometry.n, dtype=float)
             kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
@@ -131,7 +131,7 @@ def _bounding_box(geometry: Any) -> StandIn:
     low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
     x, y, z = (float(value) for value in 0.5 * (high - low))
     middle = 0.5 * (low + high)
-    return StandIn(_box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
+    return StandIn(lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
                    pin.SE3(np.eye(3), middle))
 
 

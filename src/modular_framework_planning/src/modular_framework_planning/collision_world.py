@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -57,8 +57,8 @@ def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
     for item in model.link_geometries:
         part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.geometry, item, 0.0)
         shape = stand_in(part)
-        if shape.triangles is not None and shape.surface_is_exact and shape.swell == 0.0:
-            shape = StandIn(moved(shape.triangles, item.placement * shape.offset), is_closed=shape.is_closed)
+        if shape.corners is not None and shape.surface_is_exact and shape.swell == 0.0:
+            shape = StandIn(partial(moved, shape.corners(), item.placement * shape.offset), is_closed=shape.is_closed)
         result.append(shape)
     return tuple(result)
 
@@ -105,7 +105,7 @@ def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[
         partners.setdefault(pair.second, set()).add((pair.first, pair.margin))
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, shape in enumerate(_link_stand_ins(model)):
-        if shape.kind == SURFACE and shape.triangles is not None and number in partners:
+        if shape.kind == SURFACE and shape.corners is not None and number in partners:
             groups.setdefault((parts[number].joint_id, frozenset(partners[number])), []).append(number)
     return tuple(tuple(group) for group in groups.values())
 
@@ -135,8 +135,8 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
         else:
             found.setdefault((*ordered, pair.margin), []).append(number)
     world = _arrays(model, members, robot, scene, list(found))
-    keys = tuple(None if scenic else _table_key(world, number)
-                 for number, scenic in enumerate(world.scenic[world.pairs].any(axis=1).tolist()))
+    scenic = world.scenic[world.pairs].any(axis=1)
+    keys = tuple(None if scenic[number] else _table_key(world, number) for number in range(len(found)))
     chosen = tuple(key for key in keys if key is not None)
     tables, joints = _tables(model, groups, chosen)
     numbers = iter(range(len(chosen)))
@@ -169,7 +169,7 @@ def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seque
                                if number in wanted and shape.surface is not None])
     remaining = iter(roots)
     for number, shape in zip(others, shapes, strict=True):
-        root = next(remaining) if number in wanted and shape.triangles is not None else -1
+        root = next(remaining) if number in wanted and shape.corners is not None else -1
         sphere = np.array([0.0, 0.0, 0.0, shape.radius]) if root < 0 else (
             surfaces.spheres[root] + [0, 0, 0, shape.swell])
         pose = (parts[number].placement * shape.offset).homogeneous[:3]

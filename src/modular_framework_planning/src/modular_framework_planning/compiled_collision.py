@@ -177,9 +177,9 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
         first, second = pairs[pair, 0], pairs[pair, 1]
         x, y, z = (centres[first, 0] - centres[second, 0], centres[first, 1] - centres[second, 1],
                    centres[first, 2] - centres[second, 2])
-        if exact[pair] and np.sqrt(x * x + y * y + z * z) < spheres[first, 3] + spheres[second, 3]:
-            if _goes_round(world, first, second, poses) or _goes_round(world, second, first, poses):
-                return pair
+        if (exact[pair] and np.sqrt(x * x + y * y + z * z) < spheres[first, 3] + spheres[second, 3]
+                and (_goes_round(world, first, second, poses) or _goes_round(world, second, first, poses))):
+            return pair
     return -1
 
 

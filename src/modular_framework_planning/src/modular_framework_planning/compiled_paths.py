@@ -179,13 +179,13 @@ def _table_says(world, tables, table_joints, table_of, pair, reach):  # type: ig
 
 
 @njit(cache=True, nogil=True)
-def check_path(world, samples, first, last, undecided):  # type: ignore[no-untyped-def]
+def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def]
     """Checks samples of a path; those within the clearance of a looked-at sample are not looked at.
 
     Args:
         world: what to check in.
         samples: of the path, positions of the whole robot.
-        first, last: numbers of the first and the last sample that have to be free.
+        first: number of the first sample that has to be free.
         undecided: filled with (sample, pair) too close to tell, shape (MOST_UNDECIDED, 2).
 
     Returns:
@@ -193,7 +193,7 @@ def check_path(world, samples, first, last, undecided):  # type: ignore[no-untyp
         entries, one more than fit when they do not fit; CLEAR with the number of samples looked at.
     """
     vertices, numbers, travelled = samples.vertices, samples.numbers, samples.travelled
-    joints, bodies = vertices.shape[1], len(world.joints)
+    last, joints, bodies = numbers[-1], vertices.shape[1], len(world.joints)
     # a call that is handed the whole world costs more than most of what is asked here: hence single arrays
     parents, prismatic, axes, hangs_on = world.tree.parents, world.tree.prismatic, world.tree.axes, world.joints
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
@@ -302,16 +302,16 @@ def check_path(world, samples, first, last, undecided):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def check_polyline(vertices, step, first, last, undecided, *world):  # type: ignore[no-untyped-def]
+def check_polyline(vertices, step, first, undecided, *world):  # type: ignore[no-untyped-def]
     """Checks straight pieces between vertices (n, joints) at samples at most `step` apart in every joint.
 
-    `last` below 0 stands for the end, `world` is what `arguments` returns; the others are as for check_path.
+    `world` is what `arguments` returns; the others are as for check_path.
 
     Returns:
         What check_path does, and the numbers of the samples at the vertices, shape (n,).
     """
     samples = sample(vertices, step)
-    status, number = check_path(world_of(*world), samples, first, samples.numbers[-1] if last < 0 else last, undecided)
+    status, number = check_path(world_of(*world), samples, first, undecided)
     return status, number, samples.numbers
 
 

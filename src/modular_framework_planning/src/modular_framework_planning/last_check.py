@@ -57,7 +57,7 @@ def _not_in_order(path: PlannedPath) -> str:
 
 def _collision(problem: PlanningProblem, samples: Array) -> str:
     step = problem.settings.finest_step
-    hit = problem.motion.first_collision(samples, step)
+    hit = problem.motion.colliding_state(samples, step)
     if hit is None:
         return ""
     contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)

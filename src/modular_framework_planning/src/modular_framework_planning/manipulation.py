@@ -270,7 +270,7 @@ class ManoeuvrePlanner:
         """Times a line that begins where the robot is in the scene."""
         _, motion = self._checkers(scene)
         return time_line(self._arm.group.joints, rows, self._arm.velocity, self._arm.acceleration,
-                         lambda curve: motion.first_collision(curve, CHECK_STEP) is None)
+                         lambda curve: motion.colliding_state(curve, CHECK_STEP) is None)
 
 
 def _moves(rows: Array) -> bool:

@@ -46,9 +46,9 @@ class MotionChecker:
         edge[0, self._indices], edge[1, self._indices] = start, end
         return self._checker.path_is_free(edge, step, 1)
 
-    def first_collision(self, polyline: Array, step: float) -> Array | None:
-        """Returns the first colliding sample along straight pieces (start included), or None."""
-        found = self._checker.first_collision(self.whole_path(polyline), step)
+    def colliding_state(self, polyline: Array, step: float) -> Array | None:
+        """Returns a colliding sample along straight pieces (start included), or None."""
+        found = self._checker.colliding_state(self.whole_path(polyline), step)
         return None if found is None else found[self._indices]
 
     def whole_path(self, path: Array) -> Array:

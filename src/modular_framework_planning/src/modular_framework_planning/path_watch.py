@@ -44,7 +44,7 @@ class PathWatch:
         """
         checker, motion = self._checkers(scene)
         rest = self._rows[self._reached:]
-        if motion.first_collision(rest, CHECK_STEP) is None:
+        if motion.colliding_state(rest, CHECK_STEP) is None:
             return ""
         _, before = self._checkers(self._planned_in.with_positions(scene.positions))
         for values in _samples(rest):

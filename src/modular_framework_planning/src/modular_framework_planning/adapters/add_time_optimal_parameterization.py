@@ -53,7 +53,7 @@ def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
     if problem.constraints is not None and not all(
             problem.constraints.satisfied(problem.motion.whole(values)) for values in curve):
         return False
-    return problem.motion.first_collision(curve, problem.settings.finest_step) is None
+    return problem.motion.colliding_state(curve, problem.settings.finest_step) is None
 
 
 def _number(parameters: Any, name: str, default: float, lowest: float) -> float:

@@ -133,7 +133,7 @@ class CartesianPathService:
 
         def is_free(curve: Array) -> bool:
             moves = lines.checker is not None and len(found.rows) > 1
-            return not moves or lines.motion.first_collision(curve, step) is None
+            return not moves or lines.motion.colliding_state(curve, step) is None
 
         trajectory = time_line(lines.group.joints, found.rows, velocity, acceleration, is_free)
         if request.max_cartesian_speed <= 0.0:

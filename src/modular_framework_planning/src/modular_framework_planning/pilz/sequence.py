@@ -163,7 +163,7 @@ class SequenceJoiner:
         checker = self._checkers(following.request.scene, group, start)
         motion = MotionChecker(checker, group.indices, start)
         curve = inside.curve(self._step)
-        hit = motion.first_collision(curve, self._step)
+        hit = motion.colliding_state(curve, self._step)
         if hit is not None:
             contacts = describe_contacts(checker.contacts(motion.whole(hit), include_fixed=False))
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blended within {radius} m: {contacts}")

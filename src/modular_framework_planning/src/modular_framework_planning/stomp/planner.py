@@ -143,7 +143,7 @@ class _Attempt:
     def _is_valid(self) -> bool:
         """Whether the motion passes the exact check."""
         problem, fine = self._problem, self._problem.settings.motion_step
-        if problem.motion.first_collision(self.motion, problem.settings.finest_step) is not None:
+        if problem.motion.colliding_state(self.motion, problem.settings.finest_step) is not None:
             return False
         return problem.constraints is None or all(
             problem.edge_is_valid(first, second, fine)
