@@ -135,7 +135,7 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
         else:
             found.setdefault((*ordered, pair.margin), []).append(number)
     world = _arrays(model, members, robot, scene, list(found))
-    scenic = world.scenic[world.pairs].any(axis=1)
+    scenic: list[bool] = np.any(world.scenic[world.pairs], axis=1).tolist()
     keys = tuple(None if scenic[number] else _table_key(world, number) for number in range(len(found)))
     chosen = tuple(key for key in keys if key is not None)
     tables, joints = _tables(model, groups, chosen)
