@@ -16,6 +16,9 @@ class ChildProcess:
     Args:
         module: what to run; gets the first argument, the file descriptor of its socket, then the others.
         arguments: its command line.
+
+    Raises:
+        OSError: the system has no room for one.
     """
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
@@ -23,8 +26,12 @@ class ChildProcess:
         self._socket.setblocking(False)
         with other:
             role, *rest = arguments
-            self._process = subprocess.Popen([sys.executable, "-m", module, role, str(other.fileno()), *rest],
-                                             pass_fds=[other.fileno()], stdin=subprocess.DEVNULL)
+            try:
+                self._process = subprocess.Popen([sys.executable, "-m", module, role, str(other.fileno()), *rest],
+                                                 pass_fds=[other.fileno()], stdin=subprocess.DEVNULL)
+            except OSError:
+                self._socket.close()
+                raise
         self.ended = False
 
     def messages(self) -> Iterator[bytes]:

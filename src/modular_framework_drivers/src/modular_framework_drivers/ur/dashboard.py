@@ -25,7 +25,7 @@ def ask_dashboard(address: str, line: str, timeout_s: float = 2.0, port: int = D
     """
     try:
         with socket.create_connection((address, port), timeout_s) as connection, \
-                connection.makefile("rw", encoding="utf-8", newline="\n") as lines:
+                connection.makefile("rw", encoding="utf-8", errors="replace", newline="\n") as lines:
             lines.readline()    # the greeting
             lines.write(line + "\n")
             lines.flush()

@@ -76,6 +76,7 @@ class RtdeLink:
         self._keeper: threading.Thread | None = None
         self._states: _Stream | None = None
         self._control: ChildProcess | None = None
+        self._given_up: ChildProcess | None = None
         self._control_since_s = 0.0
         self._program_wanted = False
         self.state: ArmState | None = None
@@ -105,6 +106,7 @@ class RtdeLink:
         """Give up commanding until the next `request_program`."""
         self.commanding = False
         self._program_wanted = False
+        self._given_up = self._control
         self.program_failure = reason
         self.program_failed_s = time.monotonic()
 
@@ -171,18 +173,29 @@ class RtdeLink:
         next_attempt_s = 0.0
         while not self._closing.wait(_KEEPER_PERIOD_S):
             now_s = time.monotonic()
-            if self._states is None and now_s >= next_attempt_s:
-                self._states = _Stream(self._start("state", ["--timeout", str(self._settings.timeout_s)]), now_s)
-            elif self._states is not None and self._is_over(self._states, now_s):
-                stream, self._states = self._states, None
-                stream.process.end()
-                next_attempt_s = now_s + _RETRY_S
-            self._keep_program(now_s)
+            try:
+                if self._states is not None and self._is_over(self._states, now_s):
+                    stream, self._states = self._states, None
+                    stream.process.end()
+                    next_attempt_s = now_s + _RETRY_S
+                elif self._states is None and now_s >= next_attempt_s:
+                    next_attempt_s = now_s + _RETRY_S
+                    self._states = _Stream(self._start("state", ["--timeout", str(self._settings.timeout_s)]), now_s)
+                self._keep_program(now_s)
+            except OSError as error:
+                self._tell_not_started(error)
         if self._states is not None:
             self._states.process.end()
         if self._control is not None:
             self._control.end(_STOP_PATIENCE_S)
         self._states = self._control = None
+
+    def _tell_not_started(self, error: OSError) -> None:
+        reason = f"a process for it cannot be started: {error}; free memory, processes or open files of this computer"
+        if self._states is None:
+            self.lost = reason
+        else:
+            self.drop_program(reason)
 
     def _is_over(self, stream: _Stream, now_s: float) -> bool:
         if not stream.delivered and not stream.failed and now_s - stream.since_s > _CONNECT_TIMEOUT_S:
@@ -193,7 +206,7 @@ class RtdeLink:
     def _keep_program(self, now_s: float) -> None:
         wanted = self._program_wanted and not self.lost
         possible = self.state is not None and not robot_fault(self.state, self._settings.address)
-        if self._control is not None and (not wanted or self._control.ended):
+        if self._control is not None and (not wanted or self._control.ended or self._control is self._given_up):
             process, self._control = self._control, None
             process.end()
         elif self._control is None and wanted and possible:

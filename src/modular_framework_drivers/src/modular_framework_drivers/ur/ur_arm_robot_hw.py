@@ -108,8 +108,7 @@ class UrArmHardware(RobotHW):
         if not following or not self._following:
             for handle in self._handles:
                 handle.command = handle.position
-            self._check.reset([handle.position for handle in self._handles])
-            self._refused = ""
+            self._begin_where_it_is(self._check)
         self._following = following
         self._fault = self._current_fault()
 
@@ -138,14 +137,20 @@ class UrArmHardware(RobotHW):
     def write(self, time_s: float, period_s: float) -> None:
         if self._link is None or self._check is None or not self._following:
             return
+        if self._link.state is None or self._link.state.runtime_state != PROGRAM_PLAYING:
+            self._begin_where_it_is(self._check)    # a paused arm goes on from where it stands, not from what it missed
+            return
         if period_s > 0.0:
             self._servo_time_s += _PERIOD_SMOOTHING * (min(max(period_s, 0.002), 0.05) - self._servo_time_s)
         refused = self._check.admit([handle.command for handle in self._handles], period_s)
         if refused and refused != self._refused:
             LOGGER.error("command refused: %s", refused)
         self._refused = refused
-        if self._link.state is not None and self._link.state.runtime_state == PROGRAM_PLAYING:
-            self._link.servo(self._check.sent, self._servo_time_s)
+        self._link.servo(self._check.sent, self._servo_time_s)
+
+    def _begin_where_it_is(self, check: CommandCheck) -> None:
+        check.reset([handle.position for handle in self._handles])
+        self._refused = ""
 
     def fault(self) -> str:
         return self._refused or self._fault

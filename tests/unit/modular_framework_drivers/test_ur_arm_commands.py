@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the driver of UR arms sends, and how it treats its helper processes, without any arm."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pytest
+
+from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_drivers.ur import rtde_link, ur_arm_robot_hw
+from modular_framework_drivers.ur.arm_messages import READY, ArmState
+from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
+from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
+
+PERIOD_S = 0.008
+RUNNING, NORMAL, PLAYING, PAUSED = 7, 1, 2, 4
+ZEROS = (0.0,) * 6
+
+
+class FakeLink:
+    """A link to an arm that is, in each cycle, where it was sent."""
+
+    made: FakeLink
+
+    def __init__(self, settings: LinkSettings) -> None:
+        del settings
+        FakeLink.made = self
+        self.lost = self.program_failure = ""
+        self.program_failed_s = 0.0
+        self.commanding = True
+        self.positions: Sequence[float] = ZEROS
+        self.runtime_state = PLAYING
+        self.sent: list[list[float]] = []
+
+    @property
+    def state(self) -> ArmState:
+        return ArmState(time.monotonic(), 0.0, tuple(self.positions), ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL,
+                        self.runtime_state)
+
+    def servo(self, positions: Sequence[float], time_s: float) -> bool:
+        self.sent.append(list(positions))
+        self.positions = list(positions)
+        return True
+
+    def connect(self) -> None: ...
+
+    def request_program(self) -> None: ...
+
+    def poll(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def hw(monkeypatch: pytest.MonkeyPatch) -> UrArmHardware:
+    monkeypatch.setattr(ur_arm_robot_hw, "RtdeLink", FakeLink)
+    made = UrArmHardware()
+    assert made.init(MappingNodeHandle({}), MappingNodeHandle({"robot_ip_address": "nowhere"}, "/arm_hw"))
+    return made
+
+
+def run(hw: UrArmHardware, cycles: int, command: Callable[[int], float]) -> None:
+    for cycle in range(cycles):
+        hw.read(0.0, PERIOD_S)
+        for handle in hw.get(PositionJointInterface).handles:
+            handle.command = command(cycle)
+        hw.write(0.0, PERIOD_S)
+
+
+def test_what_a_paused_arm_was_commanded_meanwhile_is_not_caught_up_with_in_a_jump(hw: UrArmHardware) -> None:
+    link = FakeLink.made
+    run(hw, 10, lambda cycle: 0.0)
+    link.runtime_state = PAUSED
+    before = len(link.sent)
+    run(hw, 300, lambda cycle: 0.001 * cycle)
+    assert len(link.sent) == before
+    link.runtime_state = PLAYING
+    run(hw, 300, lambda cycle: 0.3)
+    way = np.array([ZEROS, *link.sent[before:]])
+    speeds = np.diff(way, axis=0) / PERIOD_S
+    assert np.abs(speeds).max() <= np.pi * 1.001
+    assert np.abs(np.diff(speeds, axis=0, prepend=0.0)).max() <= 40.0 * PERIOD_S * 1.001
+    assert way[-1] == pytest.approx([0.3] * 6)
+
+
+class FakeProcess:
+    """A helper process that is ready at once, or cannot be started."""
+
+    started: list[FakeProcess]
+    refused: OSError | None
+
+    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+        if FakeProcess.refused is not None:
+            raise FakeProcess.refused
+        FakeProcess.started.append(self)
+        self.role = arguments[0]
+        self.ended = False
+        self._said = False
+
+    def messages(self) -> Iterator[bytes]:
+        if self.role == "state":
+            yield ArmState(time.monotonic(), 0.0, ZEROS, ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL,
+                           PLAYING).packed()
+        elif not self._said:
+            self._said = True
+            yield READY
+
+    def end(self, patience_s: float = 0.0) -> None:
+        self.ended = True
+
+
+@pytest.fixture
+def link(monkeypatch: pytest.MonkeyPatch) -> Iterator[RtdeLink]:
+    FakeProcess.started, FakeProcess.refused = [], None
+    monkeypatch.setattr(rtde_link, "ChildProcess", FakeProcess)
+    monkeypatch.setattr(rtde_link, "_RETRY_S", 0.05)
+    made = RtdeLink(LinkSettings("nowhere", timeout_s=5.0))
+    yield made
+    made.close()
+
+
+def until(link: RtdeLink, condition: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline_s, link.lost
+        link.poll()
+        time.sleep(0.002)
+
+
+def test_a_process_that_cannot_be_started_is_told_and_tried_again(link: RtdeLink) -> None:
+    FakeProcess.refused = OSError(24, "Too many open files")
+    link.connect()
+    link.request_program()
+    until(link, lambda: "cannot be started: [Errno 24] Too many open files" in link.lost)
+    FakeProcess.refused = None
+    until(link, lambda: link.commanding)
+    assert link.lost == ""
+
+
+def test_a_program_asked_for_at_once_after_it_was_given_up_is_a_new_one(link: RtdeLink) -> None:
+    link.connect()
+    link.request_program()
+    until(link, lambda: link.commanding)
+    link.drop_program("the program on the arm was stopped")
+    link.request_program()
+    until(link, lambda: link.commanding)
+    controls = [process for process in FakeProcess.started if process.role == "control"]
+    assert [process.ended for process in controls] == [True, False]
