@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import math
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,6 +26,7 @@ from modular_framework_control.trajectory_goal import TrajectoryGoal, Trajectory
 from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
+from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
 
 PERIOD_S = 0.008
@@ -217,3 +220,20 @@ def test_wrong_parameters_are_an_error_that_says_so(caplog: pytest.LogCaptureFix
     with caplog.at_level(logging.ERROR):
         assert not EzGripperRobotHW().init(root, root.child("hand"))
     assert "/port_name: got ''" in caplog.text
+
+
+@pytest.mark.parametrize(("max_effort", "torque"), [
+    (0.0, 400), (-1.0, 400), (math.nan, 400), (0.5, 400), (1.0, 800), (3.0, 800), (sys.float_info.max, 800),
+    (math.inf, 800)])
+def test_whatever_effort_is_allowed_becomes_a_torque_the_servo_knows(
+        line: DynamixelLine, monkeypatch: pytest.MonkeyPatch, max_effort: float, torque: int) -> None:
+    robot_hw = EzGripperRobotHW()
+    root = MappingNodeHandle({"hand": {"port_name": str(line.link)}})
+    monkeypatch.setattr(EzGripperRobotHW, "_wait_until_ready", lambda *_: True)
+    monkeypatch.setattr(EzGripper, "start", lambda _: None)
+    asked: list[int] = []
+    monkeypatch.setattr(EzGripper, "command", lambda _, position, torque: asked.append(torque))
+    assert robot_hw.init(root, root.child("hand"))
+    robot_hw.get(PositionJointInterface).handles[0].max_effort = max_effort
+    robot_hw.write(0.0, PERIOD_S)
+    assert asked == [torque]

@@ -102,9 +102,9 @@ class EzGripperRobotHW(RobotHW):
 
     def _torque(self) -> int:
         """The greatest torque the controller allows [units of the servo]."""
-        if self._handle.max_effort <= 0.0:
+        if not self._handle.max_effort > 0.0:
             return self._default_torque
-        return min(FULL_TORQUE, round(self._handle.max_effort / self._full_effort * FULL_TORQUE))
+        return round(min(1.0, self._handle.max_effort / self._full_effort) * FULL_TORQUE)
 
     def fault(self) -> str:
         return self._gripper.state().fault if self._gripper is not None else ""
