@@ -18,7 +18,10 @@ def port() -> Iterator[int]:
     def fail() -> None:
         raise ValueError("not today")
 
-    server = CommandPort({"add": add, "fail": fail})
+    def write() -> None:
+        raise OSError(28, "No space left on device")
+
+    server = CommandPort({"add": add, "fail": fail, "write": write})
     server.connect()
     yield server.port
     server.close()
@@ -31,11 +34,12 @@ def test_a_command_gets_its_arguments_as_values(port: int) -> None:
 
 
 @pytest.mark.parametrize(("command", "arguments", "reason"), [
-    ("divide", {}, "unknown command 'divide'; known: help, add, fail"),
+    ("divide", {}, "unknown command 'divide'; known: help, add, fail, write"),
     ("add", {}, "missing a required argument: 'one'"),
     ("add", {"one": 1, "third": 2}, "unexpected keyword argument 'third'"),
     ("add 3", {}, "arguments are written key=value"),
     ("fail", {}, "fail: not today"),
+    ("write", {}, "No space left on device"),
     ("", {}, "help"),
 ])
 def test_what_cannot_be_done_is_answered_with_the_reason(port: int, command: str, arguments: dict[str, object],

@@ -161,3 +161,24 @@ def test_the_link_does_not_replace_a_file(make_line: MakeLine, tmp_path: Path) -
     (tmp_path / "gripper0").write_text("mine")
     with pytest.raises(OSError, match="exists and is no link"):
         make_line()
+
+
+def test_a_line_that_nobody_reads_loses_what_it_cannot_hold_and_goes_on(line: DynamixelLine) -> None:
+    port, packets = sdk_port(line), PacketHandler(1.0)
+    line.garbage(3_000)
+    for asked in range(1, 11):
+        port.writePort(bytes((0xff, 0xff, 1, 2, 1, 0xfb)))
+        until = time.monotonic() + 5.0
+        while line.instructions < asked and time.monotonic() < until:
+            time.sleep(0.002)
+    time.sleep(3_000 * 10.0 / 57600 + 0.1)    # until the last answer was on the wire
+    line.clear()
+    port.clearPort()
+    assert packets.ping(port, 1) == (310, COMM_SUCCESS, 0)
+    port.closePort()
+
+
+@pytest.mark.parametrize("fault", ["garbage", "lose", "corrupt", "delay"])
+def test_a_fault_of_less_than_nothing_is_refused(line: DynamixelLine, fault: str) -> None:
+    with pytest.raises(ValueError, match="=-1: expected a number of at least 0"):
+        line.commands[fault](-1)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Takes orders for an emulator from outside, so that tests and people can make it fail on command.
 
-Text lines over TCP, on the loopback interface only: `command key=value ...`; one line is the answer to each, `ok ...`
-or `error ...`. `help` lists the commands. From a shell: `echo unplug | nc 127.0.0.1 29900`.
+Text lines over TCP, on the loopback interface if no other is given: `command key=value ...`; one line is the answer to
+each, `ok ...` or `error ...`. `help` lists the commands. From a shell: `echo unplug | nc 127.0.0.1 29900`.
 """
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def run_command(commands: Mapping[str, Command], line: str) -> str:
         raise CommandError(f"{name}: {error}; expected {name}{inspect.signature(commands[name])}") from error
     try:
         return commands[name](**arguments) or ""
-    except (ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError) as error:
         raise CommandError(f"{name}: {error}") from error
 
 

@@ -146,19 +146,19 @@ class DynamixelLine:
 
     def garbage(self, count: int = 8) -> None:
         """Puts so many random bytes before each answer."""
-        self.faults.garbage = int(count)
+        self.faults.garbage = int(_at_least_0("count", count))
 
     def delay(self, seconds: float) -> None:
         """Makes answers late."""
-        self.faults.delay_s = float(seconds)
+        self.faults.delay_s = float(_at_least_0("seconds", seconds))
 
     def lose(self, every: int = 1) -> None:
         """Loses each so manieth answer."""
-        self.faults.lose_every = int(every)
+        self.faults.lose_every = int(_at_least_0("every", every))
 
     def corrupt(self, every: int = 1) -> None:
         """Flips a bit in each so manieth answer."""
-        self.faults.corrupt_every = int(every)
+        self.faults.corrupt_every = int(_at_least_0("every", every))
 
     def change_id(self, new: int) -> None:
         """Gives the first servo another id."""
@@ -252,7 +252,14 @@ class DynamixelLine:
 
     def _send(self, now_s: float) -> None:
         while self._answers and self._answers[0][0] <= now_s:
-            os.write(self._master, heapq.heappop(self._answers)[2])
+            with suppress(BlockingIOError):  # nobody reads: lost, as on a wire
+                os.write(self._master, heapq.heappop(self._answers)[2])
+
+
+def _at_least_0(name: str, value: float) -> float:
+    if not value >= 0:
+        raise ValueError(f"{name}={value}: expected a number of at least 0")
+    return value
 
 
 def _describe(finger: Finger) -> str:
