@@ -251,6 +251,20 @@ def test_the_velocity_wanted_of_a_slowed_robot_is_as_much_lower(start: Callable[
     assert joint.command_acceleration == pytest.approx((joint.command_velocity - velocity) / loop.period_s, rel=0.05)
 
 
+@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0])
+def test_what_a_robot_is_asked_to_do_later_allows_for_how_slowly_it_moves(start: Callable[..., Any],
+                                                                          factor: float) -> None:
+    loop = start("pos_vel_acc")
+    send(loop, (1.0, (1.0, 0.0)))
+    loop.run(0.2)
+    loop.robot_hw.scaling.factor = factor
+    loop.run(0.1)
+    foretold = loop.controllers["c"].desired_at(loop.time_s + 0.19)
+    loop.run(0.2)
+    joint = loop.robot_hw.joints[0]
+    assert foretold[:, 0] == pytest.approx([joint.command, joint.command_velocity, joint.command_acceleration])
+
+
 @pytest.mark.parametrize("factor", [0.0, 0.5])
 def test_cancel_of_a_slowed_goal_does_not_move_the_robot_further_than_it_would_roll(start: Callable[..., Any],
                                                                                     factor: float) -> None:

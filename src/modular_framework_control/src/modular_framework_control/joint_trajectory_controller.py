@@ -24,10 +24,8 @@ from modular_framework_control.node_handle import NodeHandle, read_bool, read_na
 from modular_framework_control.rates import next_due, period_of
 from modular_framework_control.robot_hw import speed_scaling_handles
 from modular_framework_control.trajectory import (
-    ACCELERATION,
     POSITION,
     SHORTEST_SEGMENT_S,
-    VELOCITY,
     Array,
     InvalidTrajectoryError,
     Spline,
@@ -143,19 +141,19 @@ class JointTrajectoryController(Controller):
         self._mailbox.append(ticket)
 
     def desired_at(self, time_s: float) -> Array:
-        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), as if a robot that is slowed
-        went on at full speed.
+        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), if the robot lets itself be
+        moved as fast as now.
 
         Raises:
             ControllerError: the controller does not run, or the motion that far back is forgotten.
         """
         if not self._running:
             raise ControllerError("the controller is not running; nothing is desired")
-        asked_s, known_from_s = self._clock.at(time_s), self._plan.known_from_s
-        if known_from_s is None or asked_s < known_from_s - SHORTEST_SEGMENT_S:
-            raise ControllerError(f"got {time_s:.9g} s, which is before the motion under way began; ask for times from "
-                                  f"{time_s - asked_s + (known_from_s or 0.0):.9g} s on")
-        return self._plan.sample(asked_s)
+        asked_s, known_from_s = self._clock.expected_at(time_s), self._plan.known_from_s
+        if known_from_s is not None and asked_s < known_from_s - SHORTEST_SEGMENT_S:
+            raise ControllerError(f"got {time_s:.9g} s, which is before the motion under way began, by "
+                                  f"{known_from_s - asked_s:.6g} s of its trajectory; ask for a later time")
+        return self._clock.slowed(self._plan.sample(asked_s))
 
     # ---- control loop ----
 
@@ -203,12 +201,9 @@ class JointTrajectoryController(Controller):
         self._work_off_mailbox()
         if self._fault:
             self._rest()
-        now_s, rate = self._clock.now_s, self._clock.rate
+        now_s = self._clock.now_s
         self._plan.forget_before(now_s)
-        desired = self._plan.sample(now_s)
-        if rate != 1.0:
-            desired[VELOCITY] *= rate
-            desired[ACCELERATION] *= rate * rate
+        desired = self._clock.slowed(self._plan.sample(now_s))
         error = desired[:2] - self._actual
         if self._any_continuous:
             turned = error[POSITION, self._continuous]

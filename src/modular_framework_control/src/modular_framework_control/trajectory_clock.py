@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from modular_framework_control.hardware_interface import SpeedScalingHandle
+from modular_framework_control.trajectory import ACCELERATION, VELOCITY, Array
 
 RISE_PER_S = 2.0
 
@@ -51,6 +52,17 @@ class TrajectoryClock:
     def at(self, loop_s: float) -> float:
         """Its time [s] at another time of the loop [s], if it ran at full rate from now to then."""
         return loop_s - self._lag_s
+
+    def expected_at(self, loop_s: float) -> float:
+        """Its time [s] at another time of the loop [s], if it ran at the rate of now all along."""
+        return self.now_s + self.rate * (self.at(loop_s) - self.now_s) if self.rate != 1.0 else self.at(loop_s)
+
+    def slowed(self, planned: Array) -> Array:
+        """The planned state, shape (3, joints), with the velocities and accelerations of now; `planned` is changed."""
+        if self.rate != 1.0:
+            planned[VELOCITY] *= self.rate
+            planned[ACCELERATION] *= self.rate * self.rate
+        return planned
 
     def _allowed(self) -> float:
         return min((min(max(0.0, handle.factor), 1.0) for handle in self._handles), default=1.0)
