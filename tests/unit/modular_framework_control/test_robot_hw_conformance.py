@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 
@@ -128,43 +128,49 @@ class TestEzGripper(RobotHWConformance):
     settle_s = 0.6
     real_time = True
     close_after_test = False
-    gripper: ClassVar[EzGripperRobotHW]
+    robot_hw: ClassVar[RobotHW]
 
     @pytest.fixture(autouse=True, scope="class")
     @classmethod
-    def gripper_of_all(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    def robot_hw_of_all(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         finger = Finger(DynamixelServo(), FingerModel(top_speed=12000.0, time_constant_s=0.015), opening=200.0)
         line = DynamixelLine([finger], tmp_path_factory.mktemp("line") / "gripper")
         line.connect()
-        root = MappingNodeHandle({"hand": {"port_name": str(line.link), "start_position": 1.7}})
-        robot_hw = cls.gripper = EzGripperRobotHW()
-        assert robot_hw.init(root, root.child("hand"))
+        cls.robot_hw = cls.initialised({"port_name": str(line.link), "start_position": 1.7})
         yield
-        robot_hw.close()
-        robot_hw.close()
+        cls.robot_hw.close()
+        cls.robot_hw.close()
         line.close()
 
+    @classmethod
+    def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
+        """The hardware, with these parameters of the gripper."""
+        root = MappingNodeHandle({"hand": gripper})
+        robot_hw = EzGripperRobotHW()
+        assert robot_hw.init(root, root.child("hand"))
+        return robot_hw
+
     def make_robot_hw(self) -> RobotHW:
-        return self.gripper
+        return self.robot_hw
 
     def limits(self) -> Mapping[str, JointLimits]:
         return {JOINT: JointLimits(0.0, 1.94)}
 
 
-class TestCombination(RobotHWConformance):
-    """An arm and a gripper as one robot."""
+class TestCombination(TestEzGripper):
+    """An arm and a gripper of two kinds as one robot: the one fake, the other with its emulated servo."""
 
-    settle_s = 0.2
-
-    def make_robot_hw(self) -> CombinedRobotHW:
+    @classmethod
+    def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
         root = MappingNodeHandle({
-            "robot_hardware": ["arm", "gripper"],
+            "robot_hardware": ["arm", "hand"],
             "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
-            "gripper": {"type": "lab/Mock", "joints": ["finger"]},
-            "joint_limits": dict.fromkeys(("shoulder", "elbow", "finger"), LIMITED)})
-        robot_hw = CombinedRobotHW(lambda name: {"lab/Mock": MockRobotHW}[name]())
+            "hand": {"type": "lab/Hand", **gripper},
+            "joint_limits": dict.fromkeys(("shoulder", "elbow"), LIMITED)})
+        kinds: dict[str, type[RobotHW]] = {"lab/Mock": MockRobotHW, "lab/Hand": EzGripperRobotHW}
+        robot_hw = CombinedRobotHW(lambda name: kinds[name]())
         assert robot_hw.init(root, root)
         return robot_hw
 
     def limits(self) -> Mapping[str, JointLimits]:
-        return dict.fromkeys(("shoulder", "elbow", "finger"), JointLimits(-1.0, 1.0, 2.0))
+        return {**super().limits(), **dict.fromkeys(("shoulder", "elbow"), JointLimits(-1.0, 1.0, 2.0))}
