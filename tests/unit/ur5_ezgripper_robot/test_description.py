@@ -4,6 +4,7 @@
 import math
 import os
 import re
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -149,11 +150,20 @@ def test_pybullet_loads_the_stated_masses(urdf_with_paths: str, tmp_path: os.Pat
     assert total == pytest.approx(sum(link.inertial.mass for link in links if link.inertial), rel=1e-6)
 
 
-def test_the_controller_file_drives_the_joints_that_have_transmissions() -> None:
-    path = os.path.join(rospkg.RosPack().get_path("ur5_ezgripper_robot"), "controllers",
-                        "ur5_ezgripper_controller_simulation.yaml")
+def controllers_of(name: str) -> Any:
+    path = os.path.join(rospkg.RosPack().get_path("ur5_ezgripper_robot"), "controllers", name)
     with open(path, encoding="utf-8") as file:
-        controllers = yaml.safe_load(file)
+        return yaml.safe_load(file)
+
+
+def test_the_arm_has_the_same_controllers_when_the_gripper_has_none() -> None:
+    both = controllers_of("ur5_ezgripper_controller_simulation.yaml")
+    del both["ezgripper_controller"]
+    assert controllers_of("ur5_controller.yaml") == both
+
+
+def test_the_controller_file_drives_the_joints_that_have_transmissions() -> None:
+    controllers = controllers_of("ur5_ezgripper_controller_simulation.yaml")
     types = {name: values["type"] for name, values in controllers.items()}
     assert types == {"joint_state_controller": "joint_state_controller/JointStateController",
                      "arm_trajectory_controller": "position_controllers/JointTrajectoryController",
