@@ -50,6 +50,7 @@ def test_times_lists_bytes_and_truth_come_back(tmp_path):
     back = read(written(tmp_path, state), state)
     assert (back.header, back.name, back.position) == (state.header, state.name, state.position)
     assert list(back.velocity) == list(state.velocity)
+    assert read(written(tmp_path, String("null")), String("null")).data == "null"
     image = CompressedImage(data=b"\x00\xff7")
     assert bytes(read(written(tmp_path, image), image).data) == image.data
     assert read(written(tmp_path, Bool(True)), Bool(True)).data is True
@@ -71,8 +72,18 @@ def test_a_file_written_by_hand_is_read(tmp_path):
     assert (named["home"].name, named["home"].position, anonymous) == (["a"], [1], [])
 
 
+def test_messages_written_by_hand_may_leave_fields_out_and_list_them_in_order(tmp_path):
+    path = tmp_path / "hand.yaml"
+    path.write_text("kind: thing\nanonymous:\n- {header: {stamp: {secs: 3}}}\n- {header: [7, 2000000000, world]}\n")
+    first, second = (state.header for state in message_files.load(path, "thing", JointState)[1])
+    assert (first.seq, first.stamp, first.frame_id) == (0, rospy.Time(3), "")
+    assert (second.seq, second.stamp, second.frame_id) == (7, rospy.Time(2), "world")
+
+
 @pytest.mark.parametrize("value", ["{position: [a]}", "{name: 5}", "{position: 1.0}", "{header: {seq: 1.5}}",
-                                   "{header: {seq: -1}}", "{name: abc}", "[1, 2]"])
+                                   "{header: {seq: -1}}", "{name: abc}", "[1, 2]", "[]", "{joint: [a]}",
+                                   "{position: null}", "{header: {stamp: {secs: -1, nsecs: 0}}}",
+                                   "{header: {stamp: {secs: 1, hours: 2}}}"])
 def test_a_value_of_another_type_is_refused_by_name(tmp_path, value):
     path = tmp_path / "wrong.yaml"
     path.write_text(f"kind: thing\nnamed: {{good: {{}}, bad: {value}}}\n")

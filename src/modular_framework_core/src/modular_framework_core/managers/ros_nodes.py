@@ -23,17 +23,24 @@ from modular_framework_core.managers.ros_named_files import (
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
 
 JOINT_STATE_SERVICE_TIMEOUT_S = 30.0
+TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
 
 
 def start(node_name: str) -> list[str]:
-    """Starts a node and returns its arguments without the remappings of ROS."""
+    """Starts a node and returns its arguments without the remappings of ROS; an empty one may stand for a missing one.
+
+    rospy asks the master for the parameter of the topics in the log at every line, as long as nobody has set it: half a
+    request's time. Where it is not set it gets the value that has the same meaning.
+    """
     rospy.init_node(node_name)
-    return [argument for argument in rospy.myargv(sys.argv)[1:] if argument]
+    if not rospy.has_param(TOPICS_IN_LOG_PARAMETER):
+        rospy.set_param(TOPICS_IN_LOG_PARAMETER, False)
+    return list(rospy.myargv(sys.argv)[1:])
 
 
 def run_message_manager(kind: MessageKind, node_name: str) -> None:
     """Runs the manager of one kind of message; argument: optional file of named messages, where the kind has such."""
-    arguments = start(node_name)
+    arguments = [argument for argument in start(node_name) if argument]
     readers = {kinds.JOINT_STATE: read_joint_states, kinds.POSE: read_poses, kinds.ROBOT_POSE: read_robot_poses}
     if kind is kinds.TRAJECTORY and arguments:
         readers[kind] = trajectory_reader(lookup_over_service(JOINT_STATE_SERVICE_TIMEOUT_S))
@@ -63,8 +70,7 @@ def run_all() -> None:
     parameters ``~named_joint_states_file``, ``~named_trajectories_file`` and ``~named_poses_file`` do the same. The
     file of poses may be missing: older configurations have none.
     """
-    rospy.init_node("managers")
-    arguments = [*rospy.myargv(sys.argv)[1:], "", "", ""]
+    arguments = [*start("managers"), "", "", ""]
     files = [str(rospy.get_param(f"~named_{name}_file", argument)) for name, argument in
              zip(("joint_states", "trajectories", "poses"), arguments, strict=False)]
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import yaml
 
+_NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: nobody asks for its tag
+
 
 class EntryError(ValueError):
     """One entry of a configuration file cannot be used.
@@ -129,7 +131,7 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         EntryError: The file cannot be read, is no YAML, or its top level is no mapping.
     """
     try:
-        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=_NODES)
     except (OSError, UnicodeDecodeError) as error:
         raise EntryError(path, 1, f"cannot be read ({error}); give the path of a readable YAML file") from error
     except yaml.MarkedYAMLError as error:
