@@ -86,6 +86,22 @@ def test_what_a_paused_arm_was_commanded_meanwhile_is_not_caught_up_with_in_a_ju
     assert way[-1] == pytest.approx([0.3] * 6)
 
 
+@pytest.mark.parametrize("pause_s", [0.1, 0.45, 3600.0])
+def test_a_cycle_that_comes_late_is_caught_up_with_as_fast_as_the_arm_may(hw: UrArmHardware, pause_s: float) -> None:
+    link = FakeLink.made
+    run(hw, 10, lambda cycle: 0.0)
+    link.sent.clear()
+    hw.read(0.0, pause_s)
+    for handle in hw.get(PositionJointInterface).handles:
+        handle.command = 0.45
+    hw.write(0.0, pause_s)
+    assert max(link.sent[0]) <= 40.0 * 0.05 * 0.05 * 1.001, "no more than the arm may do in a twentieth of a second"
+    run(hw, 100, lambda cycle: 0.45)
+    way = np.array(link.sent)
+    assert np.abs(np.diff(way, axis=0)).max() <= np.pi * PERIOD_S * 1.001
+    assert way.max() <= 0.45 + 1e-3 and way[-1] == pytest.approx([0.45] * 6)
+
+
 class FakeProcess:
     """A helper process that is ready at once, or cannot be started."""
 

@@ -27,6 +27,8 @@ LOGGER = logging.getLogger("rosout.ur_arm")
 JOINT_NAMES = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint",
                "wrist_3_joint")
 _PERIOD_SMOOTHING = 0.02
+_SHORTEST_PERIOD_S = 0.002
+_LONGEST_PERIOD_S = 0.05    # what was to be done in a cycle that came later is caught up with, not done at once
 _CAUSE_S = 0.03      # so much later than the end of its program a state of the arm tells why [s]
 
 
@@ -140,8 +142,9 @@ class UrArmHardware(RobotHW):
         if self._link.state is None or self._link.state.runtime_state != PROGRAM_PLAYING:
             self._begin_where_it_is(self._check)    # a paused arm goes on from where it stands, not from what it missed
             return
+        period_s = min(period_s, _LONGEST_PERIOD_S)
         if period_s > 0.0:
-            self._servo_time_s += _PERIOD_SMOOTHING * (min(max(period_s, 0.002), 0.05) - self._servo_time_s)
+            self._servo_time_s += _PERIOD_SMOOTHING * (max(period_s, _SHORTEST_PERIOD_S) - self._servo_time_s)
         refused = self._check.admit([handle.command for handle in self._handles], period_s)
         if refused and refused != self._refused:
             LOGGER.error("command refused: %s", refused)
