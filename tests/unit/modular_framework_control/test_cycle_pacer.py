@@ -95,6 +95,21 @@ def test_what_the_system_does_not_permit_is_said_with_the_remedy(monkeypatch: py
     assert "rtprio" in refused[0] and "64 kB" in refused[1] and "memlock" in refused[1]
 
 
+def test_a_thread_that_ends_meanwhile_does_not_keep_the_loop_from_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[int, int] = {}
+
+    def schedule(thread: int, policy: int, parameters: os.sched_param) -> None:
+        if thread == 12:
+            raise ProcessLookupError(3, "No such process")
+        given[thread] = parameters.sched_priority
+
+    monkeypatch.setattr(os, "listdir", lambda folder: ["11", "12", "13"])
+    monkeypatch.setattr(os, "sched_setscheduler", schedule)
+    monkeypatch.setattr(real_time, "_lock_memory", lambda: "")
+    assert real_time.run_in_real_time() == []
+    assert given == {11: real_time.HELPER_PRIORITY, 13: real_time.HELPER_PRIORITY, 0: real_time.PRIORITY}
+
+
 def test_ten_thousand_cycles_with_moving_controllers_use_up_no_memory(make_loop: Callable[..., Any]) -> None:
     names = [f"j{i}" for i in range(12)]
     loop = make_loop({"hw": {"joints": names},

@@ -171,6 +171,12 @@ def test_every_part_is_closed_though_one_raises(loop: Any, caplog: pytest.LogCap
     assert "hardware 'gripper': close() raised OSError" in caplog.text
 
 
+def test_the_fault_of_a_combination_is_that_of_its_parts(loop: Any) -> None:
+    assert loop.robot_hw.fault() == ""
+    loop.arm.text, loop.gripper.text = "link lost", "too hot"
+    assert loop.robot_hw.fault() == "hardware 'arm': link lost; hardware 'gripper': too hot"
+
+
 def test_single_hardware_tells_of_all_its_commanded_joints() -> None:
     robot_hw = Fragile()
     assert list(robot_hw.faults()) == []

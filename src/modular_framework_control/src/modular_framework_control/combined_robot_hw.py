@@ -91,6 +91,9 @@ class CombinedRobotHW(RobotHW):
             except Exception as error:  # a user's hardware may raise anything; the others must be closed all the same
                 LOGGER.exception("hardware '%s': close() raised %s: %s", part.name, type(error).__name__, error)
 
+    def fault(self) -> str:
+        return "; ".join(fault.reason for fault in self.faults())
+
     def faults(self) -> Sequence[HardwareFault]:
         if self._raised:
             return [*self._raised_faults(), *self._told_faults()]

@@ -6,6 +6,7 @@ fraction of a cycle, and what exists when the loop begins is never looked throug
 """
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -37,7 +38,8 @@ def run_in_real_time() -> list[str]:
     refused = []
     try:
         for thread in os.listdir("/proc/self/task"):
-            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(HELPER_PRIORITY))
+            with contextlib.suppress(ProcessLookupError):   # it has ended meanwhile
+                os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(HELPER_PRIORITY))
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:
         refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "
