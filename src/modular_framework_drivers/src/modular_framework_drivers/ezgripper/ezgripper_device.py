@@ -152,7 +152,7 @@ class EzGripper:
             self._calm_down()
         except Exception:
             LOGGER.exception("%s: unexpected error; the gripper is out of use", self.settings.name)
-            self._report("internal error; see the log")
+            self._report("internal error, told in the log; the gripper is out of use until the node is started again")
         finally:
             self._bus.close()
 
