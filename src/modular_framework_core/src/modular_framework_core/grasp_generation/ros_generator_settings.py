@@ -27,7 +27,7 @@ class GeneratorSettings:
         max_grasps: Greatest number of grasps to store (``~max_grasps``).
         max_checks: Greatest number of grasps whose reachability is checked (``~max_checks``).
         check_reachability: Whether inverse kinematics must have a solution at every stage (``~check_reachability``).
-        scene_timeout_s: Wait for an object before failure is signalled [s] (``~scene_timeout``).
+        scene_timeout_s: Wait for an object before failure is signalled [s of the ROS clock] (``~scene_timeout``).
         top_down: What counts as a usable grasp.
     """
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections import Counter
 from typing import Any
 
 import rospy
-from moveit_msgs.msg import PlanningSceneComponents
+from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
+from modular_framework_core.grasp_generation.patience import Patience
 from modular_framework_core.grasp_generation.planning_scene_objects import (
     CropBox,
     SceneObject,
@@ -33,6 +33,7 @@ SIGNAL_TOPIC = "grasp_generated"
 SERVICE_TIMEOUT_S = 10.0
 START_TIMEOUT_S = 60.0
 SCENE_PERIOD_S = 0.25
+WAITING_PERIOD_S = 10.0
 
 
 class NoGraspError(RuntimeError):
@@ -79,48 +80,72 @@ class TopDownGraspGenerator:
         self._service = rospy.Service("~generate", Trigger, self._on_demand)
 
     def watch(self) -> None:
-        """Generates once for each object that appears, also when it was there before, until ROS shuts down."""
-        deadline = time.monotonic() + read_settings().scene_timeout_s
+        """Generates once for each object that appears, also when it was there before, until ROS shuts down.
+
+        What may come right by itself is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
+        there yet, a service that does not answer in time on a busy machine.
+        """
         before: set[str] = set()
-        told = False
+        patience: Patience | None = Patience()  # None: it is known what became of everything that is there
+        scene_was_read = False
         while not rospy.is_shutdown():
             settings = read_settings()
             try:
                 names = {found.name for found in self._candidates(settings)}
                 self._seen &= names
-                new = names - self._seen
-                if new and names == before:
-                    self._seen |= names
-                    self._generate_and_signal(settings)
-                before, told = names, told or bool(new)
-            except NoGraspError as error:
-                before = set()
+                scene_was_read = True
+                if names - self._seen:
+                    patience = patience or Patience()
+                    if names == before:
+                        self._signal_grasps(settings)
+                        self._seen |= names
+                        patience = None
+                before = names
+            except (NoObjectError, CallError, CommanderError) as error:
                 if isinstance(error, NoObjectError):
                     self._seen.clear()
-                if not told and time.monotonic() > deadline:
-                    self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s)")
-                    told = True
+                    if patience and not scene_was_read:
+                        patience, scene_was_read = Patience(), True
+                if patience and self._gives_up(error, patience, settings):
+                    self._seen |= before
+                    patience = None
+                before = set()
             rospy.rostime.wallsleep(SCENE_PERIOD_S)
 
+    def _gives_up(self, error: Exception, patience: Patience, settings: GeneratorSettings) -> bool:
+        """Signals failure when what is missing has been waited for long enough; tells what it is until then."""
+        if patience.is_used_up(rospy.get_time(), settings.scene_timeout_s):
+            self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s of the ROS clock)")
+            return True
+        rospy.loginfo_throttle(WAITING_PERIOD_S, f"top_down_grasp_generator: waiting, for {error}.")
+        return False
+
     def _on_demand(self, request: Any) -> TriggerResponse:
-        success, text = self._generate_and_signal(read_settings())
-        return TriggerResponse(success, text)
-
-    def _generate_and_signal(self, settings: GeneratorSettings) -> tuple[bool, str]:
-        with self._generating:  # a request by service may come while an object is looked at
-            return self._generate_once(settings)
-
-    def _generate_once(self, settings: GeneratorSettings) -> tuple[bool, str]:
         try:
-            grasps = self._generate(settings)
-            for number, grasp in enumerate(grasps, start=1):
-                self._store(grasp, f"{settings.name_prefix}{number}" if settings.name_prefix else "")
-            text = f"{len(grasps)} grasps of {sorted({grasp.object_id for grasp in grasps})} were stored"
-            self._publish(True, text)
-            return True, text
+            return TriggerResponse(*self._signal_grasps(read_settings()))
         except (NoGraspError, CallError, CommanderError) as error:
             self._publish(False, str(error))
-            return False, str(error)
+            return TriggerResponse(False, str(error))
+
+    def _signal_grasps(self, settings: GeneratorSettings) -> tuple[bool, str]:
+        """Stores grasps and signals it, or signals that what is there cannot be grasped; returns what was signalled.
+
+        Raises:
+            NoObjectError: There is nothing to grasp.
+            CallError, CommanderError: Another node does not answer.
+        """
+        with self._generating:  # a request by service may come while an object is looked at
+            try:
+                grasps = self._generate(settings)
+                for number, grasp in enumerate(grasps, start=1):
+                    self._store(grasp, f"{settings.name_prefix}{number}" if settings.name_prefix else "")
+                success, text = True, f"{len(grasps)} grasps of {sorted({g.object_id for g in grasps})} were stored"
+            except NoObjectError:
+                raise
+            except NoGraspError as error:
+                success, text = False, str(error)
+            self._publish(success, text)
+            return success, text
 
     def _publish(self, success: bool, text: str) -> None:
         (rospy.loginfo if success else rospy.logerr)("top_down_grasp_generator: %s.", text)
@@ -168,6 +193,8 @@ class TopDownGraspGenerator:
         seed = self._commander.current_joints() | dict(zip(posture.name, posture.position, strict=True))
         for stage in ("pregrasp", "grasp", "postgrasp"):
             result = self._commander.solve_ik(getattr(grasp, stage).pose, seed)
+            if result.error_code == MoveItErrorCodes.COMMUNICATION_FAILURE:
+                raise CallError(result.reason)
             if not result:
                 return f"at the {stage} pose, {result.reason}"
             seed = seed | result.joints
@@ -193,7 +220,7 @@ class TopDownGraspGenerator:
 
         Raises:
             NoObjectError: There is none.
-            NoGraspError: move_group does not answer.
+            CallError: move_group does not answer.
         """
         objects = self._scene_objects()
         if settings.object_name:
@@ -212,10 +239,7 @@ class TopDownGraspGenerator:
     def _scene_objects(self) -> list[SceneObject]:
         components = PlanningSceneComponents(components=PlanningSceneComponents.WORLD_OBJECT_NAMES |
                                              PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
-        try:
-            answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
-        except CallError as error:
-            raise NoGraspError(str(error)) from error
+        answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
         objects = []
         for message in answer.scene.world.collision_objects:
             try:
