@@ -47,8 +47,10 @@ class WaitForSignal(FrameworkState):
         """Waits for a signal that was not read yet."""
         if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
             publishers = self._subscribers[0].get_num_connections()
-            return self.fail(f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s "
-                             f"({publishers} publishers are connected)")
+            hint = (f"the log of its {publishers} publishers says what they wait for" if publishers else
+                    "no node publishes it, start the one that does")
+            return self.fail(f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s; "
+                             f"{hint}")
         with self._lock:
             signal, self._signal = self._signal, None
         if signal:
