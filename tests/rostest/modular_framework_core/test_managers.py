@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import pytest
 import rospy
@@ -311,3 +312,13 @@ def test_poses_of_the_file_are_poses_of_things_and_of_robots(managers):
     assert [item.position.x for item in robot.pose_array.poses] == [0.1, 0.2]
     assert robot.pose_array.header.frame_id == "base"
     assert "poses.yaml:5" in managers.log()
+
+
+def test_a_line_of_the_log_asks_the_master_nothing(managers, monkeypatch):
+    rospy.loginfo("the first line may ask for the parameter, which is remembered")
+    calls = []
+    ask = ServerProxy._ServerProxy__request
+    monkeypatch.setattr(ServerProxy, "_ServerProxy__request", lambda *call: calls.append(call[1]) or ask(*call))
+    rospy.loginfo("another line")
+    assert calls == []
+    assert rospy.get_param("/rosout_disable_topics_generation") is False  # topics are still named in every line
