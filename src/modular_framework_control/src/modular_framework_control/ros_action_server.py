@@ -18,19 +18,33 @@ Submit = Callable[[Any, GoalTicket[Any]], None]
 MakeResult = Callable[[GoalTicket[Any]], Any]
 
 # actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
-REFUSAL_DELAY_S = 0.05
+EARLIEST_END_S = 0.05
 
 
 class SteadyActionServer(ActionServer):
-    """An action server whose status topic survives a reset of the simulated clock."""
+    """An action server whose status topic survives a reset of the simulated clock, and whose clients hear of every end.
+
+    A goal that ends at once is told so EARLIEST_END_S after it came.
+    """
 
     def initialize(self) -> None:
+        self._came_s: dict[str, float] = {}
         super().initialize()
         timer: rospy.Timer | None = getattr(self, "status_timer", None)
         if timer is not None:
             timer.shutdown()
             period = rospy.Duration(1.0 / self.status_frequency)
             self.status_timer = rospy.Timer(period, self.publish_status_async, reset=True)
+
+    def internal_goal_callback(self, goal: Any) -> None:
+        self._came_s[goal.goal_id.id] = time.monotonic()
+        super().internal_goal_callback(goal)
+
+    def publish_result(self, status: Any, result: Any) -> None:
+        came_s = self._came_s.pop(status.goal_id.id, None)
+        if came_s is not None:
+            time.sleep(max(0.0, came_s + EARLIEST_END_S - time.monotonic()))
+        super().publish_result(status, result)
 
     def publish_status(self) -> None:
         try:
@@ -88,12 +102,10 @@ class ControllerActionServer:
         except GoalRefusedError as error:
             del self._goals[ticket]
             rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)
-            time.sleep(REFUSAL_DELAY_S)
             goal.set_rejected(error.result, str(error))
         except Exception as error:  # whatever is in the message, its sender gets an answer
             del self._goals[ticket]
             rospy.logerr("%s: goal rejected: %s: %s", self._server.ns, type(error).__name__, error)
-            time.sleep(REFUSAL_DELAY_S)
             goal.set_rejected(None, f"{type(error).__name__}: {error}")
 
     def _on_cancel(self, goal: ServerGoalHandle) -> None:
