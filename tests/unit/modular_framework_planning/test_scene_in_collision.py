@@ -6,13 +6,14 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.padding import Padding, uniform_padding
 from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Octree, Sphere
+from modular_framework_planning.shapes import Box, Mesh, Octree, Shape, Sphere
 from modular_framework_planning.sight_mask import bodies_in_scene
 from modular_framework_planning.voxel_map import empty_map
 
@@ -96,3 +97,22 @@ def test_voxels_are_obstacles_that_an_entry_for_the_octomap_allows(scene: Planni
     assert is_free(blocked.with_octomap(None)) and is_free(scene.with_octomap(Octree(empty_map(0.05))))
     away = pin.SE3(np.eye(3), np.array([0.0, 0.0, 2.0]))
     assert is_free(scene.with_octomap(Octree(seen), away)), "the map stands where its origin is"
+
+
+BOX_LINK_URDF = """<robot name="box"><link name="base"/><link name="arm"><collision><geometry><box size="0.4 0.4 0.4"/>
+</geometry></collision></link><joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint></robot>"""
+BOX_LINK_SRDF = '<robot name="box"><group name="arm"><joint name="turn"/></group></robot>'
+CUBE = trimesh.creation.box((0.05, 0.05, 0.05))
+
+
+@pytest.mark.parametrize("thing", [
+    Box(0.05, 0.05, 0.05), Sphere(0.03), Mesh(np.asarray(CUBE.vertices), np.asarray(CUBE.faces, dtype=np.int64)),
+    Octree(empty_map(0.05).with_look(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING))], ids=lambda item: type(item).__name__)
+def test_a_thing_wholly_inside_a_link_that_is_a_box_collides(thing: Shape) -> None:
+    scene = empty_scene(RobotModel(BOX_LINK_URDF, BOX_LINK_SRDF, {}, lambda name: name))
+    for place, free in ((0.0, False), (0.5, True)):
+        pose = pin.SE3(np.eye(3), np.array([place, 0.0, 0.0]))
+        placed = scene.with_object(CollisionObject("thing", pose, ((thing, pin.SE3.Identity()),)))
+        assert is_free(placed) is free
+        assert bool(CollisionChecker(placed).contacts(scene.positions)) is not free
