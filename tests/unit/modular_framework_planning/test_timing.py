@@ -2,6 +2,8 @@
 """Timed motions keep the limits along the whole curve a controller runs, follow their path and are nearly fastest."""
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -141,6 +143,33 @@ def test_chords_are_told_where_the_curve_leaves_them_and_nowhere_else() -> None:
     assert len(motion.chords(first=rows[2])[0]) == len(chord) - 2
 
 
+def checked_problem(colliding_state: Callable[[np.ndarray, float], np.ndarray | None]) -> SimpleNamespace:
+    class Checker:
+        def contacts(self, _: np.ndarray, include_fixed: bool) -> list[object]:
+            return []
+
+    return SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=Checker(), motion=SimpleNamespace(
+        colliding_state=colliding_state, whole=lambda values: values))
+
+
+def test_last_check_looks_at_every_motion_once() -> None:
+    looked: list[int] = []
+    problem = checked_problem(lambda line, step: looked.append(len(line)))
+    motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
+    others = (motion, replace(motion, times=2.0 * motion.times), replace(motion, accelerations=motion.velocities))
+    check = LastCheck()
+    for number in (1, 2):
+        for other in others:
+            assert check.fault(problem, PlannedPath(other.positions, other)) == ""
+        if number == 1:
+            seen = len(looked)
+            assert seen >= len(others), "points and speeds alone do not make a curve"
+    assert len(looked) == seen
+    problem.checker = checked_problem(problem.motion.colliding_state).checker
+    check.fault(problem, PlannedPath(motion.positions, motion))
+    assert len(looked) > seen, "another world is another question"
+
+
 def test_last_check_sees_a_contact_half_a_milliradian_long() -> None:
     def colliding_state(line: np.ndarray, step: float) -> np.ndarray | None:
         for start, end in zip(line[:-1], line[1:], strict=True):
@@ -152,9 +181,7 @@ def test_last_check_sees_a_contact_half_a_milliradian_long() -> None:
         return None
 
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
-    checker = SimpleNamespace(contacts=lambda positions, include_fixed: [])
-    problem = SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=checker, motion=SimpleNamespace(
-        colliding_state=colliding_state, whole=lambda values: values))
+    problem = checked_problem(colliding_state)
     assert "0.00025 rad steps" in LastCheck().fault(problem, PlannedPath(motion.positions, motion))
     problem.motion.colliding_state = lambda line, step: None
     assert LastCheck().fault(problem, PlannedPath(motion.positions, motion)) == ""

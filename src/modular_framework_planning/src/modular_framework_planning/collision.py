@@ -115,7 +115,7 @@ class CollisionChecker:
             if number >= 0:
                 return number, numbers
         if self._tolerated or self._compiled.uncompiled:
-            for number in range(end, first - 1, -max(1, int(EXACT_STEP / step))):
+            for number in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
                 if not self._rest_is_free(sample_at(path, numbers, number)):
                     return number, numbers
         return -1, numbers

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem
 from modular_framework_planning.spatial import Array
@@ -16,7 +17,7 @@ class LastCheck:
     """
 
     def __init__(self) -> None:
-        self._passed: set[tuple[bytes, int]] = set()
+        self._passed: set[tuple[CollisionChecker, bytes]] = set()
 
     def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
         """Returns what is wrong with the timed motion of a path; empty where nothing is.
@@ -26,7 +27,9 @@ class LastCheck:
             path: with a trajectory.
         """
         assert path.trajectory is not None
-        key = (path.trajectory.positions.tobytes() + path.trajectory.velocities.tobytes(), id(problem.checker))
+        motion = path.trajectory
+        key = problem.checker, b"".join(rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities,
+                                                                    motion.accelerations))
         if key in self._passed:
             return ""
         text = _not_in_order(path)

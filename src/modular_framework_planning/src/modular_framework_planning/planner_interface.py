@@ -121,11 +121,6 @@ class PlanningProblem:
         return replace(self, request=request, start=start, _goals=[],
                        motion=MotionChecker(self.checker, self.group.indices, start))
 
-    def with_checker(self, checker: CollisionChecker) -> PlanningProblem:
-        """Returns the problem with another collision checker."""
-        return replace(self, checker=checker, _goals=[],
-                       motion=MotionChecker(checker, self.group.indices, self.start))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedPath:
