@@ -5,9 +5,11 @@ from __future__ import annotations
 import sqlite3
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from moveit_commander import ConstraintsStorage, MoveItCommanderException
+from moveit_commander.group_commands import GroupCommands, MoveGroupInfoLevel
 from moveit_msgs.msg import Constraints, JointConstraint
 
 
@@ -62,3 +64,24 @@ def test_what_is_no_file_of_constraints_is_refused_with_a_reason(tmp_path: Path)
         ConstraintsStorage(str(tmp_path / "old.sqlite"))
     with pytest.raises(MoveItCommanderException, match="no name"):
         ConstraintsStorage(str(tmp_path / "new.sqlite")).add_constraints(Constraints())
+
+
+def test_the_command_database_tells_which_file_is_used(tmp_path: Path) -> None:
+    group = SimpleNamespace(_storage=None)
+    group.set_constraints_database = lambda host, _: setattr(group, "_storage", ConstraintsStorage(host))
+    commands = GroupCommands(group, None, "base")
+    assert commands.database([]) == (MoveGroupInfoLevel.INFO, "Not connected to a database")
+    place = str(tmp_path / "some.sqlite")
+    connected = (MoveGroupInfoLevel.INFO, f"Connected to {place}")
+    assert commands.database([place, "0"]) == connected == commands.database([])
+
+
+def test_what_cannot_be_saved_leaves_what_was_there(tmp_path: Path) -> None:
+    storage = ConstraintsStorage(str(tmp_path / "some.sqlite"))
+    storage.add_constraints(constraints("low"))
+    with sqlite3.connect(storage.path) as database:
+        database.execute('CREATE TRIGGER full BEFORE INSERT ON "T_moveit_constraints@constraints" '
+                         "BEGIN SELECT RAISE(ABORT, 'disk full'); END")
+    with pytest.raises(MoveItCommanderException, match="disk full"):
+        storage.add_constraints(constraints("low", 0.5))
+    assert storage.get_constraints("low") == constraints("low")

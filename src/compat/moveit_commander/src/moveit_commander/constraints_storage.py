@@ -54,8 +54,9 @@ class ConstraintsStorage:
             raise MoveItCommanderException(f"constraints database {self.path}: the constraints have no name; set .name")
         data = BytesIO()
         msg.serialize(data)
-        self.remove_constraints(msg.name, robot, group)
+        where, values = _matching(msg.name, robot, group)
         with self._connected(create=True) as database:
+            database.execute(f'DELETE FROM "{TABLE}"{where}', values)
             database.execute(f'INSERT INTO "{TABLE}" (Data, M_creation_time, M_constraints_id, M_robot_id, M_group_id) '
                              "VALUES (?, ?, ?, ?, ?)", (
                                  data.getvalue(), int(time.time()), *(item.encode() for item in (

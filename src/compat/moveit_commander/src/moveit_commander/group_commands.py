@@ -149,10 +149,11 @@ class GroupCommands:
                                "</group_state>"]))
 
     def database(self, words: Words) -> Answer:
-        """Chooses the file of constraints."""
+        """Chooses the file of constraints, or tells which it is."""
         if words:
             self.group.set_constraints_database(words[0], int(number(words[1])) if len(words) > 1 else 33829)
-        return info("Not connected to a database")
+        storage = self.group._storage
+        return info("Not connected to a database" if storage is None else f"Connected to {storage.path}")
 
     def delete(self, words: Words) -> Answer:
         """Forgets joint values."""
