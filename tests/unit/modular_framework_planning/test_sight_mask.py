@@ -2,15 +2,18 @@
 """Depth images and clouds become points in the right places, and robot and known objects are told from the rest."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import rospy
 
 from modular_framework_planning.depth_images import (
     Pinhole,
+    SeenPoints,
     cloud_array,
     depth_array,
     points_of_cloud,
@@ -21,8 +24,16 @@ from modular_framework_planning.joint_history import JointHistory
 from modular_framework_planning.octomap_settings import DepthImageSettings, PointCloudSettings, read_sensors
 from modular_framework_planning.planning_scene import CollisionObject, empty_scene
 from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
 from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Plane, Sphere
-from modular_framework_planning.sight_mask import DEPTH_NOISE, RegionCache, bodies_in_scene, depth_mask_of, mask_of
+from modular_framework_planning.sight_mask import (
+    DEPTH_NOISE,
+    RegionCache,
+    SightMask,
+    bodies_in_scene,
+    depth_mask_of,
+    mask_of,
+)
 
 CAMERA = Pinhole(100.0, 100.0, 31.5, 23.5)
 CUBE = Mesh(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.1,
@@ -169,3 +180,23 @@ def test_joints_are_remembered_and_interpolated() -> None:
             history.at(stamp)
     history.add(1.0, np.array([7.0]))
     assert history.at(1.0) == 7.0, "a clock that was set back begins anew"
+
+
+def test_a_look_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) -> None:
+    """Needs no master: whatever is asked of the scene monitor is answered here."""
+    scene, caches = empty_scene(model), []
+
+    def mask(cache: RegionCache, bodies: Sequence[object], _: np.ndarray) -> SightMask:
+        caches.append(cache)
+        return mask_of(cache, bodies, 1.0, 0.0)
+
+    monitor = SimpleNamespace(model=model, positions_at=lambda *_: scene.positions, snapshot=lambda: seen,
+                              apply=lambda change: change(seen))
+    octomap, looked = OctomapMonitor(monitor), SeenPoints(np.full((1, 3), 3.0), np.empty((0, 3)))
+    for number in range(5):
+        thing = CollisionObject("thing", pin.SE3.Identity(), ((Box(0.1, 0.1, 1.0 + number), pin.SE3.Identity()),))
+        seen = scene.with_object(thing)
+        octomap.look("", rospy.Time(1), looked, mask)
+    seen = scene
+    octomap.look("", rospy.Time(1), looked, mask)
+    assert len(caches[-1]._regions) == len(model.link_geometries)

@@ -95,7 +95,9 @@ class OctomapMonitor:
         origin, clipped = _into(into_map, sensor.translation[None])[0], _into(into_map, beyond)
         for _ in range(ATTEMPTS):
             scene = self._monitor.snapshot()
-            mask = make_mask(self._regions, bodies_in_scene(scene, positions), sensor.translation)
+            bodies = bodies_in_scene(scene, positions)
+            self._regions.keep_only(geometry for geometry, _ in bodies)
+            mask = make_mask(self._regions, bodies, sensor.translation)
             hidden = np.asarray(mask.hides(ends, sensor.translation, shadow))
             hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
             if self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map):

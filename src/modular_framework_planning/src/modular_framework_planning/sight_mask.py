@@ -86,7 +86,7 @@ class RegionCache:
     def keep_only(self, geometries: Iterable[Any]) -> None:
         """Forgets geometries that are no longer in use."""
         wanted = {id(item) for item in geometries}
-        self._regions = {key: value for key, value in self._regions.items() if key in wanted}
+        self._regions = {key: value for key, value in list(self._regions.items()) if key in wanted}
 
 
 def _region_of(geometry: Any) -> Region:
