@@ -108,7 +108,8 @@ CUBE = trimesh.creation.box((0.05, 0.05, 0.05))
 
 @pytest.mark.parametrize("thing", [
     Box(0.05, 0.05, 0.05), Sphere(0.03), Mesh(np.asarray(CUBE.vertices), np.asarray(CUBE.faces, dtype=np.int64)),
-    Octree(empty_map(0.05).with_look(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING))], ids=lambda item: type(item).__name__)
+    Octree(empty_map(0.05).with_look(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING))],
+    ids=lambda item: type(item).__name__)
 def test_a_thing_wholly_inside_a_link_that_is_a_box_collides(thing: Shape) -> None:
     scene = empty_scene(RobotModel(BOX_LINK_URDF, BOX_LINK_SRDF, {}, lambda name: name))
     for place, free in ((0.0, False), (0.5, True)):

@@ -25,7 +25,8 @@ def tree_of(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
     zeros = np.zeros(pin_model.nq)
     axes, prismatic = [], []
     for number in chosen:  # a joint's own column of its Jacobian is its axis: linear on top, angular below
-        column = pin.computeJointJacobian(pin_model, data, zeros, number).reshape(6, -1)[:, pin_model.joints[number].idx_v]
+        jacobian = pin.computeJointJacobian(pin_model, data, zeros, number).reshape(6, -1)  # flat for a single joint
+        column = jacobian[:, pin_model.joints[number].idx_v]
         prismatic.append(bool(np.linalg.norm(column[:3]) > 0.5))
         axes.append(column[:3] if prismatic[-1] else column[3:])
     parents = [pin_model.parents[number] - 1 for number in chosen] if joints is None else range(-1, len(chosen) - 1)
