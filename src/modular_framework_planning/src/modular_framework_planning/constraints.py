@@ -49,11 +49,6 @@ class KinematicConstraints:
         """Returns the same constraints with working memory of their own."""
         return KinematicConstraints(self.model, self.joints, self.positions, self.orientations, self.name)
 
-    def region_centre(self, item: PositionConstraint, positions: Array) -> Array:
-        """Returns the middle of a position constraint's first region in the planning frame [m]."""
-        pin.forwardKinematics(self.model.pin_model, self._data, positions)
-        return np.array((item.reference.pose(self._data) * item.regions[0][1]).translation)
-
     def evaluate(self, positions: Array) -> list[ConstraintResult]:
         """Returns one result a constraint: joints first, then positions, then orientations."""
         pin.forwardKinematics(self.model.pin_model, self._data, positions)

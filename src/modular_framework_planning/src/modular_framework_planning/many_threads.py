@@ -16,8 +16,8 @@ def prepare() -> None:
     A thread that wakes up for a message waits for the interpreter behind every plan in turn, at Python's default up to
     5 ms each and several times a message: a change of the scene beside eight plans would take a third of a second.
 
-    glibc gives each thread that finds the others busy an arena of its own, and none returns what a plan has freed: the
-    process would grow for as long as new threads meet. Other C libraries are left as they are.
+    glibc gives each thread that finds the others busy an arena of its own, up to eight a core, and what a plan has
+    freed in one is of no use to a thread with another. Other C libraries are left as they are.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)

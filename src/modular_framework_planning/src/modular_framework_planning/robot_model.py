@@ -244,10 +244,6 @@ class RobotModel:
                 f"{self.upper[i]:.4f}]" for i in indices
                 if not self.lower[i] - tolerance <= positions[i] <= self.upper[i] + tolerance]
 
-    def link_transform(self, data: Any, link: str) -> Transform:
-        """Returns the pose of a link in the planning frame; `data` must hold the placements of the state."""
-        return data.oMf[self.frame_ids[link]]
-
     def link_transforms(self, positions: Array) -> dict[str, Transform]:
         """Computes the pose of every link in the planning frame."""
         data = self.pin_model.createData()

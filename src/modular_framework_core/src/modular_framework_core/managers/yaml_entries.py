@@ -42,11 +42,6 @@ class Entry:
     key: str
     node: yaml.Node
 
-    @property
-    def value_line(self) -> int:
-        """Line where the value starts, counted from 1."""
-        return int(self.node.start_mark.line) + 1
-
     def fault(self, text: str) -> EntryError:
         """Makes an error that points at this entry."""
         return EntryError(self.path, self.line, f"'{self.key}': {text}")

@@ -103,8 +103,3 @@ class TaskSpec:
     node_name: str
     script: str
     root: MachineSpec
-
-    @property
-    def success_outcome(self) -> str:
-        """The outcome that means the task reached its aim: the first one declared."""
-        return self.root.outcomes[0]
