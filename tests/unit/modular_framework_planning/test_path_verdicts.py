@@ -20,7 +20,7 @@ from modular_framework_planning.planning_scene import CollisionObject, PlanningS
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.urdf_document import package_resolver
 
-ARM_WORLDS, ARM_PATHS = 5, 12
+ARM_WORLDS, ARM_PATHS = 5, 6
 BARS_PATHS, OBSTACLES = 150, 30
 STEP = 0.01  # [rad or m]
 LONGEST_WAY = 60  # [STEP]
@@ -82,11 +82,11 @@ class Neighbourhood:
         """Compares the verdicts on a path with those on its samples; returns how many of these touch."""
         samples = samples_of(path)
         touching = np.array([not self.ours.is_free(sample) for sample in samples])
-        assert self.ours.path_is_free(path, STEP) is not touching.any()
+        assert self.ours.path_is_free(path, STEP) == (not touching.any())
         later = touching[len(samples_of(path[:2])):]
-        assert self.ours.path_is_free(path[1:], STEP, 1) is not later.any()
+        assert self.ours.path_is_free(path[1:], STEP, 1) == (not later.any())
         found = self.ours.colliding_state(path, STEP)
-        assert (found is None) is not touching.any()
+        assert (found is None) == (not touching.any())
         assert found is None or np.abs(samples[touching] - found).max(axis=1).min() < 1e-9
         return int(touching.sum())
 

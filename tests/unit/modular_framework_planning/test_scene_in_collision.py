@@ -116,4 +116,4 @@ def test_a_thing_wholly_inside_a_link_that_is_a_box_collides(thing: Shape) -> No
         pose = pin.SE3(np.eye(3), np.array([place, 0.0, 0.0]))
         placed = scene.with_object(CollisionObject("thing", pose, ((thing, pin.SE3.Identity()),)))
         assert is_free(placed) is free
-        assert bool(CollisionChecker(placed).contacts(scene.positions)) is not free
+        assert bool(CollisionChecker(placed).contacts(scene.positions)) == (not free)
