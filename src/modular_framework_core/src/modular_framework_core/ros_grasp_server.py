@@ -37,7 +37,7 @@ class GraspServer:
     Parameters:
         ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.
         ``~position_tolerance`` (0.05 rad): distance that counts as reached.
-        ``~motion_timeout`` (30 s).
+        ``~motion_timeout`` (25 s).
 
     Args:
         group: The joints of the fingers and their limits.
@@ -48,7 +48,7 @@ class GraspServer:
         self._group, self._manipulator = group, manipulator
         self._full_scale = float(rospy.get_param("~max_torque_full_scale", 800.0))
         self._tolerance = float(rospy.get_param("~position_tolerance", 0.05))
-        self._timeout_s = float(rospy.get_param("~motion_timeout", 30.0))
+        self._timeout_s = float(rospy.get_param("~motion_timeout", 25.0))
         self._lock = threading.Lock()
         self._motion_lock = threading.Lock()
         self._stops: dict[str, threading.Event] = {}
