@@ -112,15 +112,8 @@ class PosVelJointSaturation(PositionJointSaturation):
             handle.command_acceleration = _clamped(handle.command_acceleration, self.limits.max_acceleration)
 
 
-class VelocityJointSaturation:
-    """Saturates velocity commands: largest velocity, largest change of the measured velocity; only the way back at an
-    end of the range. With soft limits at most `k_position` times the way left. Not a number becomes 0.
-
-    Args:
-        handle: the joint.
-        limits: its limits.
-        soft: its soft limits, if any.
-    """
+class _Saturation:
+    """What bounds the commands of one joint and remembers none of them."""
 
     __slots__ = ("handle", "limits", "soft")
 
@@ -131,6 +124,19 @@ class VelocityJointSaturation:
 
     def reset(self) -> None:
         """Nothing is remembered."""
+
+
+class VelocityJointSaturation(_Saturation):
+    """Saturates velocity commands: largest velocity, largest change of the measured velocity; only the way back at an
+    end of the range. With soft limits at most `k_position` times the way left. Not a number becomes 0.
+
+    Args:
+        handle: the joint.
+        limits: its limits.
+        soft: its soft limits, if any.
+    """
+
+    __slots__ = ()
 
     def enforce_limits(self, period_s: float) -> None:
         """Replace `handle.command` by the nearest allowed one."""
@@ -154,7 +160,7 @@ class VelocityJointSaturation:
         handle.command = max(lowest, min(highest, command))
 
 
-class EffortJointSaturation:
+class EffortJointSaturation(_Saturation):
     """Saturates effort commands: largest effort; none that drives a joint further out of its range or beyond its
     largest velocity. With soft limits at most `k_velocity` times what is left to the velocity that is allowed there.
     Not a number becomes 0.
@@ -165,15 +171,7 @@ class EffortJointSaturation:
         soft: its soft limits, if any.
     """
 
-    __slots__ = ("handle", "limits", "soft")
-
-    def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
-        self.handle = handle
-        self.limits = limits
-        self.soft = soft
-
-    def reset(self) -> None:
-        """Nothing is remembered."""
+    __slots__ = ()
 
     def enforce_limits(self, period_s: float) -> None:
         """Replace `handle.command` by the nearest allowed one."""
