@@ -2,6 +2,7 @@
 """The action server of a controller: goals become tickets, and what becomes of a ticket is told to the client."""
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -41,10 +42,13 @@ class SteadyActionServer(ActionServer):
         super().internal_goal_callback(goal)
 
     def publish_result(self, status: Any, result: Any) -> None:
-        came_s = self._came_s.pop(status.goal_id.id, None)
-        if came_s is not None:
-            time.sleep(max(0.0, came_s + EARLIEST_END_S - time.monotonic()))
-        super().publish_result(status, result)
+        early_s = self._came_s.pop(status.goal_id.id, 0.0) + EARLIEST_END_S - time.monotonic()
+        if early_s <= 0.0:
+            super().publish_result(status, result)
+            return
+        later = threading.Timer(early_s, super().publish_result, (status, result))  # whoever calls has other work to do
+        later.daemon = True
+        later.start()
 
     def publish_status(self) -> None:
         try:
