@@ -164,12 +164,18 @@ def test_a_cancel_stops_the_servo(gripper: Gripper) -> None:
     gripper.client.cancel_goal()
     assert gripper.client.wait_for_result(rospy.Duration(2))
     assert gripper.client.get_state() == GoalStatus.PREEMPTED
-    opening = re.search(r"opening=(\d+) speed=(-?\d+)", gripper.order("state"))
-    assert opening is not None
-    assert abs(int(opening[2])) < 100
-    assert int(opening[1]) > 300
+    opening, speed = opening_and_speed(gripper)
+    assert abs(speed) < 100
+    assert opening > 300
     time.sleep(0.3)
-    assert f"opening={opening[1]}"[:-2] in gripper.order("state")
+    assert opening_and_speed(gripper)[0] == pytest.approx(opening, abs=20)
+
+
+def opening_and_speed(gripper: Gripper) -> tuple[int, int]:
+    """Of the emulated servo [ticks, ticks/s]; the fingers' whole travel are 2560 ticks."""
+    found = re.search(r"opening=(-?\d+) speed=(-?\d+)", gripper.order("state"))
+    assert found is not None
+    return int(found[1]), int(found[2])
 
 
 def test_a_new_goal_takes_over(gripper: Gripper) -> None:

@@ -30,6 +30,7 @@ class SteadyActionServer(ActionServer):
 
     def initialize(self) -> None:
         self._came_s: dict[str, float] = {}
+        self._ends_to_tell: set[threading.Timer] = set()
         super().initialize()
         timer: rospy.Timer | None = getattr(self, "status_timer", None)
         if timer is not None:
@@ -46,9 +47,20 @@ class SteadyActionServer(ActionServer):
         if early_s <= 0.0:
             super().publish_result(status, result)
             return
-        later = threading.Timer(early_s, super().publish_result, (status, result))  # whoever calls has other work to do
+        later = threading.Timer(early_s, self._tell_end, (status, result))  # whoever calls has other work to do
         later.daemon = True
+        self._ends_to_tell.add(later)
         later.start()
+
+    def _tell_end(self, status: Any, result: Any) -> None:
+        super().publish_result(status, result)
+        self._ends_to_tell.discard(threading.current_thread())  # type: ignore[arg-type]
+
+    def stop(self) -> None:
+        """Stop serving, once every end has been told."""
+        for later in list(self._ends_to_tell):
+            later.join()
+        super().stop()
 
     def publish_status(self) -> None:
         try:
