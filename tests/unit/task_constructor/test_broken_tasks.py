@@ -60,6 +60,17 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(world: World) -> N
     assert lines == sorted(lines)
 
 
+def test_a_missing_key_is_told_beside_wrong_transitions_and_a_repeated_label_beside_what_is_wrong_below_it(
+        world: World) -> None:
+    states = "{target: home, source: plan, transitions: {success: dne, fail: gave_up}}"
+    text = f"name: t\nsource: state_machine\noutcomes: [done, gave_up]\nstates:\n  - A: {states}\n"
+    faults = world.faults(text + "  - B: {source: use_arm, transitions: {success: done, fail: gave_up}}\n")
+    assert len(faults) == 2 and "target 'dne' is unknown" in faults[0] and "needs the userdata key" in faults[1]
+    faults = world.faults(text.replace("dne", "done") + "  - A: {source: plan, spede: 1.0}\n")
+    assert len(faults) == 3 and "'target' is missing" in faults[0] and "is given twice" in faults[1]
+    assert "did you mean 'speed'?" in faults[2]
+
+
 def test_the_good_tasks_have_no_fault(world: World) -> None:
     shared = NESTED.replace("outcomes: [done, gave_up]\n      states", "outcomes: [done, gave_up]\n      userdata: "
                             "self.userdata\n      states")

@@ -79,6 +79,17 @@ def test_equal_names_of_nested_machines_do_not_overwrite_each_other(world: World
     assert machine(world, text).execute() == "fail"
 
 
+@pytest.mark.parametrize("template", ["state_machine", "concurrent_state_machine", "framework_state_machine"])
+def test_the_keys_of_a_nested_machine_are_handed_to_its_container(world: World, template: str) -> None:
+    inner = "A: {source: move}" if template.startswith("concurrent") else \
+        "A: {source: move, transitions: {success: success, fail: fail}}"
+    produced = "      outcome_map: {success: {A: success}}\n" if template.startswith("concurrent") else ""
+    keys = "      input_keys: [a, b]\n      output_keys: [c]\n"
+    header = f"{HEADER}  - M:\n      source: {template}\n{keys}{produced}"
+    text = world.generate(f"{header}      states:\n        - {inner}\n")
+    assert "input_keys=['a', 'b']," in text and "output_keys=['c']," in text
+
+
 def test_a_nested_machine_shares_the_userdata_object_when_asked(world: World) -> None:
     text = HEADER + "  - In: {source: state_machine, outcomes: [success, fail], userdata: self.userdata, " \
            "states: [{S: {source: remember, v: 1}}]}\n"
@@ -191,6 +202,15 @@ def test_own_templates_take_header_keys_of_their_own(tmp_path: Path) -> None:
     made = machine(world, GOOD_TASK.replace("source: state_machine", "source: polite_machine\ngreeting: hello"))
     assert made.greeting == "hello"
     assert made.execute() == "done"
+
+
+def test_userdata_keys_are_refused_where_the_template_has_no_use_for_them(tmp_path: Path) -> None:
+    (tmp_path / "own.template").write_text(
+        'class {{ state_machine.type }}(smach.StateMachine):\n    def __init__(self):\n'
+        "        super().__init__(outcomes={{ state_machine.outcomes | literal }})\n")
+    faults = World(tmp_path, tmp_path).faults(
+        f"{HEADER}  - M:\n      source: own\n      input_keys: [a]\n      states:\n        - A: {{source: move}}\n")
+    assert len(faults) == 1 and "'M' (template own): key 'input_keys' is unknown" in faults[0]
 
 
 def test_a_header_key_an_own_template_needs_is_named_when_it_is_missing(tmp_path: Path) -> None:

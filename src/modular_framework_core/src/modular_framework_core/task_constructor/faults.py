@@ -52,10 +52,17 @@ class FaultList:
 
     def __init__(self) -> None:
         self._faults: list[Fault] = []
+        self._settled: set[Place] = set()
 
     def add(self, place: Place, message: str) -> None:
-        """Note a fault."""
-        self._faults.append(Fault(place, message))
+        """Note a fault, unless a fault noted with ``add_cause`` at the same place explains it."""
+        if place not in self._settled:
+            self._faults.append(Fault(place, message))
+
+    def add_cause(self, place: Place, message: str) -> None:
+        """Note a fault of a value that cannot be read at all: further faults of that value would only follow from it."""
+        self.add(place, message)
+        self._settled.add(place)
 
     def add_unknown(self, place: Place, what: str, found: str, allowed: Iterable[str]) -> None:
         """Note a name that is none of those allowed, with the nearest one where there is one near."""
@@ -70,10 +77,10 @@ class FaultList:
             raise TaskFault(self._faults)
 
 
-def listing(allowed: Iterable[str]) -> str:
-    """Say which names are allowed: ``allowed: a, b``."""
-    names = list(allowed)
-    return f"allowed: {', '.join(names)}" if names else "none is allowed here"
+def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
+    """Say which names are allowed: ``allowed: a, b``; ``empty`` is said when there are none."""
+    names = list(dict.fromkeys(allowed))
+    return f"allowed: {', '.join(names)}" if names else empty
 
 
 def nearest(found: str, allowed: Iterable[str]) -> str:
@@ -81,7 +88,7 @@ def nearest(found: str, allowed: Iterable[str]) -> str:
     names = [str(name) for name in allowed]
     by_lower = {name.lower(): name for name in names}
     wanted = str(found).lower()
-    matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.6)
+    matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
     if not matches and len(wanted) >= 3:
         matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
     return f"; did you mean '{by_lower[matches[0]]}'?" if matches else ""

@@ -76,6 +76,7 @@ def _machine(template: TemplateSource, *, is_root: bool) -> dict[str, Any]:
     else:
         properties["userdata"] = {"const": "self.userdata"}
         properties["transitions"] = or_reference(_NAME_MAP)
-        properties["input_keys"] = properties["output_keys"] = or_reference(_KEYS)
+        if template.takes_keys:
+            properties["input_keys"] = properties["output_keys"] = or_reference(_KEYS)
         required = ["source", "states"]
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}

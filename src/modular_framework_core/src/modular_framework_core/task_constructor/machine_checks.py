@@ -47,7 +47,7 @@ def check_sequential(
         place: where the outcomes are declared.
         faults: where faults are noted.
     """
-    targets = [*dict.fromkeys(labels), *(outcomes or ())]
+    targets = list(dict.fromkeys([*labels, *(outcomes or ())]))
     before = len(faults)
     for child in children:
         transitions = child.transitions or {}
@@ -156,8 +156,10 @@ def check_outcome_map(
             child = by_label.get(label)
             if child is None:
                 faults.add_unknown(conditions.keys[label], "outcome_map: state", label, by_label)
+            elif not isinstance(value, str):
+                faults.add(wanted.place, f"outcome_map: outcome of '{label}' must be a name, found {kind_of(wanted)}")
             elif child.outcomes is not None and value not in child.outcomes:
-                faults.add_unknown(wanted.place, f"outcome_map: outcome of '{label}'", str(value), child.outcomes)
+                faults.add_unknown(wanted.place, f"outcome_map: outcome of '{label}'", value, child.outcomes)
             result[outcome][label] = str(value)
     return result
 
@@ -206,7 +208,7 @@ def _missing_key(
 ) -> str:
     text = (
         f"state '{state.label}' needs the userdata key '{key}', which the machine '{machine.label}' does not have; "
-        f"{listing(sorted(available))}{nearest(key, sorted(available))}"
+        f"{listing(sorted(available), 'it has none')}{nearest(key, sorted(available))}"
     )
     if not is_root:
         return f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the keys around it"

@@ -231,4 +231,8 @@ class _Reader:
             found += [inner for inner in (item.types if isinstance(item, AnyOf) else (item,)) if inner not in found]
         if any(isinstance(item, Anything) for item in found):
             return Anything()
+        choices = tuple(value for item in found if isinstance(item, Choice) for value in item.values)
+        if choices:
+            others = [item for item in found if not isinstance(item, Choice)]
+            found = [Choice(tuple(dict.fromkeys(choices))), *others]
         return found[0] if len(found) == 1 else AnyOf(tuple(found))

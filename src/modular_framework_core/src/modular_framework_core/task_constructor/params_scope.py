@@ -7,10 +7,14 @@ option, in a list, in a mapping, in the header of a nested machine.
 """
 from __future__ import annotations
 
-from modular_framework_core.task_constructor.faults import FaultList, listing, nearest
+import difflib
+
+from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 PREFIX = "params."
+MISSPELT = 0.75
+"""A text counts as a misspelt reference when what is before its point is this similar to ``params`` (0 to 1)."""
 
 
 class ParamsScope:
@@ -35,15 +39,23 @@ class ParamsScope:
                 return Sequence(tuple(self.resolve(item, faults) for item in node.items), node.place)
             case Scalar(value=str(text)) if text.startswith(PREFIX):
                 return self._look_up(node, text.removeprefix(PREFIX), faults)
+            case Scalar(value=str(text)):
+                self._note_misspelt(node.place, text, faults)
         return node
+
+    def _note_misspelt(self, place: Place, text: str, faults: FaultList) -> None:
+        word, _, key = text.partition(".")
+        if key in self._visible and difflib.SequenceMatcher(None, f"{word.lower()}.", PREFIX).ratio() > MISSPELT:
+            faults.add_cause(place, f"'{text}' would be taken as text; did you mean '{PREFIX}{key}'?")
+            self.used.add(key)
 
     def _look_up(self, node: Scalar, key: str, faults: FaultList) -> Node:
         found = self._visible.get(key)
         if found is None:
-            faults.add(
+            faults.add_cause(
                 node.place,
                 f"'{PREFIX}{key}' refers to nothing: no params around it has the key '{key}'; "
-                f"{listing(self._visible)}{nearest(key, self._visible)}",
+                f"{listing(self._visible, 'there are no params around it')}{nearest(key, self._visible)}",
             )
             return node
         self.used.add(key)

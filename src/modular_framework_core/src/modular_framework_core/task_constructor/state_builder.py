@@ -82,6 +82,8 @@ class StateBuilder:
             hint = nearest(str(node.value), names) if isinstance(node.value, str) else ""
             if wanted == Plain("str") and not isinstance(node.value, str) and node.value is not None:
                 hint = "; put it in quotes to make it text"
+            elif wanted in (Plain("float"), Plain("int")) and _is_quoted_number(node.value):
+                hint = "; leave the quotes out to make it a number"
         self._faults.add(node.place, f"{what} must be {wanted.describe()}, found {kind_of(node)}{hint}")
 
     def _state_source(self, body: Mapping, label: str) -> StateSource | None:
@@ -122,6 +124,10 @@ class StateBuilder:
         if "outcomes" in options:
             return header_fields.names(options["outcomes"], "outcomes", FaultList())
         return source.default_names("outcomes") or None
+
+
+def _is_quoted_number(value: object) -> bool:
+    return isinstance(value, str) and value.removeprefix("-").replace(".", "", 1).isdecimal()
 
 
 def plain_transitions(body: Mapping) -> dict[str, str]:

@@ -45,14 +45,15 @@ class TaskBuilder:
         self._states = states
         self._templates = templates
         self._faults = FaultList()
+        self._link_faults = 0
         self._state_builder = StateBuilder(states, templates, self._faults)
         self._taken = {class_name_of(name) for name in states.names()} | set(dir(builtins))
 
     def build(self, document: Node, script: str) -> TaskSpec:
         """Return the task; raise ``TaskFault`` with everything that is wrong."""
         if not isinstance(document, Mapping):
-            self._faults.add(document.place, f"a task must be a mapping with {listing(_ROOT_KEYS)}, "
-                                             f"found {kind_of(document)}")
+            self._faults.add(document.place, f"a task must be a mapping, found {kind_of(document)}; its keys: "
+                                             f"{', '.join(_ROOT_KEYS)}")
             self._faults.raise_if_any()
         assert isinstance(document, Mapping)
         scope = ParamsScope().inner(params_of(document.entries.get("params"), self._faults), self._faults)
@@ -65,7 +66,7 @@ class TaskBuilder:
         if "node_name" in header.entries:
             node = header_fields.node_name(header.entries["node_name"], self._faults) or name
         root = self._machine(name, header, scope, None)
-        if root is not None and not len(self._faults):
+        if root is not None and len(self._faults) == self._link_faults:
             machine_checks.check_userdata(root, self._provided_by(), self._faults)
         self._faults.raise_if_any()
         assert root is not None, "a machine that could not be built has left a fault"
@@ -86,6 +87,7 @@ class TaskBuilder:
             return None
         self._check_header_keys(header, template, is_root=parent is None, label=label)
         outcomes_place = header.entries["outcomes"].place if "outcomes" in header.entries else header.place
+        before_links = len(self._faults)
         if template.concurrent:
             machine_checks.check_concurrent(links, self._faults)
         else:
@@ -96,6 +98,7 @@ class TaskBuilder:
         if template.concurrent and known_outcomes and links and len(self._faults) == before:
             machine_checks.check_outcomes_produced(outcomes, {*outcome_map, default_outcome}, outcomes_place,
                                                    self._faults)
+        self._link_faults += len(self._faults) - before_links
         return MachineSpec(
             label=label,
             template=template,
@@ -164,9 +167,9 @@ class TaskBuilder:
 
     def _check_header_keys(self, header: Mapping, template: TemplateSource, *, is_root: bool, label: str) -> None:
         known = [*(_ROOT_KEYS if is_root else _NESTED_KEYS), *sorted(template.options)]
-        if not template.concurrent:
-            for key in ("default_outcome", "outcome_map"):
-                known.remove(key)
+        without = [] if template.concurrent else ["default_outcome", "outcome_map"]
+        without += [] if template.takes_keys else ["input_keys", "output_keys"]
+        known = [key for key in known if key not in without]
         for key in header.entries:
             if key not in known:
                 what = f"'{label}' (template {template.name}): key"
@@ -216,13 +219,13 @@ class TaskBuilder:
         first_lines: dict[str, int] = {}
         for label, place, body in entries:
             header_fields.label(label, place, self._faults)
+            if label in outcomes:
+                self._faults.add(place, f"the label '{label}' is also an outcome of the machine; rename one of them")
+            spec, link = self._child(label, place, body, scope, parent_type)
             if label in first_lines:
                 self._faults.add(place, f"the label '{label}' is given twice; first in line {first_lines[label]}")
                 continue
             first_lines[label] = place.line
-            if label in outcomes:
-                self._faults.add(place, f"the label '{label}' is also an outcome of the machine; rename one of them")
-            spec, link = self._child(label, place, body, scope, parent_type)
             links.append(link)
             if spec is not None:
                 specs.append(spec)

@@ -51,9 +51,13 @@ def write(task: TaskSpec, file: Path) -> None:
                              "a .dot file") from error
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             raise GraphError(f"{file}: Graphviz failed: {error}") from error
-        file.write_bytes(done.stdout)
+        content = done.stdout
     else:
-        file.write_text(source, encoding="utf-8")
+        content = source.encode()
+    try:
+        file.write_bytes(content)
+    except OSError as error:
+        raise GraphError(f"{file} cannot be written: {error.strerror}; name a file in a folder that is there") from error
 
 
 def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: str | None) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 SUFFIX = ".template"
 _OPTION = re.compile(r"\boptions\.(\w+)|\boptions\[['\"](\w+)['\"]\]")
+_TAKES_KEYS = re.compile(r"\bchildren\.keys\b|\binput_keys\b")
 _PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
 
 
@@ -21,6 +22,7 @@ class TemplateSource:
         file: absolute path.
         concurrent: whether it makes a ``smach.Concurrence``.
         options: header keys of its own that it uses as ``options.<key>``.
+        takes_keys: whether its machines can have ``input_keys`` and ``output_keys``.
         userdata: keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
             None when it does not say.
     """
@@ -29,6 +31,7 @@ class TemplateSource:
     file: Path
     concurrent: bool
     options: frozenset[str]
+    takes_keys: bool
     userdata: frozenset[str] | None
 
 
@@ -65,4 +68,5 @@ def _read_template(name: str, file: Path) -> TemplateSource:
     options = frozenset(first or second for first, second in _OPTION.findall(text))
     declared = _PROVIDES.search(text)
     provided = None if declared is None else frozenset(re.findall(r"\w+", declared.group(1)))
-    return TemplateSource(name, file, re.search(r"\bConcurrence\b", text) is not None, options, provided)
+    concurrent, takes_keys = re.search(r"\bConcurrence\b", text), _TAKES_KEYS.search(text)
+    return TemplateSource(name, file, concurrent is not None, options, takes_keys is not None, provided)
