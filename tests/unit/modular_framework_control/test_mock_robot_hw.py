@@ -38,6 +38,19 @@ def test_it_is_where_it_was_told_to_be_one_cycle_later() -> None:
     assert handle.velocity == pytest.approx(1.0)
 
 
+def test_a_joint_moved_steadily_by_cycles_of_different_length_has_a_steady_velocity() -> None:
+    robot_hw = make_robot_hw()
+    handle = robot_hw.get(PositionJointInterface).get_handle("elbow")
+    velocities, time_s = [], 0.0
+    for period_s in (0.008, 0.012, 0.004, 0.016, 0.008):
+        time_s += period_s
+        robot_hw.read(time_s, period_s)
+        velocities.append(handle.velocity)
+        handle.command = 1.5 * time_s
+        robot_hw.write(time_s, period_s)
+    assert velocities == pytest.approx([0.0] + [1.5] * 4)
+
+
 def test_faulty_parameters_are_refused(caplog: pytest.LogCaptureFixture) -> None:
     assert MockRobotHW().init(MappingNodeHandle({}), MappingNodeHandle({}, "/hw")) is False
     assert "/hw/joints" in caplog.text

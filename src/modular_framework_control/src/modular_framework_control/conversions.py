@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where message classes meet the types of the controllers."""
+"""Where message classes meet the types of the controllers.
+
+Messages are stamped by the ROS clock, controllers count in the time of the control loop: by `ahead_s` [s] the former is
+ahead of the latter (see `LoopTime`).
+"""
 from __future__ import annotations
 
 import math
@@ -28,21 +32,23 @@ from modular_framework_control.trajectory_goal import TrajectoryErrorCode, Traje
 from modular_framework_control.trajectory_tolerances import JointTolerance
 
 
-def trajectory_from_msg(message: JointTrajectoryMsg) -> JointTrajectory:
+def trajectory_from_msg(message: JointTrajectoryMsg, ahead_s: float = 0.0) -> JointTrajectory:
     """A trajectory_msgs/JointTrajectory as sent; it is not checked here."""
     points = tuple(TrajectoryPoint(point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities),
                                    tuple(point.accelerations)) for point in message.points)
-    return JointTrajectory(tuple(message.joint_names), points, message.header.stamp.to_sec())
+    stamp = message.header.stamp
+    return JointTrajectory(tuple(message.joint_names), points, stamp.to_sec() - ahead_s if stamp else 0.0)
 
 
 def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
     return {message.name: JointTolerance(message.position, message.velocity) for message in messages}
 
 
-def goal_from_msg(message: FollowJointTrajectoryGoal) -> TrajectoryGoal:
+def goal_from_msg(message: FollowJointTrajectoryGoal, ahead_s: float = 0.0) -> TrajectoryGoal:
     """A control_msgs/FollowJointTrajectoryGoal as sent; it is not checked here."""
-    return TrajectoryGoal(trajectory_from_msg(message.trajectory), _tolerances_from_msg(message.path_tolerance),
-                          _tolerances_from_msg(message.goal_tolerance), message.goal_time_tolerance.to_sec())
+    return TrajectoryGoal(
+        trajectory_from_msg(message.trajectory, ahead_s), _tolerances_from_msg(message.path_tolerance),
+        _tolerances_from_msg(message.goal_tolerance), message.goal_time_tolerance.to_sec())
 
 
 def trajectory_result_to_msg(code: TrajectoryErrorCode, text: str) -> FollowJointTrajectoryResult:
@@ -55,9 +61,9 @@ def _point(state: Array) -> JointTrajectoryPoint:
     return JointTrajectoryPoint(positions=rows[0], velocities=rows[1], accelerations=rows[2] if len(rows) > 2 else [])
 
 
-def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Sequence[str]) -> Any:
+def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0) -> Any:
     """Write a snapshot into a JointTrajectoryControllerState or a FollowJointTrajectoryFeedback; returns it."""
-    message.header.stamp = genpy.Time.from_sec(snapshot.time_s)
+    message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
     message.joint_names = list(joint_names)
     message.desired = _point(snapshot.desired)
     message.actual = _point(snapshot.actual)
@@ -66,9 +72,10 @@ def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Seque
     return message
 
 
-def snapshot_to_msg(snapshot: TrajectorySnapshot, joint_names: Sequence[str]) -> JointTrajectoryControllerState:
+def snapshot_to_msg(snapshot: TrajectorySnapshot, joint_names: Sequence[str],
+                    ahead_s: float = 0.0) -> JointTrajectoryControllerState:
     """State of a trajectory controller."""
-    return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names)
+    return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names, ahead_s)
 
 
 def gripper_result_to_msg(state: GripperState) -> GripperCommandResult:
@@ -81,11 +88,11 @@ def gripper_feedback_to_msg(state: GripperState) -> GripperCommandFeedback:
     return GripperCommandFeedback(state.position, state.effort, state.stalled, state.reached_goal)
 
 
-def joint_state_to_msg(snapshot: JointStateSnapshot) -> JointState:
+def joint_state_to_msg(snapshot: JointStateSnapshot, ahead_s: float = 0.0) -> JointState:
     """A sensor_msgs/JointState."""
     message = JointState(name=snapshot.names, position=snapshot.positions, velocity=snapshot.velocities,
                          effort=snapshot.efforts)
-    message.header.stamp = genpy.Time.from_sec(snapshot.time_s)
+    message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
     return message
 
 
@@ -96,11 +103,12 @@ def controller_report_to_msg(report: ControllerReport) -> ControllerState:
     return ControllerState(report.info.name, report.state.value, report.info.type, claims)
 
 
-def controller_statistics_to_msg(report: ControllerReport) -> ControllerStatistics:
+def controller_statistics_to_msg(report: ControllerReport, ahead_s: float = 0.0) -> ControllerStatistics:
     """Update times of one controller; `variance_time`, a duration, is the square root of their variance."""
     figures = report.statistics
+    updated, overrun = (genpy.Time.from_sec(time_s + ahead_s if time_s else 0.0)
+                        for time_s in (figures.updated_at_s, figures.last_overrun_s))
     return ControllerStatistics(
-        report.info.name, report.info.type, genpy.Time.from_sec(figures.updated_at_s),
-        report.state is LoadedState.RUNNING, genpy.Duration.from_sec(figures.max_s),
-        genpy.Duration.from_sec(figures.mean_s), genpy.Duration.from_sec(math.sqrt(figures.variance_s2)),
-        figures.overruns, genpy.Time.from_sec(figures.last_overrun_s))
+        report.info.name, report.info.type, updated, report.state is LoadedState.RUNNING,
+        genpy.Duration.from_sec(figures.max_s), genpy.Duration.from_sec(figures.mean_s),
+        genpy.Duration.from_sec(math.sqrt(figures.variance_s2)), figures.overruns, overrun)

@@ -256,7 +256,7 @@ class JointTrajectoryController(Controller):
             self._stop()
             return ""
         now_s = self._clock.now_s
-        origin_s = self._clock.at(order.stamp_s) if order.stamp_s > 0.0 else now_s
+        origin_s = self._clock.at(order.stamp_s) if order.stamp_s != 0.0 else now_s
         end_s = origin_s + float(order.spline.times_s[-1])
         if end_s <= now_s + SHORTEST_SEGMENT_S:
             return (f"all {len(order.spline.times_s)} points lie in the past: the last one was due "

@@ -38,6 +38,7 @@ class MockRobotHW(RobotHW):
         self._handles: list[JointHandle] = []
         self._limits: list[JointLimits] = []
         self._sent: list[float] = []
+        self._sent_period_s = 0.0
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         try:
@@ -71,7 +72,7 @@ class MockRobotHW(RobotHW):
             return
         for handle, position in zip(self._handles, self._sent, strict=True):
             state = handle.state
-            state.velocity = (position - state.position) / period_s if period_s > 0.0 else 0.0
+            state.velocity = (position - state.position) / self._sent_period_s if self._sent_period_s > 0.0 else 0.0
             state.position = position
 
     def _move_on(self, period_s: float) -> None:
@@ -87,6 +88,7 @@ class MockRobotHW(RobotHW):
 
     def write(self, time_s: float, period_s: float) -> None:
         self._guard.enforce(period_s)
+        self._sent_period_s = period_s  # what the controllers went on by; the next differs when cycles come late
         self._sent = [handle.command for handle in self._handles]
 
 

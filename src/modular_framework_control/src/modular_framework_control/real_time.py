@@ -26,11 +26,14 @@ def prepare_interpreter() -> None:
     gc.freeze()
 
 
-def run_in_real_time() -> list[str]:
+def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     """Run this process before ordinary ones, the calling thread before its others (SCHED_FIFO); keep its memory in RAM.
 
     The other threads go first too, as the loop waits while one of them holds Python's interpreter: an ordinary process
     that takes the processor from that one would hold up the loop.
+
+    Args:
+        priority: of the calling thread, 1 to 99; what the control loop needs is less urgent than the loop itself.
 
     Returns:
         What was not permitted and why; nothing when all was.
@@ -40,7 +43,7 @@ def run_in_real_time() -> list[str]:
         for thread in os.listdir("/proc/self/task"):
             with contextlib.suppress(ProcessLookupError):   # it has ended meanwhile
                 os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(HELPER_PRIORITY))
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError as error:
         refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "
                        f"or docker run --cap-add SYS_NICE --ulimit rtprio={PRIORITY})")

@@ -7,6 +7,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from modular_framework_control.controller import ControllerError
 from modular_framework_control.joint_command_controllers import JointCommandController
+from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_outbox import Outbox
 
@@ -14,8 +15,9 @@ from modular_framework_control.ros_outbox import Outbox
 class JointCommandEdge:
     """Subscribes `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several."""
 
-    def __init__(self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox) -> None:
-        del outbox
+    def __init__(self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        del outbox, loop_time
         self._controller = controller
         self._topic = join_names(namespace, f"{name}/command")
         kind = Float64 if controller.single else Float64MultiArray

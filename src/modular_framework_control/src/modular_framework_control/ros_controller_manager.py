@@ -31,6 +31,7 @@ from modular_framework_control import conversions
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_manager import ControllerManager
 from modular_framework_control.controller_types import ControllerTypes
+from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.ros_controllers import attach_ros
@@ -51,18 +52,21 @@ class RosControllerManager:
         robot_hw: initialised hardware.
         namespace: namespace of the robot; controllers and their parameters are found below it.
         types: known controller types; the built-in ones when not given.
+        loop_time: says how stamps of messages differ from the time given to `update`; not at all when not given.
     """
 
-    def __init__(self, robot_hw: RobotHW, namespace: str = "/", types: ControllerTypes | None = None) -> None:
+    def __init__(self, robot_hw: RobotHW, namespace: str = "/", types: ControllerTypes | None = None,
+                 loop_time: LoopTime | None = None) -> None:
         self._namespace = namespace
         self._outbox = Outbox()
+        self._loop_time = loop_time if loop_time is not None else LoopTime()
         self.manager = ControllerManager(robot_hw, RosNodeHandle(namespace), types, self._attach)
         self._services: list[rospy.Service] = []
         self._statistics: rospy.Publisher | None = None
         self._statistics_due_s = 0.0
 
     def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
-        close = attach_ros(controller, self._namespace, name, self._outbox)
+        close = attach_ros(controller, self._namespace, name, self._outbox, self._loop_time)
 
         def detach() -> None:
             self._outbox.flush()
@@ -97,7 +101,7 @@ class RosControllerManager:
         if self._statistics is not None and self._statistics.get_num_connections() > 0:
             message = ControllersStatistics()
             message.header.stamp = rospy.Time.now()
-            message.controller = [conversions.controller_statistics_to_msg(report)
+            message.controller = [conversions.controller_statistics_to_msg(report, self._loop_time.ahead_s)
                                   for report in self.manager.list_controllers()]
             self._statistics.publish(message)
 

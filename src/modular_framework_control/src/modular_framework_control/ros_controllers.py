@@ -30,6 +30,7 @@ from modular_framework_control.gripper_action_controller import (
 from modular_framework_control.joint_command_controllers import JointCommandController
 from modular_framework_control.joint_state_controller import JointStateController, JointStateSnapshot
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
+from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
 from modular_framework_control.ros_command_edges import JointCommandEdge
@@ -48,13 +49,15 @@ from modular_framework_control.trajectory_goal import (
 class JointStateEdge:
     """Publishes `joint_states` (sensor_msgs/JointState) in the namespace of the robot."""
 
-    def __init__(self, controller: JointStateController, namespace: str, name: str, outbox: Outbox) -> None:
+    def __init__(self, controller: JointStateController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
         del name
+        self._loop_time = loop_time
         self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=10)
         controller.on_state = lambda snapshot: outbox.put_droppable(self._publish, snapshot)
 
     def _publish(self, snapshot: JointStateSnapshot) -> None:
-        self._publisher.publish(conversions.joint_state_to_msg(snapshot))
+        self._publisher.publish(conversions.joint_state_to_msg(snapshot, self._loop_time.ahead_s))
 
     def close(self) -> None:
         """Close the topic."""
@@ -65,9 +68,11 @@ class JointTrajectoryEdge:
     """Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
     `<name>/query_state` (service)."""
 
-    def __init__(self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox) -> None:
+    def __init__(self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
         self._controller = controller
         self._name = join_names(namespace, name)
+        self._loop_time = loop_time
         self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
         self._action = ControllerActionServer(f"{self._name}/follow_joint_trajectory", FollowJointTrajectoryAction,
                                               self._submit, controller.cancel, _trajectory_result, outbox)
@@ -85,30 +90,32 @@ class JointTrajectoryEdge:
 
     def _submit(self, message: FollowJointTrajectoryGoal, ticket: TrajectoryTicket) -> None:
         try:
-            self._controller.submit(conversions.goal_from_msg(message), ticket)
+            self._controller.submit(conversions.goal_from_msg(message, self._loop_time.ahead_s), ticket)
         except GoalRejectedError as error:
             result = conversions.trajectory_result_to_msg(error.code, str(error))
             raise GoalRefusedError(result, str(error)) from error
 
     def _on_command(self, message: JointTrajectoryMsg) -> None:
         try:
-            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message)))
+            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
         except GoalRejectedError as error:
             rospy.logwarn("%s/command ignored: %s", self._name, error)
 
     def _on_query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
         try:
-            state = self._controller.desired_at(request.time.to_sec())
+            state = self._controller.desired_at(request.time.to_sec() - self._loop_time.ahead_s)
         except ControllerError as error:
             raise rospy.ServiceException(f"{self._name}/query_state: {error}") from error
         return QueryTrajectoryStateResponse(self._controller.joint_names, *(row.tolist() for row in state))
 
     def _publish_state(self, snapshot: TrajectorySnapshot) -> None:
         if self._state.get_num_connections() > 0:
-            self._state.publish(conversions.snapshot_to_msg(snapshot, self._controller.joint_names))
+            self._state.publish(conversions.snapshot_to_msg(snapshot, self._controller.joint_names,
+                                                            self._loop_time.ahead_s))
 
     def _feedback(self, ticket: TrajectoryTicket, snapshot: TrajectorySnapshot) -> None:
-        message = conversions.fill_snapshot(FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names)
+        message = conversions.fill_snapshot(FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names,
+                                            self._loop_time.ahead_s)
         self._action.publish_feedback(ticket, message)
 
 
@@ -120,7 +127,9 @@ def _trajectory_result(ticket: GoalTicket[TrajectoryErrorCode]) -> Any:
 class GripperEdge:
     """Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action)."""
 
-    def __init__(self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox) -> None:
+    def __init__(self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        del loop_time
         self._controller = controller
         self._action = ControllerActionServer(join_names(namespace, f"{name}/gripper_cmd"), GripperCommandAction,
                                               self._submit, controller.cancel, _gripper_result, outbox)
@@ -153,7 +162,8 @@ _EDGES: tuple[tuple[type[Controller], Any], ...] = (
 )
 
 
-def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox) -> Callable[[], None]:
+def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox,
+               loop_time: LoopTime) -> Callable[[], None]:
     """Open the topics, actions and services of a controller.
 
     Args:
@@ -161,12 +171,13 @@ def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox
         namespace: absolute namespace of the robot.
         name: name of the controller.
         outbox: thread that talks to ROS for the control loop.
+        loop_time: says how stamps of messages and the time of the control loop differ.
 
     Returns:
         What closes them.
     """
     for controller_class, edge_class in _EDGES:
         if isinstance(controller, controller_class):
-            close: Callable[[], None] = edge_class(controller, namespace, name, outbox).close
+            close: Callable[[], None] = edge_class(controller, namespace, name, outbox, loop_time).close
             return close
     return lambda: None

@@ -11,6 +11,7 @@ import rospy
 
 from modular_framework_control.combined_robot_hw import robot_hw_of_type
 from modular_framework_control.cycle_pacer import CyclePacer, LoopStatistics
+from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import ParameterError, read_bool, read_number
 from modular_framework_control.plugins import PluginError
 from modular_framework_control.real_time import prepare_interpreter, run_in_real_time
@@ -40,10 +41,12 @@ class RobotHwNode:
     Args:
         ended: set by whoever wants the loop to end; controllers are then stopped, goals end, and the hardware is closed
             while the node can still say so.
+        loop_time: time of the loop, unless the clock is simulated; stamps follow the clock of the system.
     """
 
-    def __init__(self, ended: threading.Event) -> None:
+    def __init__(self, ended: threading.Event, loop_time: LoopTime | None = None) -> None:
         self._ended = ended
+        self._loop_time = loop_time if loop_time is not None else LoopTime()
         self._nh = RosNodeHandle("~")
         self._period_s = 1.0 / read_number(self._nh, "rate", 125.0, 1.0)
         self._real_time = read_bool(self._nh, "real_time", True)
@@ -60,6 +63,7 @@ class RobotHwNode:
         self._connected = threading.Event()
         self._failure = ""
         self._statistics = LoopStatistics(self._period_s)
+        self._last_s = 0.0
 
     def connect(self) -> None:
         """Initialise the hardware.
@@ -72,7 +76,7 @@ class RobotHwNode:
                                  "its own message above says why")
         self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
         self._readiness.connect()
-        self._manager = RosControllerManager(self._robot_hw)
+        self._manager = RosControllerManager(self._robot_hw, loop_time=self._loop_time)
         self._report = LoopReport(self._statistics, self._period_s, type(self._robot_hw).__name__, self._fault)
         self._report.connect()
 
@@ -110,13 +114,14 @@ class RobotHwNode:
             rospy.logwarn("control loop without: %s", "; ".join(refused))
 
     def _loop(self, manager: RosControllerManager) -> None:
-        wait = CyclePacer(self._period_s).wait if rospy.rostime.is_wallclock() else self._wait_for_simulated_clock
-        last_s, late_s, missed = rospy.get_time(), 0.0, 0
+        now, wait = ((self._loop_time.now, CyclePacer(self._period_s).wait) if rospy.rostime.is_wallclock()
+                     else (rospy.get_time, self._wait_for_simulated_clock))
+        self._last_s, late_s, missed = now(), 0.0, 0
         while not self._ended.is_set() and not self._failure and not rospy.is_shutdown():
             begun_s = time.perf_counter()
-            time_s = rospy.get_time()
-            period_s = max(0.0, time_s - last_s)
-            last_s = time_s
+            time_s = now()
+            period_s = max(0.0, time_s - self._last_s)
+            self._last_s = time_s
             self._robot_hw.read(time_s, period_s)
             if self._connected.is_set():
                 manager.update(time_s, period_s)
@@ -142,7 +147,7 @@ class RobotHwNode:
         self._readiness.close()
         manager.close()
         try:
-            self._robot_hw.write(rospy.get_time(), self._period_s)
+            self._robot_hw.write(self._last_s + self._period_s, self._period_s)
         except Exception as error:  # a user's hardware may raise anything; what follows must be done all the same
             rospy.logerr("last write of hardware %s raised %s", type(self._robot_hw).__name__, error)
         self._report.close()

@@ -9,6 +9,7 @@ from geometry_msgs.msg import Quaternion, Vector3, WrenchStamped
 from sensor_msgs.msg import Imu
 
 from modular_framework_control.handles import ForceTorqueSensorHandle, ImuSensorHandle
+from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_outbox import Outbox
 from modular_framework_control.sensor_controllers import ForceTorqueSensorController, SensorController
@@ -17,7 +18,8 @@ from modular_framework_control.sensor_controllers import ForceTorqueSensorContro
 class SensorEdge:
     """Publishes geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units."""
 
-    def __init__(self, controller: SensorController, namespace: str, name: str, outbox: Outbox) -> None:
+    def __init__(self, controller: SensorController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
         del name
         wrenches = isinstance(controller, ForceTorqueSensorController)
         self._publishers = {
@@ -25,7 +27,7 @@ class SensorEdge:
             for sensor in controller.sensor_names}
         to_msg = wrench_to_msg if wrenches else imu_to_msg
         controller.on_reading = lambda time_s, handle: outbox.put_droppable(
-            self._publishers[handle.name].publish, to_msg(time_s, handle))
+            self._publishers[handle.name].publish, to_msg(time_s + loop_time.ahead_s, handle))
 
     def close(self) -> None:
         """Close the topics."""
@@ -34,7 +36,7 @@ class SensorEdge:
 
 
 def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamped:
-    """What a force-torque sensor measured at `time_s` [s]."""
+    """What a force-torque sensor measured at `time_s` of the ROS clock [s]."""
     message = _stamped(WrenchStamped(), time_s, handle.frame_id)
     message.wrench.force = Vector3(*handle.force)
     message.wrench.torque = Vector3(*handle.torque)
@@ -42,7 +44,7 @@ def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamp
 
 
 def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
-    """What an inertial unit measured at `time_s` [s]."""
+    """What an inertial unit measured at `time_s` of the ROS clock [s]."""
     message = _stamped(Imu(), time_s, handle.frame_id)
     message.orientation = Quaternion(*handle.orientation)
     message.angular_velocity = Vector3(*handle.angular_velocity)

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The time of a control loop on a real robot, which nobody who sets the clock of the system can disturb.
+
+Taken from that clock, the time of a loop would go back when it is set back, and controllers would begin anew; set
+forward, it would carry trajectories to their end in one cycle. So the loop counts on the monotonic clock. Only the
+stamps of messages follow the system's, by which all other programs count.
+"""
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+
+NOTICED_STEP_S = 1e-3
+TOLD_STEP_S = 0.1
+QUICK_S = 5e-4
+"""A reading of both clocks that took longer says too little about how far they are apart [s]."""
+
+LOGGER = logging.getLogger("rosout.control_loop")
+
+
+class LoopTime:
+    """Time that begins as that of the system's clock, and from then on goes on steadily.
+
+    Args:
+        system: clock that may be set by anybody [s].
+        steady: clock that never jumps [s].
+
+    Attributes:
+        ahead_s: by how much the system's clock is ahead of this time [s]; changes when it is set. Time of the loop and
+            stamps of messages differ by it.
+    """
+
+    def __init__(self, system: Callable[[], float] = time.time, steady: Callable[[], float] = time.monotonic) -> None:
+        self._system = system
+        self._steady = steady
+        self._began_s = system() - steady()
+        self.ahead_s = 0.0
+
+    def now(self) -> float:
+        """The time now [s]; looks whether the system's clock was set meanwhile."""
+        steady_s = self._steady()
+        system_s = self._system()
+        time_s = self._began_s + steady_s
+        ahead_s = system_s - time_s
+        if abs(ahead_s - self.ahead_s) > NOTICED_STEP_S and self._steady() - steady_s < QUICK_S:
+            step_s, self.ahead_s = ahead_s - self.ahead_s, ahead_s
+            if abs(step_s) > TOLD_STEP_S:
+                LOGGER.warning("the clock of the system was set by %+.3f s: motions go on as if it had not been, the "
+                               "stamps of messages follow it", step_s)
+        return time_s

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node robot_hw while somebody sets the clock of the system: motions go on, stamps of messages follow the clock."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from controller_manager_msgs.srv import LoadController, SwitchController
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_control.loop_time import LoopTime
+from modular_framework_control.ros_robot_hw import RobotHwNode
+
+HOUR_S = 3600.0
+
+
+class SetClock:
+    """The clock of the system as the node sees it."""
+
+    def __init__(self) -> None:
+        self.set_by_s = 0.0
+
+    def __call__(self) -> float:
+        return time.time() + self.set_by_s
+
+
+@pytest.fixture(scope="module")
+def clock(ros_session: Any) -> Iterator[SetClock]:
+    """A node in this process; its clock can be set."""
+    for name, value in {"joints": ["shoulder"], "rate": 100, "real_time": False}.items():
+        rospy.set_param(f"~{name}", value)
+    rospy.set_param("/states", {"type": "joint_state_controller/JointStateController"})
+    rospy.set_param("/arm", {"type": "position_controllers/JointTrajectoryController", "joints": ["shoulder"],
+                             "constraints": {"goal_time": 1.0}})
+    system, ended = SetClock(), threading.Event()
+    node = RobotHwNode(ended, LoopTime(system))
+    node.connect()
+    loop = threading.Thread(target=node.run)
+    loop.start()
+    rospy.wait_for_service("controller_manager/switch_controller", 20.0)
+    for name in ("states", "arm"):
+        assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)(name).ok
+    switch = rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)
+    assert switch(["states", "arm"], [], 2, False, 0.0).ok
+    yield system
+    ended.set()
+    loop.join(10.0)
+    node.close()
+
+
+@pytest.fixture
+def arm(clock: SetClock) -> actionlib.SimpleActionClient:
+    client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(10.0))
+    return client
+
+
+def move(client: actionlib.SimpleActionClient, position: float, duration_s: float, stamp_s: float = 0.0) -> None:
+    trajectory = JointTrajectory(joint_names=["shoulder"])
+    trajectory.header.stamp = rospy.Time.from_sec(stamp_s)
+    trajectory.points.append(JointTrajectoryPoint(positions=[position], velocities=[0.0],
+                                                  time_from_start=rospy.Duration.from_sec(duration_s)))
+    client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
+
+
+@pytest.mark.parametrize("step_s", [-HOUR_S, HOUR_S, -0.5])
+def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_clock_that_was_set(
+        clock: SetClock, arm: actionlib.SimpleActionClient, step_s: float) -> None:
+    states: list[JointState] = []
+    here = rospy.wait_for_message("joint_states", JointState, 5.0).position[0]
+    subscriber = rospy.Subscriber("joint_states", JointState, states.append)
+    begun_s = time.monotonic()
+    move(arm, here + 1.0, 2.0)
+    while not states or states[-1].position[0] < here + 0.1:
+        assert time.monotonic() - begun_s < 10.0
+        time.sleep(0.01)
+    clock.set_by_s += step_s
+    assert arm.wait_for_result(rospy.Duration(10.0))
+    took_s, told_s = time.monotonic() - begun_s, clock()
+    subscriber.unregister()
+    assert arm.get_state() == GoalStatus.SUCCEEDED, arm.get_goal_status_text()
+    assert took_s >= 1.9, "it must not be carried to its end at once"
+    assert states[-1].position[0] == pytest.approx(here + 1.0, abs=0.05)
+    fastest = max(abs(state.velocity[0]) for state in states)
+    assert fastest < 0.8, "the curve of this goal is never faster than 0.75 rad/s"
+    assert told_s - 1.0 < states[-1].header.stamp.to_sec() <= told_s + 0.01
+
+
+def test_a_header_stamp_counts_by_the_clock_as_it_is_now(clock: SetClock, arm: actionlib.SimpleActionClient) -> None:
+    clock.set_by_s += HOUR_S
+    time.sleep(0.1)
+    begun_s = time.monotonic()
+    move(arm, 0.0, 0.3, stamp_s=clock() + 0.7)
+    assert arm.wait_for_result(rospy.Duration(10.0))
+    assert arm.get_state() == GoalStatus.SUCCEEDED
+    assert time.monotonic() - begun_s > 0.9
+    move(arm, 0.5, 0.3, stamp_s=clock() - 5.0)
+    assert arm.wait_for_result(rospy.Duration(10.0))
+    assert arm.get_state() == GoalStatus.REJECTED and "in the past" in arm.get_goal_status_text()
