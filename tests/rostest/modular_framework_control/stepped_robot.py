@@ -18,9 +18,10 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_control.combined_robot_hw import CombinedRobotHW
 from modular_framework_control.handles import SpeedScalingHandle
-from modular_framework_control.hardware_interface import SpeedScalingInterface
+from modular_framework_control.hardware_interface import ControllerInfo, SpeedScalingInterface
 from modular_framework_control.mock_robot_hw import MockRobotHW
 from modular_framework_control.node_handle import NodeHandle
+from modular_framework_control.robot_hw import SwitchState
 from modular_framework_control.ros_controller_manager import RosControllerManager
 from modular_framework_control.ros_node_handle import RosNodeHandle
 
@@ -29,18 +30,20 @@ WAIT_S = 10.0
 
 
 class HinderedRobotHW(MockRobotHW):
-    """Fake hardware that can be blocked, slowed down and stopped by a fault.
+    """Fake hardware that can be blocked, slowed down, stopped by a fault, and slow to get ready for controllers.
 
     Attributes:
         blocked: positions of the joints that cannot move, by name.
         reason: the fault; "" for none.
         scaling: its speed slider.
+        switching: how far it is with getting ready for its controllers.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.blocked: dict[str, float] = {}
         self.reason = ""
+        self.switching = SwitchState.DONE
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         joints = robot_hw_nh.get_param("joints")
@@ -51,6 +54,9 @@ class HinderedRobotHW(MockRobotHW):
 
     def fault(self) -> str:
         return self.reason
+
+    def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
+        return self.switching
 
     def read(self, time_s: float, period_s: float) -> None:
         super().read(time_s, period_s)

@@ -2,6 +2,7 @@
 """Loading, switching and unloading controllers, by the rules of ros_control."""
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -179,6 +180,15 @@ def test_without_a_control_loop_a_switch_says_so_and_does_not_happen_later(loop:
         loop.manager.switch_controller(["right"], [], STRICT)
     loop.step(3)
     assert loop.states()["right"] == "initialized"
+
+
+def test_hardware_may_take_longer_to_get_ready_than_a_loop_for_its_next_cycle(loop: Any) -> None:
+    ready_s = time.monotonic() + 3.0 * loop.manager._update_wait_s
+    loop.robot_hw.switch_result = lambda controller=None: (
+        SwitchState.DONE if time.monotonic() > ready_s else SwitchState.ONGOING)
+    assert loop.switch(["right"], []) is None
+    assert loop.states()["right"] == "running"
+    assert time.monotonic() > ready_s
 
 
 @pytest.mark.parametrize("jump_back", [True, False])

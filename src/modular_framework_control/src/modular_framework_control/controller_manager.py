@@ -62,7 +62,7 @@ class ControllerManager:
         root_nh: namespace below which each controller's parameters are found under its name.
         types: known controller types.
         attach: called for each loaded controller; opens its topics and actions and returns what closes them.
-        update_wait_s: how long a switch waits for the control loop to carry it out [s of real time].
+        update_wait_s: how long a switch waits for the next cycle of the control loop [s of real time].
         clock: real time [s], for the statistics.
     """
 
@@ -243,15 +243,17 @@ class ControllerManager:
                 raise ControllerError("; ".join(request.errors))
 
     def _hand_over(self, request: SwitchRequest) -> None:
-        """Put `request` into the slot of the loop and wait until it is done."""
-        self._pending = request
-        if request.done.wait(self._update_wait_s + request.timeout_s):
-            return
+        """Put `request` into the slot of the loop and wait until it is done, as long as the loop runs."""
+        self._pending, seen = request, -1
+        while seen != request.cycles:
+            seen = request.cycles
+            if request.done.wait(self._update_wait_s):
+                return
         with self._slot_lock:
             self._pending = None
         if not request.done.is_set():
-            raise ControllerError(f"the control loop did not carry out the switch within "
-                                  f"{self._update_wait_s + request.timeout_s:.1f} s; is it running, or paused?")
+            raise ControllerError(f"the control loop did not carry out the switch: it made no cycle for "
+                                  f"{self._update_wait_s:.1f} s; is it running, or paused?")
 
     def list_controllers(self) -> list[ControllerReport]:
         """All loaded controllers in the order they were loaded."""

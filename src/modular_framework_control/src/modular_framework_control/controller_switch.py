@@ -174,6 +174,7 @@ class SwitchRequest:
         plan: what to do.
         start_asap: start each controller as soon as the hardware is ready for it, not all together.
         timeout_s: how long the hardware may take [s of the loop's time]; 0 for no bound.
+        cycles: how many the loop has spent on it.
         done: set by the loop when nothing is left to do.
         errors: what went wrong, filled by the loop before `done`.
     """
@@ -181,6 +182,7 @@ class SwitchRequest:
     plan: SwitchPlan
     start_asap: bool = False
     timeout_s: float = 0.0
+    cycles: int = 0
     done: threading.Event = field(default_factory=threading.Event)
     errors: list[str] = field(default_factory=list)
     _begun_s: float | None = None
@@ -195,6 +197,7 @@ class SwitchRequest:
 
     def step(self, robot_hw: RobotHW, time_s: float) -> bool:
         """One cycle of the switch, in the control loop; True when it is finished."""
+        self.cycles += 1
         if self._begun_s is None:
             self._begin(robot_hw, time_s)
         if self.start_asap:
