@@ -250,6 +250,9 @@ source_workspace() {
 }
 
 main() {
+  # an empty environment (a service, `env -i`) lacks what caches and ROS's own files are kept in
+  [ -n "${HOME:-}" ] || HOME=$(getent passwd "$(id -u)" | cut -d: -f6) || fail "HOME is not set" "export HOME=FOLDER"
+  export HOME
   local command=${1:-setup}
   [ $# = 0 ] || shift
   case $command in
