@@ -2,12 +2,14 @@
 """When the fingers count as arrived or held up, without a motor: positions go in, orders to the motor come out."""
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
-from modular_framework_drivers.ezgripper.grip import Drive, Goal, Grip, GripRules, Motion
+from modular_framework_drivers.ezgripper.grip import Drive, Goal, Grip, GripRules, Motion, Standing
 from modular_framework_drivers.ezgripper.gripper_servos import joint_from_ticks, ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
 
@@ -140,6 +142,21 @@ def test_the_torque_asked_for_is_never_exceeded_and_held_goals_are_short_of_the_
 @given(st.floats(-0.3, 2.3))
 def test_ticks_and_joint_positions_belong_together(position: float) -> None:
     assert joint_from_ticks(ticks_from_joint(position)) == pytest.approx(position, abs=1.94 / 2500)
+
+
+def times_of_standing(velocities: list[float]) -> list[float]:
+    """When fingers with these velocities, measured every PERIOD_S, are said to stand [s]."""
+    standing = Standing(0.05, 0.1)
+    return [round(i * PERIOD_S, 6) for i, v in enumerate(velocities) if standing.update(v, i * PERIOD_S)]
+
+
+def test_fingers_stand_when_they_have_been_slow_for_a_while() -> None:
+    assert times_of_standing([1.0, 0.5, *[0.01] * 8]) == [0.14, 0.16, 0.18]
+
+
+@pytest.mark.parametrize("frequency", [0.7, 1.0, 3.0, 12.0])
+def test_fingers_that_swing_do_not_stand_where_they_turn_round(frequency: float) -> None:
+    assert not times_of_standing([math.cos(2.0 * math.pi * frequency * i * PERIOD_S) for i in range(500)])
 
 
 def test_open_is_0_and_closed_1_94() -> None:

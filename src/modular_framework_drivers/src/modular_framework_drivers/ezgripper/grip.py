@@ -145,3 +145,22 @@ class Grip:
             case Motion.MOVING:
                 return Drive(self.goal.position, self.goal.torque)
         raise ValueError(f"unknown motion {self.motion}")
+
+
+class Standing:
+    """Whether fingers stand; that they are slow once is not enough, so they are where they turn round too.
+
+    Args:
+        slow: who stands is slower than this [rad/s].
+        duration_s: and has been all the time for so long [s].
+    """
+
+    def __init__(self, slow: float, duration_s: float) -> None:
+        self._slow = slow
+        self._duration_s = duration_s
+        self._since_s = math.inf
+
+    def update(self, velocity: float, time_s: float) -> bool:
+        """Take a measured velocity [rad/s] of `time_s` [s]; returns whether the fingers stand."""
+        self._since_s = min(self._since_s, time_s) if abs(velocity) < self._slow else math.inf
+        return time_s - self._since_s >= self._duration_s

@@ -18,14 +18,14 @@ from modular_framework_core.ros_grasp_server import GraspServer
 from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT
-from modular_framework_drivers.ezgripper.grip import Motion
+from modular_framework_drivers.ezgripper.grip import Motion, Standing
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 
 ACTION_NAME = "moveit_grasp_action_server"
 POLL_S = 0.01
-STOP_TIMEOUT_S = 0.5
-STANDING_SPEED = 0.05
+STOP_TIMEOUT_S = 1.0
+STANDING_SPEED, STANDING_S = 0.05, 0.1
 
 
 class EzGripperManipulator:
@@ -89,11 +89,11 @@ class EzGripperManipulator:
     def _stop(self) -> None:
         """Stop the servo, and see that it stands."""
         self._gripper.stop()
-        end_s = time.monotonic() + STOP_TIMEOUT_S
         asked_s = time.monotonic()
-        while time.monotonic() < end_s:
+        standing = Standing(STANDING_SPEED, STANDING_S)
+        while time.monotonic() < asked_s + STOP_TIMEOUT_S:
             state = self._gripper.state()
-            if state.fault or (state.stamp_s > asked_s and abs(state.reading.velocity) < STANDING_SPEED):
+            if state.fault or (state.stamp_s > asked_s and standing.update(state.reading.velocity, state.stamp_s)):
                 return
             time.sleep(POLL_S)
         rospy.logwarn("%s: told to stop, the fingers still moved after %.1f s", self._gripper.settings.name,
