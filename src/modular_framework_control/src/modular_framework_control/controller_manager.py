@@ -24,9 +24,10 @@ from modular_framework_control.controller_switch import (
     plan_switch,
 )
 from modular_framework_control.controller_types import BASE_CLASS, ControllerTypes
+from modular_framework_control.fault_watch import FaultWatch
 from modular_framework_control.hardware_interface import ControllerInfo, InterfaceResources
 from modular_framework_control.node_handle import NodeHandle, join_names
-from modular_framework_control.robot_hw import HardwareFault, RobotHW
+from modular_framework_control.robot_hw import RobotHW
 
 Detach = Callable[[], None]
 Attach = Callable[[str, Controller], Detach]
@@ -81,12 +82,12 @@ class ControllerManager:
         self._loaded: tuple[LoadedController, ...] = ()
         self._detach: dict[str, Detach] = {}
         self._last_time_s = float("-inf")
-        self._fault_text = ""
+        self._watch = FaultWatch(robot_hw)
 
     @property
     def fault(self) -> str:
         """Why the hardware could not follow in the last cycle; "" when it could."""
-        return self._fault_text
+        return self._watch.text
 
     # ---- control loop ----
 
@@ -101,7 +102,7 @@ class ControllerManager:
         """
         reset = reset_controllers or time_s < self._last_time_s
         self._last_time_s = time_s
-        faults = self._hardware_faults()
+        faults = self._watch.ask()
         begun_s = self._clock()
         late_s = begun_s + period_s if period_s > 0.0 else math.inf
         for entry in self._loaded:
@@ -124,22 +125,6 @@ class ControllerManager:
             begun_s = ended_s
         if self._pending is not None:
             self._step_switch(time_s)
-
-    def _hardware_faults(self) -> Sequence[HardwareFault]:
-        """What the hardware suffers from; the log tells when that changes."""
-        try:
-            faults = self._robot_hw.faults()
-        except Exception as error:  # a user's hardware may raise anything; what cannot tell is not to be trusted
-            faults = (HardwareFault(f"fault() raised {type(error).__name__}: {error}",
-                                    self._robot_hw.commanded_joints),)
-        if faults or self._fault_text:
-            text = "; ".join(fault.reason for fault in faults)
-            if text and text != self._fault_text:
-                LOGGER.error("hardware fault: %s; controllers of its joints hold until it is over", text)
-            elif not text:
-                LOGGER.info("the hardware follows again (it did not for: %s)", self._fault_text)
-            self._fault_text = text
-        return faults
 
     def _step_switch(self, time_s: float) -> None:
         if not self._slot_lock.acquire(blocking=False):
@@ -229,7 +214,8 @@ class ControllerManager:
                 out because the control loop did not run.
         """
         with self._services:
-            plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop, _checked(strictness))
+            plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop,
+                               Strictness.of(strictness))
             if not plan.start and not plan.stop:
                 return
             conflict = self._robot_hw.check_for_conflict(plan.resulting)
@@ -296,16 +282,6 @@ class ControllerManager:
 
     def _names(self) -> str:
         return ", ".join(entry.name for entry in self._loaded) or "none"
-
-
-def _checked(strictness: int) -> Strictness:
-    if strictness == 0:
-        LOGGER.warning("switch_controller: strictness 0 is not defined; using BEST_EFFORT (1)")
-        return Strictness.BEST_EFFORT
-    try:
-        return Strictness(strictness)
-    except ValueError:
-        raise ControllerError(f"strictness {strictness} is not known; use BEST_EFFORT (1) or STRICT (2)") from None
 
 
 def _close(name: str, controller: Controller, detach: Detach) -> None:

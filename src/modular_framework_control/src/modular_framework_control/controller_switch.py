@@ -31,6 +31,21 @@ class Strictness(IntEnum):
     BEST_EFFORT = 1
     STRICT = 2
 
+    @classmethod
+    def of(cls, number: int) -> Strictness:
+        """The strictness a request asks for by its number; 0, as ros_control has it, means BEST_EFFORT.
+
+        Raises:
+            ControllerError: there is none of this number.
+        """
+        if number == 0:
+            LOGGER.warning("switch_controller: strictness 0 is not defined; using BEST_EFFORT (1)")
+            return cls.BEST_EFFORT
+        try:
+            return cls(number)
+        except ValueError:
+            raise ControllerError(f"strictness {number} is not known; use BEST_EFFORT (1) or STRICT (2)") from None
+
 
 @dataclass(slots=True)
 class LoadedController:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,12 +26,9 @@ from modular_framework_control.trajectory import (
     POSITION,
     SHORTEST_SEGMENT_S,
     Array,
-    InvalidTrajectoryError,
-    Spline,
     splice,
     stop_ramp,
 )
-from modular_framework_control.trajectory_check import check_points, joint_faults
 from modular_framework_control.trajectory_clock import TrajectoryClock
 from modular_framework_control.trajectory_goal import (
     GoalRejectedError,
@@ -41,24 +37,9 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
+from modular_framework_control.trajectory_order import TrajectoryOrder, order_of
 from modular_framework_control.trajectory_plan import TrajectoryPlan
-from modular_framework_control.trajectory_tolerances import (
-    Tolerances,
-    read_tolerances,
-    tolerances_of_goal,
-    violations,
-)
-
-
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """A checked goal in the mailbox; `spline` is None for "stop"."""
-
-    joints: tuple[int, ...]
-    stamp_s: float
-    spline: Spline | None
-    tolerances: Tolerances
-    ticket: TrajectoryTicket | None
+from modular_framework_control.trajectory_tolerances import read_tolerances, violations
 
 
 class JointTrajectoryController(Controller):
@@ -83,9 +64,9 @@ class JointTrajectoryController(Controller):
         self.on_state: Callable[[TrajectorySnapshot], None] | None = None
         self.on_feedback: Callable[[TrajectoryTicket, TrajectorySnapshot], None] | None = None
         self._handles: list[Any] = []
-        self._mailbox: deque[_Order | TrajectoryTicket] = deque()
+        self._mailbox: deque[TrajectoryOrder | TrajectoryTicket] = deque()
         self._running = False
-        self._active: _Order | None = None
+        self._active: TrajectoryOrder | None = None
         self._fault = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -116,25 +97,7 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
-        trajectory = goal.trajectory
-        if not trajectory.points and ticket is None:
-            everything = tuple(range(len(self.joint_names)))
-            self._mailbox.append(_Order(everything, 0.0, None, self._tolerances, None))
-            return
-        faults = joint_faults(trajectory.joint_names, self.joint_names, self._allow_partial)
-        if faults:
-            raise GoalRejectedError(TrajectoryErrorCode.INVALID_JOINTS, faults)
-        joints = tuple(self.joint_names.index(name) for name in trajectory.joint_names)
-        try:
-            check_points(trajectory)
-            if math.isnan(goal.goal_time_tolerance_s):
-                raise InvalidTrajectoryError("goal_time_tolerance is not a number")
-            tolerances = tolerances_of_goal(self._tolerances, self.joint_names, joints, goal.path_tolerance,
-                                            goal.goal_tolerance, goal.goal_time_tolerance_s)
-        except InvalidTrajectoryError as error:
-            raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, str(error)) from error
-        spline = Spline(trajectory) if trajectory.points else None
-        self._mailbox.append(_Order(joints, trajectory.stamp_s, spline, tolerances, ticket))
+        self._mailbox.append(order_of(goal, ticket, self.joint_names, self._tolerances, self._allow_partial))
 
     def cancel(self, ticket: TrajectoryTicket) -> None:
         """Ask the control loop to stop following the goal of `ticket`."""
@@ -192,7 +155,7 @@ class JointTrajectoryController(Controller):
     def _reject_waiting(self, text: str) -> None:
         while self._mailbox:
             order = self._mailbox.popleft()
-            if isinstance(order, _Order) and order.ticket is not None:
+            if isinstance(order, TrajectoryOrder) and order.ticket is not None:
                 order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
 
     def update(self, time_s: float, period_s: float) -> None:
@@ -237,7 +200,7 @@ class JointTrajectoryController(Controller):
     def _work_off_mailbox(self) -> None:
         while self._mailbox:
             order = self._mailbox.popleft()
-            if isinstance(order, _Order):
+            if isinstance(order, TrajectoryOrder):
                 refusal = self._fault or self._take_up(order)
                 if refusal:
                     self._refuse(order, refusal)
@@ -245,7 +208,7 @@ class JointTrajectoryController(Controller):
                 self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
                 self._stop()
 
-    def _take_up(self, order: _Order) -> str:
+    def _take_up(self, order: TrajectoryOrder) -> str:
         """Begin to follow a goal: it replaces the goal before it, and its motion from the start of the new one on.
 
         Returns:
@@ -272,20 +235,20 @@ class JointTrajectoryController(Controller):
         self._plan.follow(track, splice_s)
         return ""
 
-    def _warn_of_late_points(self, order: _Order, late_s: float) -> None:
+    def _warn_of_late_points(self, order: TrajectoryOrder, late_s: float) -> None:
         times_s = order.spline.times_s if order.spline is not None else np.zeros(0)
         late = int(np.searchsorted(times_s, late_s, side="right"))
         if late > 1 or (late == 1 and late_s > 0.0):
             LOGGER.warning("%s: the first %d of %d points are left out, they lie in the past; the next one is due in "
                            "%.3f s", self._namespace, late, len(times_s), times_s[late] - late_s)
 
-    def _refuse(self, order: _Order, reason: str) -> None:
+    def _refuse(self, order: TrajectoryOrder, reason: str) -> None:
         if order.ticket is None:
             LOGGER.warning("%s/command ignored: %s", self._namespace, reason)
         else:
             order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, reason)
 
-    def _replace_active(self, order: _Order) -> None:
+    def _replace_active(self, order: TrajectoryOrder) -> None:
         self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "preempted by a new goal")
         if order.ticket is not None:
             self._active = order
@@ -297,7 +260,7 @@ class JointTrajectoryController(Controller):
         self._plan.follow(stop_ramp(range(len(self.joint_names)), self._plan.sample(now_s), now_s,
                                     self._stop_duration_s * self._clock.rate), now_s)
 
-    def _check(self, order: _Order, now_s: float, error: Array) -> None:
+    def _check(self, order: TrajectoryOrder, now_s: float, error: Array) -> None:
         tolerances, late_s = order.tolerances, now_s - self._plan.end_s
         if late_s < 0.0:
             outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""
