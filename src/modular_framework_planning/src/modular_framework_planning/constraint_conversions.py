@@ -81,10 +81,10 @@ def holding_link(scene: PlanningScene, name: str) -> str:
     """Returns the link a frame is fixed to: the link of that name, or the one that holds the object; else empty."""
     if scene.model.has_link(name):
         return name
-    if name in scene.objects or name in scene.fixed_frames:
+    if name in scene.objects:
         return ""
-    held = scene.attached.get(name) or scene.attached.get(name.partition("/")[0])
-    return held.link if held else ""
+    return next((item.link for held, item in scene.attached.items() if name == held
+                 or (name.startswith(f"{held}/") and name.removeprefix(f"{held}/") in item.body.subframes)), "")
 
 
 class _Reader:

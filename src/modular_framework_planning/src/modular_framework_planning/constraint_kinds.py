@@ -18,7 +18,8 @@ from modular_framework_planning.regions import Solid
 from modular_framework_planning.spatial import Array, Transform
 
 SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
-INSIDE = 1.0e-5  # [m] or [rad]; projections aim this far inside a tolerance, not at its border
+INSIDE = 1.0e-5  # [m]; projections aim this far inside a region, not at its border
+INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight ways between two states bulge
 Row = tuple[Array, float]  # one linearised condition: (joint velocities -> change, change that is wanted)
 
 
@@ -191,7 +192,7 @@ class OrientationConstraint:
         angles, turned = self.deviation(data)
         if float((np.abs(angles) - self.tolerances).max()) <= SLACK:
             return
-        limits = self.tolerances - np.minimum(INSIDE, 0.5 * self.tolerances)
+        limits = INNER_SHARE * self.tolerances
         reference = self.reference.pose(data)
         where = self.link.pose(data).translation
         spin = (self.link.jacobian_at(model, data, where) - self.reference.jacobian_at(model, data, where))[3:]

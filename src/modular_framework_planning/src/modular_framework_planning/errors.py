@@ -2,7 +2,12 @@
 """Gives every failure of the planner one type that carries a result code and a reason a person can act on."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from modular_framework_planning.exact_collision import Contact
 
 
 class ErrorCode(IntEnum):
@@ -46,12 +51,14 @@ class PlanningError(Exception):
     Attributes:
         code: what the caller on the wire is told.
         reason: where, what was got, what was allowed and what to do.
+        contacts: what touches, where that is the reason.
     """
 
-    def __init__(self, code: ErrorCode, reason: str) -> None:
+    def __init__(self, code: ErrorCode, reason: str, contacts: Sequence[Contact] = ()) -> None:
         super().__init__(reason)
         self.code = code
         self.reason = reason
+        self.contacts = tuple(contacts)
 
 
 class ModelError(PlanningError):

@@ -82,7 +82,8 @@ class GoalResolver:
             return PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, f"{what} violates the path constraints: "
                                  f"{constraints.describe(whole)}; move the goal or widen the tolerances")
         contacts = self._checker.contacts(whole, include_fixed=False)
-        return PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}")
+        return PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}",
+                             contacts)
 
     def _joint(self, goal: JointGoal) -> Array:
         """Returns the exact target; where that is not free, the first free state found within the tolerances."""

@@ -21,6 +21,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import InverseKinematics
 from modular_framework_planning.line_timing import time_line
 from modular_framework_planning.motion_check import MotionChecker
+from modular_framework_planning.node_settings import PickPlaceSettings
 from modular_framework_planning.planning_request import JointGoal, PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import JointGroup
@@ -28,9 +29,7 @@ from modular_framework_planning.solution_choice import first_free
 from modular_framework_planning.spatial import Array, Transform
 from modular_framework_planning.trajectory import Trajectory
 
-LINE_STEP_M = 0.005
 CHECK_STEP = 0.004  # [rad or m] between looked-at states
-MOST_POSTURES = 4  # of the arm at the grasp that are tried
 DISTANCE_SLACK_M = 1.0e-6
 
 SceneChange = Callable[[PlanningScene], PlanningScene]
@@ -124,7 +123,7 @@ class ManoeuvrePlanner:
     """Plans manoeuvres one after the other within one deadline. Not for use from two threads at a time."""
 
     def __init__(self, arm: Arm, plan: Callable[[PlanningRequest], PlanningAnswer], request: PlanningRequest,
-                 contact_tolerance_m: float) -> None:
+                 contact_tolerance_m: float, settings: PickPlaceSettings | None = None) -> None:
         """Takes what all manoeuvres share.
 
         Args:
@@ -132,9 +131,10 @@ class ManoeuvrePlanner:
             plan: plans the way to the approach.
             request: a template of that plan: scene, planner, time allowed, path constraints.
             contact_tolerance_m: depth at which a held object may already touch something.
+            settings: how finely lines are solved and how many postures are tried.
         """
         self._arm, self._plan, self._template = arm, plan, request
-        self._tolerance_m = contact_tolerance_m
+        self._tolerance_m, self._settings = contact_tolerance_m, settings or PickPlaceSettings()
         self._deadline_s = time.monotonic() + request.allowed_time_s
         self._constraints: KinematicConstraints | None = request.path_constraints
 
@@ -199,7 +199,8 @@ class ManoeuvrePlanner:
                 arm.link, manoeuvre.tip_pose, scene.positions))
         at_nearest = scene.with_positions(found[0])
         checker, motion = self._checkers(at_nearest)
-        free = first_free([item[arm.group.indices] for item in found], motion.state_is_free, MOST_POSTURES)
+        free = first_free([item[arm.group.indices] for item in found], motion.state_is_free,
+                          self._settings.max_attempted_states_per_pose)
         if not free:
             raise PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{manoeuvre.name}: reach: all {len(found)} inverse "
                                 "kinematics solutions collide; the nearest: "
@@ -234,8 +235,8 @@ class ManoeuvrePlanner:
 
     def _line(self, scene: PlanningScene, end: Transform) -> StraightLine:
         """Follows a line from where the robot is in the scene."""
-        return straight_line(self._arm.solver, self._arm.link, scene.positions, [end], LINE_STEP_M,
-                             objection=self._objection(scene))
+        return straight_line(self._arm.solver, self._arm.link, scene.positions, [end],
+                             self._settings.cartesian_motion_step_size, objection=self._objection(scene))
 
     def _way_to(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
         """Plans from where the robot is to the begin of the approach, with nothing allowed to touch."""

@@ -145,7 +145,7 @@ class PlanningPipeline:
         if isinstance(found, Trajectory):
             return PlannedPath(found.positions, found, found_s=now, is_short=True)
         path = replace(found, found_s=now)
-        if path.is_short or path.trajectory is not None:
+        if path.is_short or path.trajectory is not None or not problem.settings.sampling.simplify_solutions:
             return path
         return replace(path, vertices=_shortened(problem, path.vertices))
 
@@ -164,7 +164,7 @@ class PlanningPipeline:
         fixed = checker.fixed_contacts(start)
         if fixed:
             raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
-                                f"joint of group '{group.name}' can change that; allow the pair or move it")
+                                f"joint of group '{group.name}' can change that; allow the pair or move it", fixed)
         if checker.is_free(start):
             return checker
         shallow = [item for item in checker.contacts(start, include_fixed=False)
@@ -237,7 +237,7 @@ def _require_start(problem: PlanningProblem) -> None:
         contacts = problem.checker.contacts(problem.start, include_fixed=False)
         raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state in collision: "
                             f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
-                            "FixStartStateCollision")
+                            "FixStartStateCollision", contacts)
     if problem.constraints is not None and not problem.constraints.satisfied(problem.start):
         raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
                             f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "

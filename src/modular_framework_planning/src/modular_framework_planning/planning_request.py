@@ -42,6 +42,13 @@ class ConstraintGoal:
 
 
 @dataclass(frozen=True, slots=True)
+class SamplingSettings:
+    """What is below ~ompl: whether the paths that are found are shortened."""
+
+    simplify_solutions: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class PipelineSettings:
     """How the planner works where a request leaves it open; names as in the config package.
 
@@ -60,6 +67,7 @@ class PipelineSettings:
         robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
         seed: of every plan of the pipeline; None for fresh random numbers each time.
         seeded_iterations: after how many a planner that goes on to improve its path stops, where a seed is set.
+        sampling: of paths that are searched.
     """
 
     start_state_max_bounds_error: float = 0.1
@@ -80,6 +88,7 @@ class PipelineSettings:
     robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
     seeded_iterations: int = 2000
+    sampling: SamplingSettings = field(default_factory=SamplingSettings)
 
     @property
     def finest_step(self) -> float:

@@ -97,7 +97,7 @@ class PlanningScene:
 
     def with_fixed_frames(self, frames: Mapping[str, Transform]) -> PlanningScene:
         """Returns the scene with further named frames, given in the planning frame."""
-        return self._changed(fixed_frames={**self.fixed_frames, **frames})
+        return self._changed(fixed_frames={**self.fixed_frames, **frames}) if frames else self
 
     def with_padding(self, padding: Padding) -> PlanningScene:
         """Returns the scene with another padding; raises UnknownNameError for a link the robot does not have."""
@@ -226,7 +226,7 @@ class PlanningScene:
         """Returns the pose of a frame in the planning frame.
 
         Args:
-            frame: a link, an object, "object/subframe", a fixed frame; empty means the planning frame.
+            frame: a link, an object, "object/subframe", a fixed frame (as of tf); empty means the planning frame.
             positions: joint positions [rad or m] to use instead of the scene's.
 
         Raises:
@@ -239,11 +239,11 @@ class PlanningScene:
             return SE3.Identity()
         if self.model.has_link(frame):
             return self.model.link_transforms(self.positions if positions is None else positions)[frame]
-        if frame in self.fixed_frames:
-            return self.fixed_frames[frame]
         found = self._body_transform(frame, positions)
         if found is None:
             found = self._subframe_transform(frame, positions)
+        if found is None:
+            found = self.fixed_frames.get(frame)  # last: what finds objects may call a frame of tf as the object
         if found is None:
             known = [self.model.planning_frame, *self.model.frame_ids, *self._body_frames(), *self.fixed_frames]
             raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.node_settings import MotionSettings
 from modular_framework_planning.pipeline import PlanningPipeline
 from modular_framework_planning.planning_request import PlanningAnswer, PlanningRequest
 from modular_framework_planning.robot_model import RobotModel
@@ -26,6 +27,7 @@ class MoveGroupContext:
     execution: TrajectoryExecution
     markers: MarkerPublisher
     reporter: Reporter
+    settings: MotionSettings
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
         """Plans with the pipeline the request names, or the default one.

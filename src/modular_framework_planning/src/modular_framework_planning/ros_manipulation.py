@@ -27,7 +27,6 @@ from modular_framework_planning.ros_context import MoveGroupContext
 from modular_framework_planning.ros_motion_watch import WatchedMotion
 
 DEFAULT_PLANNING_TIME_S = 5.0
-DEFAULT_REPLAN_ATTEMPTS = 5
 FINGER_SETTLE_S = 0.5
 REASONS_TOLD = 10
 
@@ -89,7 +88,7 @@ class Manipulation:
         details: dict[str, Any] = {"group": task.group}
         try:
             check_options(options)
-            tries = max(1, options.replan_attempts or DEFAULT_REPLAN_ATTEMPTS) if options.replan else 1
+            tries = self._context.settings.plan_execution.attempts(options)
             for number in range(tries):
                 try:
                     self._once(result)
@@ -165,7 +164,8 @@ class Manipulation:
                                   allowed_s if allowed_s > 0.0 else DEFAULT_PLANNING_TIME_S,
                                   cancelled=self._cancelled.is_set,
                                   path_constraints=None if constraints.is_empty else constraints)
-        return ManoeuvrePlanner(arm, self._context.plan, request, settings.start_state_contact_tolerance)
+        return ManoeuvrePlanner(arm, self._context.plan, request, settings.start_state_contact_tolerance,
+                                self._context.settings.pick_place)
 
     # ---------------------------------------------------------------- execution
     def _message(self, stage: Stage) -> RobotTrajectory:

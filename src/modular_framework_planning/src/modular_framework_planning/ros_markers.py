@@ -2,6 +2,7 @@
 """Shows planning scene and planned path as markers, for an RViz without MoveIt's plugin."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from modular_framework_control.ros_telling import tell
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.conversions import pose_message
+from modular_framework_planning.exact_collision import Contact
 from modular_framework_planning.planning_request import PlanningAnswer
 from modular_framework_planning.planning_scene import Color, PlanningScene
 from modular_framework_planning.robot_model import RobotModel
@@ -25,12 +27,20 @@ GHOST_COLOR = (1.0, 0.6, 0.1)
 INTERMEDIATE_GHOSTS = 3
 LINE_POINTS = 60
 PLANE_SIZE_M = 3.0
+CONTACT_COLOR = (1.0, 0.0, 0.0, 0.8)
+CONTACT_SIZE_M = 0.05
 
 
 class MarkerPublisher:
-    """Publishes ~planning_scene_markers, ~display_planned_path and ~display_planned_path_markers, all latched."""
+    """Publishes ~planning_scene_markers, ~display_planned_path, ~display_planned_path_markers, ~display_contacts.
 
-    def __init__(self) -> None:
+    All are latched.
+    """
+
+    def __init__(self, planning_frame: str) -> None:
+        """Args: the frame of contacts."""
+        self._frame = planning_frame
+        self._contacts = rospy.Publisher(names.DISPLAY_CONTACTS_TOPIC, MarkerArray, queue_size=5, latch=True)
         self._scene = rospy.Publisher(names.SCENE_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
         self._path = rospy.Publisher(names.PATH_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
         self._display = rospy.Publisher(names.DISPLAY_PATH_TOPIC, DisplayTrajectory, queue_size=5, latch=True)
@@ -64,6 +74,18 @@ class MarkerPublisher:
         for number, marker in enumerate(markers):
             marker.id = number
         tell(self._path, MarkerArray(markers))
+
+
+    def show_contacts(self, contacts: Sequence[Contact]) -> None:
+        """Publishes a ball where bodies touch, named by them: why the last plan failed; none takes old ones away."""
+        markers = [Marker(action=Marker.DELETEALL)]
+        for number, contact in enumerate(contacts):
+            marker = _marker(Marker.SPHERE, self._frame, f"{contact.first.name}={contact.second.name}", number)
+            marker.pose.position = Point(*(float(value) for value in contact.position))
+            marker.scale.x = marker.scale.y = marker.scale.z = CONTACT_SIZE_M
+            _paint(marker, CONTACT_COLOR)
+            markers.append(marker)
+        tell(self._contacts, MarkerArray(markers))
 
 
 def _paint(marker: Marker, color: tuple[float, float, float, float]) -> None:

@@ -2,7 +2,9 @@
 """Executes a planned motion, stops it when a change of the scene gets in its way, and records where the robot went."""
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +18,7 @@ from modular_framework_planning.path_watch import PathWatch
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.ros_context import MoveGroupContext
 
-PERIOD_S = 0.05
+PERIOD_S = 0.05  # between two looks at the scene
 JOIN_TIMEOUT_S = 5.0
 
 
@@ -42,6 +44,8 @@ class WatchedMotion:
             self._seen_version = planned_in.geometry_version
         self._stop, self._ended = threading.Event(), threading.Event()
         self._blocked = ""
+        frequency = context.settings.plan_execution.record_trajectory_state_frequency
+        self._period_s = 1.0 / frequency if frequency > 0.0 else math.inf
         self._begun = rospy.Time.now()
         self.executed = RobotTrajectory()
         self.executed.joint_trajectory.joint_names = self._joints
@@ -78,17 +82,20 @@ class WatchedMotion:
                                 f"rest of the motion is blocked: {self._blocked}; plan again, or ask for replan")
 
     def _accompany(self, cancelled: threading.Event) -> None:
+        pause_s, due_s = min(PERIOD_S, self._period_s), 0.0
         while not self._ended.is_set():
             if cancelled.is_set():
                 self._stop.set()
-            self._record()
+            if time.monotonic() >= due_s:
+                due_s = time.monotonic() + self._period_s
+                self._record()
             try:
                 self._look()
             except Exception as error:  # noqa: BLE001 - a motion nobody can watch any more must stop
                 self._blocked = f"watching it failed with {type(error).__name__}: {error}"
             if self._blocked:
                 self._stop.set()
-            cancelled.wait(PERIOD_S) if not cancelled.is_set() else self._ended.wait(PERIOD_S)
+            cancelled.wait(pause_s) if not cancelled.is_set() else self._ended.wait(pause_s)
 
     def _look(self) -> None:
         """Checks what is left of the motion when the geometry of the scene changed."""
@@ -99,7 +106,9 @@ class WatchedMotion:
             self._blocked = self._watch.blocked_by(self._change(scene))
 
     def _record(self) -> None:
-        """Notes the measured positions, once for each instant."""
+        """Notes the measured positions, once for each instant, unless nothing is to be recorded."""
+        if math.isinf(self._period_s):
+            return
         stamp = rospy.Time.now() - self._begun
         points = self.executed.joint_trajectory.points
         if points and stamp <= points[-1].time_from_start:

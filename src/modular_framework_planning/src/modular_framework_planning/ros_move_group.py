@@ -29,6 +29,12 @@ from modular_framework_planning.compile_loops import compile_all
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.many_threads import prepare
+from modular_framework_planning.node_settings import (
+    MotionSettings,
+    PickPlaceSettings,
+    PlanExecutionSettings,
+    SceneMonitorSettings,
+)
 from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.ros_capabilities import Capability, chosen_capabilities
 from modular_framework_planning.ros_context import MoveGroupContext
@@ -39,7 +45,7 @@ from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
 from modular_framework_planning.ros_padding import load_padding
 from modular_framework_planning.ros_parameters import load_kinematics_settings, load_robot_model
 from modular_framework_planning.ros_pipelines import load_pipelines
-from modular_framework_planning.ros_reconfiguration import ExecutionReconfiguration
+from modular_framework_planning.ros_reconfiguration import given_settings, reconfigurations
 from modular_framework_planning.ros_report import Reporter
 from modular_framework_planning.ros_scene_monitor import SceneMonitor
 
@@ -67,10 +73,14 @@ def build_context() -> MoveGroupContext:
     """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
     model = load_robot_model()
     kinematics = KinematicsPool(model, load_kinematics_settings())
-    monitor = SceneMonitor(model, load_padding(model))
+    monitor = SceneMonitor(model, load_padding(model), given_settings("planning_scene_monitor", SceneMonitorSettings()))
     execution = load_execution(monitor)
-    return MoveGroupContext(model, monitor, kinematics, load_pipelines(model, kinematics), execution,
-                            MarkerPublisher(), Reporter())
+    pipelines = load_pipelines(model, kinematics)
+    pipelines.sampling_settings = given_settings("ompl", pipelines.sampling_settings)
+    settings = MotionSettings(given_settings("plan_execution", PlanExecutionSettings()),
+                              given_settings("pick_place", PickPlaceSettings()))
+    return MoveGroupContext(model, monitor, kinematics, pipelines, execution, MarkerPublisher(model.planning_frame),
+                            Reporter(tell_requests="--debug" in rospy.myargv()), settings)
 
 
 def advertise(context: MoveGroupContext) -> None:
@@ -80,7 +90,8 @@ def advertise(context: MoveGroupContext) -> None:
     OctomapMonitor(context.monitor).connect()
     context.markers.show_scene(context.monitor.snapshot())
     context.execution.connect()
-    ExecutionReconfiguration(context.execution).connect()
+    for adjustable in reconfigurations(context):
+        adjustable.connect()
     rospy.on_shutdown(context.execution.close)
     rospy.on_shutdown(context.pipelines.close)
     for capability in chosen_capabilities(CAPABILITIES):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import rospy
@@ -13,7 +13,12 @@ from modular_framework_planning.errors import ErrorCode, ModelError, PlanningErr
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import DEFAULT_PLANNER, PlanningPipeline
 from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, PipelineSpec
-from modular_framework_planning.planning_request import PipelineSettings, PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_request import (
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+    SamplingSettings,
+)
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.seeded_planning import SeededPlanning
 
@@ -35,6 +40,18 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
             seeded: plans requests with a seed.
         """
         self._loaded, self.default, self._refused, self._seeded = dict(loaded), default, dict(refused), seeded
+        self._sampling = SamplingSettings()
+
+    @property
+    def sampling_settings(self) -> SamplingSettings:
+        """Settings of paths that are searched, of all pipelines; plans that begin later go by them."""
+        return self._sampling
+
+    @sampling_settings.setter
+    def sampling_settings(self, settings: SamplingSettings) -> None:
+        self._sampling = settings
+        for pipeline in self._loaded.values():
+            pipeline.settings = replace(pipeline.settings, sampling=settings)
 
     def __getitem__(self, name: str) -> PlanningPipeline:
         return self._loaded[name]
@@ -78,7 +95,7 @@ def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
     if not pipelines:
         name = default or str(own.get("planning_plugin") or DEFAULT_PLANNER).split("_interface")[0].split("/")[0]
         inner = own.get(name)
-        pipelines = {name: dict(inner if isinstance(inner, dict) else own)}
+        pipelines = {name: {**own, **(inner if isinstance(inner, dict) else {})}}
     if not default:
         default = "ompl" if "ompl" in pipelines else next(iter(pipelines))
     return pipelines, default

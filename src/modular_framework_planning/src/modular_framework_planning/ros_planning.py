@@ -102,6 +102,7 @@ def answer(context: MoveGroupContext, message: Any, change: Callable[[PlanningSc
     name = message.goal_constraints[0].name if message.goal_constraints else ""
     details: dict[str, Any] = {"group": message.group_name, "planner_id": message.planner_id, "request_name": name,
                                "planning_time_s": 0.0, "start": {}, "goal": {}}
+    context.reporter.request(message)
     try:
         if not message.start_state.joint_state.name or message.start_state.is_diff:
             context.monitor.wait_for_state()
@@ -112,6 +113,7 @@ def answer(context: MoveGroupContext, message: Any, change: Callable[[PlanningSc
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
         code = context.reporter.failure("plan", error, **details)
         if isinstance(error, PlanningError):
+            context.markers.show_contacts(error.contacts)
             raise
         raise PlanningError(ErrorCode(code), f"planning failed: {type(error).__name__}: {error}") from error
     response = MotionPlanResponse(group_name=message.group_name)
@@ -122,6 +124,7 @@ def answer(context: MoveGroupContext, message: Any, change: Callable[[PlanningSc
     details.update(planner_id=found.planner_id, planning_time_s=found.total_time_s,
                    goal=dict(zip(scene.model.joint_names, found.goal.tolist(), strict=True)))
     context.reporter.report("plan", ErrorCode.SUCCESS, "", **details)
+    context.markers.show_contacts(())
     context.markers.show_path(scene, response, found)
     return response
 

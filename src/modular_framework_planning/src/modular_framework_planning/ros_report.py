@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 import rospy
+from moveit_msgs.msg import MotionPlanRequest
 from std_msgs.msg import String
 
 from modular_framework_control.ros_telling import tell
@@ -15,11 +16,19 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 
 
 class Reporter:
-    """Publishes ~planning_report (std_msgs/String, JSON)."""
+    """Publishes ~planning_report (std_msgs/String, JSON) and, if asked to, ~motion_plan_request (latched)."""
 
-    def __init__(self) -> None:
+    def __init__(self, tell_requests: bool = False) -> None:
+        """Args: whether requests for plans are told, as MoveIt does with the argument --debug."""
         self._ids = itertools.count(1)
         self._publisher = rospy.Publisher(names.REPORT_TOPIC, String, queue_size=100)
+        self._requests = rospy.Publisher(names.REQUEST_TOPIC, MotionPlanRequest, queue_size=10,
+                                         latch=True) if tell_requests else None
+
+    def request(self, message: MotionPlanRequest) -> None:
+        """Tells a request as it came."""
+        if self._requests is not None:
+            tell(self._requests, message)
 
     def report(self, kind: str, code: int, reason: str, **details: Any) -> None:
         """Publishes one result; a failure is logged as well.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,14 @@ from modular_framework_planning import capability_names as names
 from modular_framework_planning.conversions import state_message
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.joint_history import JointHistory
+from modular_framework_planning.node_settings import SceneMonitorSettings
 from modular_framework_planning.padding import Padding
 from modular_framework_planning.planning_scene import PlanningScene, empty_scene
 from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.ros_tf_frames import TfFrames
 from modular_framework_planning.scene_conversions import apply_attached_object, apply_collision_object
 from modular_framework_planning.scene_difference import difference_message
 from modular_framework_planning.scene_messages import apply_scene, apply_world, scene_message
-
-STATE_UPDATE_PERIOD_S = 0.1
 
 
 class SceneMonitor:
@@ -33,14 +34,17 @@ class SceneMonitor:
     A thread of its own tells subscribers and listeners what changed, so that nobody waits for large messages; changes
     that follow each other closely are told as one.
 
-    Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object.
+    Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object, tf.
     Publishes: ~monitored_planning_scene: to each new subscriber the whole scene, to all the changes, among them the
-    joint positions while they change, ten times a second at most.
-    Parameters: ~planning_scene_monitor/publish_planning_scene, publish_geometry_updates, publish_state_updates (true).
+    joint positions and frames of tf while they change, as often as `settings` say at most.
+    Parameters: those of `settings`, below ~planning_scene_monitor.
     """
 
-    def __init__(self, model: RobotModel, padding: Padding | None = None) -> None:
+    def __init__(self, model: RobotModel, padding: Padding | None = None,
+                 settings: SceneMonitorSettings | None = None) -> None:
         self.model = model
+        self.settings = settings or SceneMonitorSettings()  # may be replaced while the node runs
+        self._frames = TfFrames(model)
         self._scene = empty_scene(model).with_padding(padding or Padding())
         self._lock = threading.RLock()
         self._positions = model.default_positions()
@@ -53,15 +57,15 @@ class SceneMonitor:
         self.listeners: list[Callable[[PlanningScene], None]] = []
         self._publisher: Any = None
         self._told = self._scene
+        self._was_silent = False
         self._telling = threading.Lock()
         self._news = threading.Event()
 
     def connect(self) -> None:
         """Starts to listen and to publish."""
+        self._frames.connect()
         self._told = self.snapshot()
-        if rospy.get_param("~planning_scene_monitor/publish_planning_scene", True):
-            self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _Greeter(self),
-                                              queue_size=100)
+        self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _Greeter(self), queue_size=100)
         rospy.Subscriber(names.JOINT_STATES_TOPIC, JointState, self._on_joint_state, queue_size=5, tcp_nodelay=True)
         for topic, kind, change in (
                 (names.SCENE_TOPIC, SceneMessage, apply_scene),
@@ -74,35 +78,40 @@ class SceneMonitor:
     def greet(self, publish: Callable[[Any], None]) -> None:
         """Hands the scene that the others know to a new subscriber; the lock keeps changes from coming in between."""
         with self._telling:
-            publish(scene_message(self._told, 0))
+            if self.settings.publish_planning_scene:
+                publish(scene_message(self._told, 0))
 
     def _tell(self) -> None:
-        """Tells changes of the scene as they come, and of the joints every STATE_UPDATE_PERIOD_S."""
-        geometry, state = (bool(rospy.get_param(f"~planning_scene_monitor/publish_{part}_updates", True))
-                           for part in ("geometry", "state"))
+        """Tells changes of the scene as they come, and of joints and frames as often as the settings say."""
         while not rospy.is_shutdown():
-            changed = self._news.wait(STATE_UPDATE_PERIOD_S)
+            settings = self.settings
+            changed = self._news.wait(1.0 / settings.publish_planning_scene_hz)
             self._news.clear()
-            if not (changed or state):
+            if not (changed or settings.publish_state_updates or settings.publish_transforms_updates):
                 continue
             scene = self.snapshot()
             try:
-                self._publish(scene if geometry else self._told.with_positions(scene.positions))
+                self._publish(scene, settings)
                 for listener in self.listeners if changed else ():
                     listener(scene)
             except rospy.ROSException as error:  # the node is going down
                 rospy.logdebug("the change of the planning scene was not told: %s", error)
 
-    def _publish(self, scene: PlanningScene) -> None:
-        if self._publisher is None:
-            return
+    def _publish(self, scene: PlanningScene, settings: SceneMonitorSettings) -> None:
+        """Tells subscribers the wanted parts of what changed, or everything where they heard nothing for a while."""
         with self._telling:
-            message = difference_message(self._told, scene) if self._publisher.get_num_connections() else None
+            heard = settings.publish_planning_scene and self._publisher.get_num_connections() > 0
+            if not heard:
+                self._told, self._was_silent = scene, not settings.publish_planning_scene
+                return
+            told = replace(
+                scene if settings.publish_geometry_updates else self._told,
+                positions=(scene if settings.publish_state_updates else self._told).positions,
+                fixed_frames=(scene if settings.publish_transforms_updates else self._told).fixed_frames)
+            message = scene_message(told, 0) if self._was_silent else difference_message(self._told, told)
             if message is not None:
                 self._publisher.publish(message)
-                self._told = scene
-            elif not self._publisher.get_num_connections():
-                self._told = scene
+                self._told, self._was_silent = told, False
 
     def _on_change(self, message: Any, context: tuple[str, Callable[[PlanningScene, Any], PlanningScene]]) -> None:
         topic, change = context
@@ -115,8 +124,9 @@ class SceneMonitor:
 
     def apply(self, change: Callable[[PlanningScene], PlanningScene]) -> PlanningScene:
         """Changes the scene, all or nothing; the next snapshot has the change. Raises PlanningError."""
+        frames = self._frames.now()
         with self._lock:
-            self._scene = change(self._scene.with_positions(self._positions.copy()))
+            self._scene = change(self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames))
             scene = self._scene
         self._news.set()
         return scene
@@ -173,9 +183,10 @@ class SceneMonitor:
             return self._arrived.wait_for(lambda: self._arrivals > seen, timeout_s)
 
     def snapshot(self) -> PlanningScene:
-        """Returns the scene as it is now, with the robot where it is now."""
+        """Returns the scene as it is now, with the robot and the frames of tf where they are now."""
+        frames = self._frames.now()
         with self._lock:
-            return self._scene.with_positions(self._positions.copy())
+            return self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames)
 
     def positions(self) -> Any:
         """Returns a copy of the current joint positions [rad or m]."""

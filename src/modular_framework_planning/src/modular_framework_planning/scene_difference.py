@@ -40,7 +40,7 @@ def difference_message(before: PlanningScene, after: PlanningScene) -> SceneMess
     message.robot_state.is_diff = empty.robot_state.is_diff = True
     if joints_moved(before, after):
         message.robot_state.joint_state = state_message(after, with_attached=False).joint_state
-    if before.fixed_frames is not after.fixed_frames:
+    if any(before.fixed_frames.get(name) is not place for name, place in after.fixed_frames.items()):
         message.fixed_frame_transforms = frames_to_message(after)
     if before.acm is not after.acm:
         write_matrix(after.acm, message.allowed_collision_matrix)

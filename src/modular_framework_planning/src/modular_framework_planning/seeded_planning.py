@@ -48,7 +48,7 @@ class SeededPlanning:
         """Plans in a fresh process.
 
         Args:
-            pipeline: one of those the specs describe; its planners' settings of now are used.
+            pipeline: one of those the specs describe; its settings and those of its planners of now are used.
             request: what to plan.
             seed: 0 or more; the same request, scene and seed give the same trajectory.
 
@@ -59,7 +59,7 @@ class SeededPlanning:
             raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; allowed is 0 or more")
         connection = self._connect()
         try:
-            send(connection, to_bytes((pipeline.name, pipeline.configurations.snapshot(), seed,
+            send(connection, to_bytes((pipeline.name, pipeline.settings, pipeline.configurations.snapshot(), seed,
                                        replace(request, cancelled=_never))))
             self._wait(connection, request)
             found = from_bytes(receive(connection), self._model)
@@ -69,7 +69,7 @@ class SeededPlanning:
         finally:
             connection.close()
         if isinstance(found, Failure):
-            raise PlanningError(ErrorCode(found.code), found.reason)
+            raise PlanningError(ErrorCode(found.code), found.reason, found.contacts)
         return found
 
     def start(self) -> None:

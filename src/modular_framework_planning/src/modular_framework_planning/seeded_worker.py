@@ -23,6 +23,7 @@ from pinocchio import SE3 as Transform
 
 from modular_framework_planning.compile_loops import compile_all
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.exact_collision import Contact
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.pipeline import PlanningPipeline
 from modular_framework_planning.pipeline_parts import PipelineSpec
@@ -59,6 +60,7 @@ class Failure:
 
     code: int
     reason: str
+    contacts: tuple[Contact, ...] = ()
 
 
 def send(connection: socket.socket, data: bytes) -> None:
@@ -103,12 +105,13 @@ def serve(setup: WorkerSetup, model: RobotModel, pipelines: dict[str, PlanningPi
 def _child(connection: socket.socket, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
     """Plans one request and ends the process."""
     try:
-        name, configurations, seed, request = from_bytes(receive(connection), model)
+        name, settings, configurations, seed, request = from_bytes(receive(connection), model)
 
         def cancelled() -> bool:
             return bool(select.select([connection], [], [], 0.0)[0])  # the parent says nothing more: this is its end
 
         pipeline = pipelines[name]
+        pipeline.settings = settings
         pipeline.configurations.restore(configurations)
         send(connection, to_bytes(_answer(pipeline, replace(request, cancelled=cancelled), seed)))
     except (EOFError, OSError):
@@ -123,7 +126,7 @@ def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> Any:
         ou.RNG.setSeed(1 + seed % (2**31 - 1))  # OMPL ignores the seed 0
         return pipeline.plan(replace(request, seed=seed), repeatable=True)
     except PlanningError as error:
-        return Failure(int(error.code), error.reason)
+        return Failure(int(error.code), error.reason, error.contacts)
     except Exception as error:  # noqa: BLE001 - the parent must be told whatever happened
         traceback.print_exc()
         return Failure(int(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")

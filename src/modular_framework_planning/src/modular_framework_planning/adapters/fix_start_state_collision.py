@@ -37,4 +37,5 @@ class FixStartStateCollision(RequestAdapter):
         raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, "start state in collision: "
                             f"{describe_contacts(contacts)}; " + (
                                 f"no free state within {settings.jiggle_fraction:.0%} of the joints' ranges"
-                                if shallow else "too deep to move out of; allow the pair or move the object"))
+                                if shallow else "too deep to move out of; allow the pair or move the object"),
+                            contacts)

@@ -20,7 +20,6 @@ from modular_framework_planning.ros_motion_watch import WatchedMotion
 from modular_framework_planning.ros_planning import answer
 from modular_framework_planning.scene_messages import apply_scene
 
-DEFAULT_REPLAN_ATTEMPTS = 5
 SHORTEST_DELAY_S = 0.05  # between two attempts: a plan that fails at once must not fill the log
 WORTH_ANOTHER_TRY = (ErrorCode.PLANNING_FAILED, ErrorCode.INVALID_MOTION_PLAN, ErrorCode.TIMED_OUT,
                      ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE)
@@ -66,8 +65,7 @@ class MoveAction:
     def _work(self, goal: Any, cancelled: threading.Event,
               feedback: Callable[[Any], None]) -> tuple[MoveGroupResult, bool, str]:
         options = goal.planning_options
-        attempts = (options.replan_attempts if options.replan_attempts > 0 else DEFAULT_REPLAN_ATTEMPTS) \
-            if options.replan else 1
+        attempts = self._context.settings.plan_execution.attempts(options)
         result, text = MoveGroupResult(), ""
         try:
             check_options(options)

@@ -18,7 +18,6 @@ from moveit_msgs.msg import (
 
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.capabilities.move_action import (
-    DEFAULT_REPLAN_ATTEMPTS,
     WORTH_ANOTHER_TRY,
     check_options,
     scene_change,
@@ -45,8 +44,7 @@ class SequenceAction:
     def _work(self, goal: Any, cancelled: threading.Event,
               feedback: Callable[[Any], None]) -> tuple[MoveGroupSequenceResult, bool, str]:
         options = goal.planning_options
-        attempts = (options.replan_attempts if options.replan_attempts > 0 else DEFAULT_REPLAN_ATTEMPTS) \
-            if options.replan else 1
+        attempts = self._context.settings.plan_execution.attempts(options)
         result, text = MoveGroupSequenceResult(), ""
         try:
             check_options(options)
