@@ -11,7 +11,7 @@ import pytest
 from modular_framework_control.hardware_interface import PositionJointInterface
 from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_drivers.ur import rtde_link, ur_arm_robot_hw
-from modular_framework_drivers.ur.arm_messages import READY, ArmState
+from modular_framework_drivers.ur.arm_messages import READY, TAKEN, ArmState
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 
@@ -107,6 +107,7 @@ class FakeProcess:
 
     started: list[FakeProcess]
     refused: OSError | None
+    mute: str       # role of the one that says nothing after its first message
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
         if FakeProcess.refused is not None:
@@ -114,15 +115,25 @@ class FakeProcess:
         FakeProcess.started.append(self)
         self.role = arguments[0]
         self.ended = False
-        self._said = False
+        self._said = self._taken = False
 
     def messages(self) -> Iterator[bytes]:
+        if self.role == FakeProcess.mute and self._said:
+            return
         if self.role == "state":
+            self._said = True
             yield ArmState(time.monotonic(), 0.0, ZEROS, ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL,
                            PLAYING).packed()
         elif not self._said:
             self._said = True
             yield READY
+        elif self._taken:
+            self._taken = False
+            yield TAKEN
+
+    def send(self, message: bytes) -> bool:
+        self._taken = True
+        return True
 
     def end(self, patience_s: float = 0.0) -> None:
         self.ended = True
@@ -130,7 +141,7 @@ class FakeProcess:
 
 @pytest.fixture
 def link(monkeypatch: pytest.MonkeyPatch) -> Iterator[RtdeLink]:
-    FakeProcess.started, FakeProcess.refused = [], None
+    FakeProcess.started, FakeProcess.refused, FakeProcess.mute = [], None, ""
     monkeypatch.setattr(rtde_link, "ChildProcess", FakeProcess)
     monkeypatch.setattr(rtde_link, "_RETRY_S", 0.05)
     made = RtdeLink(LinkSettings("nowhere", timeout_s=5.0))
@@ -165,3 +176,34 @@ def test_a_program_asked_for_at_once_after_it_was_given_up_is_a_new_one(link: Rt
     until(link, lambda: link.commanding)
     controls = [process for process in FakeProcess.started if process.role == "control"]
     assert [process.ended for process in controls] == [True, False]
+
+
+def test_a_control_loop_that_comes_late_does_not_take_the_link_for_lost(link: RtdeLink) -> None:
+    link.connect()
+    link.request_program()
+    until(link, lambda: link.commanding)
+    FakeProcess.mute = "state"
+    for _ in range(3):
+        time.sleep(0.4)
+        link.poll()
+        assert link.lost == "" and link.commanding
+
+
+@pytest.mark.parametrize(("role", "said"), [("state", "reads the arm's state has said nothing"),
+                                            ("control", "commands the arm has taken no command")])
+def test_a_process_that_hangs_is_told_and_replaced(link: RtdeLink, role: str, said: str) -> None:
+    link.connect()
+    link.request_program()
+    until(link, lambda: link.commanding)
+    begun_s = time.monotonic()
+    FakeProcess.mute = role
+    while said not in (reason := link.lost + link.program_failure):
+        assert time.monotonic() < begun_s + 3.0, reason
+        link.servo(ZEROS, PERIOD_S)
+        link.poll()
+        time.sleep(0.005)
+    assert time.monotonic() - begun_s > 0.4 and not link.commanding
+    FakeProcess.mute = ""
+    link.request_program()
+    until(link, lambda: link.commanding)
+    assert [process.ended for process in FakeProcess.started if process.role == role] == [True, False]

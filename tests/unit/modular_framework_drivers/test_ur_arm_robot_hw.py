@@ -2,11 +2,15 @@
 """The driver of UR arms against the emulated controller: it follows, says what is wrong, and comes back."""
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
+import os
+import resource
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -207,6 +211,48 @@ def test_a_pause_is_no_fault_but_stops_the_clock(make_rig: Callable[..., Rig]) -
     start = rig.positions
     rig.run(1.0, [position + 0.05 for position in start])
     assert rig.positions == pytest.approx([position + 0.05 for position in start], abs=1e-3)
+
+
+def test_a_pause_in_the_midst_of_commands_is_none_either(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig()
+    start = rig.positions
+    for step in range(300):
+        if step % 30 == 10:
+            rig.arm.order("pause")
+        elif step % 30 == 20:
+            rig.arm.order("play")
+        rig.cycle([position + 0.0003 * step for position in start])
+        assert rig.hw.fault() == ""
+    rig.run(0.5, [position + 0.09 for position in start])
+    assert rig.positions == pytest.approx([position + 0.09 for position in start], abs=1e-3)
+
+
+def scheduling(rig: Rig) -> dict[str, tuple[int, int]]:
+    """Policy and priority of the driver's processes, by their role."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        with contextlib.suppress(OSError):
+            line = (entry / "cmdline").read_bytes().decode().split("\0") if entry.name.isdigit() else []
+            if "modular_framework_drivers.ur.rtde_process" in line and rig.arm.address in line:
+                number = int(entry.name)
+                found[line[3]] = os.sched_getscheduler(number), os.sched_getparam(number).sched_priority
+    return found
+
+
+def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitted_and_wanted(
+        make_rig: Callable[..., Rig]) -> None:
+    other, fifo = (os.SCHED_OTHER, 0), (os.SCHED_FIFO, 60)
+    permitted = os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] >= 80
+    rig = make_rig()
+    expected = dict.fromkeys(("state", "control"), fifo if permitted else other)
+    assert scheduling(rig) == expected
+    rig.arm.order("cut")
+    rig.until(lambda: rig.hw.fault() != "")
+    rig.arm.order("restore")
+    rig.until(lambda: "being made again" not in rig.hw.fault())
+    assert rig.resume() == "" and scheduling(rig) == expected
+    rig.hw.close()
+    assert scheduling(make_rig(real_time=False)) == dict.fromkeys(("state", "control"), other)
 
 
 @pytest.mark.parametrize("command", [math.nan, 7.0, 1.0])

@@ -8,16 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modular_framework_drivers.ur.command_check import CommandCheck, MotionLimits
+from modular_framework_control.joint_limits import JointLimits, SoftJointLimits
+from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_drivers.ur.arm_parameters import read_checked_joints
+from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 
 NAMES = ("shoulder", "elbow")
-LIMITS = [MotionLimits(name, -2.0, 2.0, 3.0, 40.0) for name in NAMES]
+LIMITS = JointLimits(-2.0, 2.0, max_velocity=3.0, max_acceleration=40.0)
 DT_S = 0.008
 WILD = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-2.5, 2.5))
 
 
-def checked(max_jump: float = 0.5) -> CommandCheck:
-    check = CommandCheck(LIMITS, max_jump)
+def checked(max_jump: float = 0.5, soft: SoftJointLimits | None = None) -> CommandCheck:
+    check = CommandCheck([CheckedJoint(name, LIMITS, soft) for name in NAMES], max_jump)
     check.reset([0.0, 0.0])
     return check
 
@@ -96,3 +99,50 @@ def test_a_refused_command_brings_a_moving_arm_to_rest_and_the_next_good_one_goe
 def test_the_refusal_says_what_was_got_and_what_is_allowed() -> None:
     assert "command 2.5 rad is outside its range [-2, 2] rad" in checked().admit([2.5, 0.0], DT_S)
     assert "at most 0.5 rad at once" in checked().admit([0.9, 0.0], DT_S)
+
+
+@settings(deadline=None)
+@given(speed=st.floats(0.1, 2.5), k_position=st.floats(2.0, 20.0), end=st.floats(0.2, 1.5))
+def test_an_end_of_the_soft_range_is_approached_the_slower_the_nearer_and_not_passed(speed: float, k_position: float,
+                                                                                     end: float) -> None:
+    check = checked(max_jump=4.0, soft=SoftJointLimits(-1.9, end, k_position, 1.0))
+    for cycle in range(1, 700):
+        before = check.sent[0]
+        assert check.admit([min(speed * cycle * DT_S, 1.9), 0.0], DT_S) == ""
+        allowed = k_position * (end - before)
+        assert (check.sent[0] - before) / DT_S <= allowed + 40.0 * DT_S + 1e-6
+        assert check.sent[0] <= end + 40.0 * DT_S * DT_S
+    if speed * 700 * DT_S > end:
+        assert check.sent[0] <= end + 1e-3
+
+
+def test_outside_the_soft_range_only_the_way_back_is_open_and_nothing_moves_by_itself() -> None:
+    check = checked(soft=SoftJointLimits(-1.0, 1.0, 5.0, 1.0))
+    check.reset([1.5, 0.0])
+    for _ in range(50):
+        assert check.admit([1.5, 0.0], DT_S) == ""
+    assert check.sent[0] == 1.5
+    for _ in range(50):
+        check.admit([1.8, 0.0], DT_S)
+    assert check.sent[0] == 1.5
+    for _ in range(200):
+        check.admit([1.2, 0.0], DT_S)
+    assert check.sent[0] == pytest.approx(1.2, abs=40.0 * DT_S * DT_S)
+
+
+def test_the_limits_are_those_of_the_description_and_of_joint_limits_but_never_more_than_the_arm_can() -> None:
+    description = """<robot name="arm"><link name="a"/><link name="b"/>
+      <joint name="shoulder" type="revolute"><parent link="a"/><child link="b"/>
+        <limit lower="-9" upper="1" velocity="99" effort="1"/>
+        <safety_controller soft_lower_limit="-1" soft_upper_limit="0.5" k_position="15" k_velocity="2"/>
+      </joint></robot>"""
+    root = MappingNodeHandle({"robot_description": description, "joint_limits": {"elbow": {
+        "has_position_limits": True, "min_position": -0.5, "max_position": 0.5, "has_acceleration_limits": True,
+        "max_acceleration": 3.0, "soft_lower_limit": -0.4, "soft_upper_limit": 0.4, "k_position": 10.0,
+        "k_velocity": 1.0}}})
+    shoulder, elbow = read_checked_joints(["shoulder", "elbow"], root)
+    assert (shoulder.limits.min_position, shoulder.limits.max_position) == (pytest.approx(-2.0 * math.pi), 1.0)
+    assert (shoulder.limits.max_velocity, shoulder.limits.max_acceleration) == (pytest.approx(math.pi), 40.0)
+    assert shoulder.soft == SoftJointLimits(-1.0, 0.5, 15.0, 2.0)
+    assert (elbow.limits.min_position, elbow.limits.max_position, elbow.limits.max_acceleration) == (-0.5, 0.5, 3.0)
+    assert elbow.soft == SoftJointLimits(-0.4, 0.4, 10.0, 1.0)

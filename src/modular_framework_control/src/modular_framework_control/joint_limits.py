@@ -85,7 +85,7 @@ class PositionJointSaturation:
             reach = limits.max_velocity * period_s
             lowest, highest = last - reach, last + reach
         else:
-            slowest, fastest = _soft_velocities(last, limits, self.soft)
+            slowest, fastest = soft_velocities(last, limits, self.soft)
             lowest, highest = last + slowest * period_s, last + fastest * period_s
         if command > highest:
             command = highest
@@ -146,7 +146,7 @@ class VelocityJointSaturation(_Saturation):
         if self.soft is None:
             lowest, highest = -limits.max_velocity, limits.max_velocity
         else:
-            lowest, highest = _soft_velocities(position, limits, self.soft)
+            lowest, highest = soft_velocities(position, limits, self.soft)
         if limits.max_acceleration < math.inf:
             change = limits.max_acceleration * max(0.0, period_s)
             lowest, highest = max(lowest, state.velocity - change), min(highest, state.velocity + change)
@@ -180,7 +180,7 @@ class EffortJointSaturation(_Saturation):
         position, velocity = handle.state.position, handle.state.velocity
         lowest, highest = -limits.max_effort, limits.max_effort
         if self.soft is not None:
-            slowest, fastest = _soft_velocities(position, limits, self.soft)
+            slowest, fastest = soft_velocities(position, limits, self.soft)
             if slowest > -math.inf:
                 lowest = _clamped(self.soft.k_velocity * (slowest - velocity), limits.max_effort)
             if fastest < math.inf:
@@ -200,7 +200,7 @@ def _clamped(value: float, bound: float) -> float:
     return max(-bound, min(bound, value)) if value == value else 0.0
 
 
-def _soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
+def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
     """Smallest and largest velocity allowed at `position`."""
     largest = limits.max_velocity
     lowest = -largest if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
@@ -269,4 +269,4 @@ class JointLimitGuard:
 
 __all__ = ["EffortJointSaturation", "JointLimitGuard", "JointLimiter", "JointLimits", "PosVelJointSaturation",
            "PositionJointSaturation", "SoftJointLimits", "VelocityJointSaturation", "limit_handle", "limits_from_urdf",
-           "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters"]
+           "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters", "soft_velocities"]

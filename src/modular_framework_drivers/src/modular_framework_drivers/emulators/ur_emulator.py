@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import IO
 
+from modular_framework_control.real_time import run_in_real_time
 from modular_framework_drivers.emulators.command_port import CommandPort
 from modular_framework_drivers.emulators.ur_control_script import ProgramReceiver
 from modular_framework_drivers.emulators.ur_controller import HOME, MODELS, UrController
@@ -27,6 +28,7 @@ from modular_framework_drivers.emulators.ur_rtde_server import RtdeServer, RtdeS
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 RTDE_PORT, SCRIPT_PORTS, DASHBOARD_PORT, COMMAND_PORT = 30004, (30001, 30002, 30003), 29999, 29901
+_PRIORITY = 30       # below the control loop and its helpers, above everything else
 _MAX_CATCH_UP = 25   # cycles; after a longer hold-up the clock of the controller is set to now
 
 
@@ -69,7 +71,8 @@ class UrEmulator:
         self._port.connect()
 
     def run(self) -> None:
-        """Serve until `stop`."""
+        """Serve until `stop`; in real time where that is permitted: an arm keeps its time."""
+        run_in_real_time(_PRIORITY)
         period_s = self.controller.period_s
         next_s = time.monotonic() + period_s
         while not self._stopping.is_set():

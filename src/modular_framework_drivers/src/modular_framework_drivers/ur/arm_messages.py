@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the control loop and the processes that hold ur-rtde say to each other; one datagram per message.
 
-The first byte is the kind; numbers follow in the machine's own byte order, as both ends run on one machine.
+The first byte is the kind; numbers follow in the machine's own byte order, as both ends run on one machine. CONNECTING
+comes from both processes when they begin to connect; STATE, and ALIVE while there is none, from the one that reads;
+READY once and TAKEN after each command from the one that commands; FAILED with the reason from both, as the last one.
 """
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 JOINTS = 6
-STATE, READY, FAILED, SERVO = b"S", b"R", b"F", b"Q"
+CONNECTING, STATE, ALIVE, READY, TAKEN, FAILED, SERVO = b"C", b"S", b"A", b"R", b"T", b"F", b"Q"
 _STATE = struct.Struct("=cdd26dii I".replace(" ", ""))
 _SERVO = struct.Struct("=c7d")
 MESSAGE_SIZE = 1024
@@ -22,7 +24,7 @@ class ArmState:
     """What the arm's controller reports.
 
     Attributes:
-        received_s: when it came, on the monotonic clock [s].
+        received_s: when the process that reads got it, on the monotonic clock [s].
         timestamp_s: the controller's own clock [s].
         positions: of the joints [rad].
         velocities: [rad/s].

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from modular_framework_control.joint_limit_parameters import JointLimits, limits_from_urdf, limits_with_parameters
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_number
-from modular_framework_drivers.ur.command_check import MotionLimits
+from modular_framework_control.joint_limit_parameters import (
+    JointLimits,
+    limits_from_urdf,
+    limits_with_parameters,
+    soft_limits_from_urdf,
+    soft_limits_with_parameters,
+)
+from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+from modular_framework_drivers.ur.command_check import CheckedJoint
 from modular_framework_drivers.ur.rtde_link import LinkSettings
 
-_UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, math.pi)
-_MAX_ACCELERATION = 40.0          # the most URScript accepts of a joint [rad/s^2]
+# what an arm can do at most: turns, its maker's speed, and the acceleration that URScript accepts of a joint
+_UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, max_velocity=math.pi, max_acceleration=40.0)
 
 
 def read_prefix(nh: NodeHandle) -> str:
@@ -39,7 +46,7 @@ def read_link_settings(nh: NodeHandle) -> LinkSettings:
     return LinkSettings(address, read_number(nh, "link_timeout", 0.12, 0.02), scale,
                         read_number(nh, "payload_mass_kg", 0.0), _read_centre(nh),
                         _read_bounded(nh, "servoj_lookahead_time", 0.03, 0.03, 0.2),
-                        _read_bounded(nh, "servoj_gain", 2000.0, 100.0, 2000.0))
+                        _read_bounded(nh, "servoj_gain", 2000.0, 100.0, 2000.0), read_bool(nh, "real_time", True))
 
 
 def _read_bounded(nh: NodeHandle, key: str, default: float, low: float, high: float) -> float:
@@ -58,20 +65,22 @@ def _read_centre(nh: NodeHandle) -> tuple[float, float, float]:
     return numbers[0], numbers[1], numbers[2]
 
 
-def read_motion_limits(names: list[str], root_nh: NodeHandle) -> list[MotionLimits]:
-    """Limits of the joints, from the robot description, `joint_limits` and what the arm can do at most.
+def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJoint]:
+    """The joints with their limits: of the robot description and `joint_limits`, and what the arm can do at most.
 
     Raises:
         ParameterError: a limit is not allowed.
     """
     description = root_nh.get_param("robot_description")
     known = limits_from_urdf(description) if isinstance(description, str) else {}
-    limits = []
+    soft = soft_limits_from_urdf(description) if isinstance(description, str) else {}
+    joints = []
     for name in names:
-        limit = limits_with_parameters(name, known.get(name, _UR_LIMITS), root_nh)
-        acceleration = _MAX_ACCELERATION
-        if root_nh.get_param(f"joint_limits/{name}/has_acceleration_limits", False):
-            acceleration = read_number(root_nh, f"joint_limits/{name}/max_acceleration", _MAX_ACCELERATION)
-        limits.append(MotionLimits(name, limit.min_position, limit.max_position, min(limit.max_velocity, math.pi),
-                                   acceleration))
-    return limits
+        limits = limits_with_parameters(name, known.get(name, _UR_LIMITS), root_nh)
+        joints.append(CheckedJoint(name, replace(
+            limits, min_position=max(limits.min_position, _UR_LIMITS.min_position),
+            max_position=min(limits.max_position, _UR_LIMITS.max_position),
+            max_velocity=min(limits.max_velocity, _UR_LIMITS.max_velocity),
+            max_acceleration=min(limits.max_acceleration, _UR_LIMITS.max_acceleration),
+        ), soft_limits_with_parameters(name, soft.get(name), root_nh)))
+    return joints

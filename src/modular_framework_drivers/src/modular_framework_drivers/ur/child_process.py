@@ -41,6 +41,8 @@ class ChildProcess:
                 message = self._socket.recv(MESSAGE_SIZE)
             except BlockingIOError:
                 return
+            except ConnectionResetError:    # it went without reading all we said; what it said comes next
+                continue
             except OSError:
                 message = b""
             if not message:

@@ -2,7 +2,12 @@
 """Checks every position command before it goes to the arm: what the arm cannot do must not reach it.
 
 A command that is no number, lies outside a joint's range or is far from the last one is refused; the arm brakes and
-holds. One that is only faster, or accelerates more, than a joint may is followed as fast as the joint may.
+holds. One that is only faster, or accelerates more, than a joint may is followed as fast as the joint may; so is one
+beyond a soft limit, up to that limit.
+
+The limits are those of every hardware (modular_framework_control.joint_limits), but a guard that makes any command the
+nearest allowed one does not do here: a real arm must not drive to the end of its range because a controller went
+wrong, and it stops itself hard when it is told to change its speed at once.
 """
 from __future__ import annotations
 
@@ -10,50 +15,57 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from modular_framework_control.joint_limit_parameters import JointLimits, SoftJointLimits
+from modular_framework_control.joint_limits import soft_velocities
+
 _SLACK = 1e-6     # rounding that is forgiven [rad], and as a share of a limit
 
 
 @dataclass(frozen=True, slots=True)
-class MotionLimits:
-    """What a joint may do.
+class CheckedJoint:
+    """A joint and what it may do.
 
     Attributes:
         name: of the joint.
-        min_position, max_position: its range [rad].
-        max_velocity: [rad/s].
-        max_acceleration: [rad/s^2].
+        limits: of its position [rad], velocity [rad/s] and acceleration [rad/s^2]; all finite.
+        soft: its soft limits, if any.
     """
 
     name: str
-    min_position: float
-    max_position: float
-    max_velocity: float
-    max_acceleration: float
+    limits: JointLimits
+    soft: SoftJointLimits | None = None
+
+    def velocity_range(self, position: float) -> tuple[float, float]:
+        """Smallest and largest velocity at `position` [rad]; where soft limits leave only the way back, also 0."""
+        if self.soft is None:
+            return -self.limits.max_velocity, self.limits.max_velocity
+        slowest, fastest = soft_velocities(position, self.limits, self.soft)
+        return min(slowest, 0.0), max(fastest, 0.0)
 
 
 class CommandCheck:
     """The commands that go to the arm.
 
     Args:
-        limits: of the joints, in the order of the commands.
+        joints: in the order of the commands.
         max_jump: largest distance between a command and what was last sent [rad].
 
     Attributes:
         sent: what is to be sent [rad]; changed by `admit` and `reset`.
     """
 
-    def __init__(self, limits: Sequence[MotionLimits], max_jump: float) -> None:
-        self._limits = tuple(limits)
+    def __init__(self, joints: Sequence[CheckedJoint], max_jump: float) -> None:
+        self._joints = tuple(joints)
         self._max_jump = max_jump
-        self.sent = [0.0] * len(self._limits)
-        self._velocities = [0.0] * len(self._limits)
-        self._targets = [0.0] * len(self._limits)
+        self.sent = [0.0] * len(self._joints)
+        self._velocities = [0.0] * len(self._joints)
+        self._targets = [0.0] * len(self._joints)
 
     def reset(self, positions: Sequence[float]) -> None:
         """Begin anew from an arm that rests at `positions` [rad]."""
         self.sent = list(positions)
         self._targets = list(positions)
-        self._velocities = [0.0] * len(self._limits)
+        self._velocities = [0.0] * len(self._joints)
 
     def admit(self, commands: Sequence[float], period_s: float) -> str:
         """Set `sent` to what the arm is to be told.
@@ -68,55 +80,59 @@ class CommandCheck:
         reason = self._why_not(commands)
         if period_s <= 0.0:
             return reason
-        for joint, limit in enumerate(self._limits):
+        for index, joint in enumerate(self._joints):
+            limits = joint.limits
             if reason:
-                self._brake(joint, limit.max_acceleration * period_s, period_s)
+                self._brake(index, limits.max_acceleration * period_s, period_s)
             else:
-                command = min(max(commands[joint], limit.min_position), limit.max_position)
-                self._approach(joint, command, limit, period_s)
+                command = min(max(commands[index], limits.min_position), limits.max_position)
+                self._approach(index, command, joint, period_s)
         return reason
 
     def _why_not(self, commands: Sequence[float]) -> str:
-        for command, sent, limit in zip(commands, self.sent, self._limits, strict=True):
+        for command, sent, joint in zip(commands, self.sent, self._joints, strict=True):
+            limits = joint.limits
             if not math.isfinite(command):
-                return f"joint '{limit.name}': command {command} is no position; the arm holds"
-            if not limit.min_position - _SLACK <= command <= limit.max_position + _SLACK:
-                return (f"joint '{limit.name}': command {command:.6g} rad is outside its range "
-                        f"[{limit.min_position:.6g}, {limit.max_position:.6g}] rad; the arm holds")
+                return f"joint '{joint.name}': command {command} is no position; the arm holds"
+            if not limits.min_position - _SLACK <= command <= limits.max_position + _SLACK:
+                return (f"joint '{joint.name}': command {command:.6g} rad is outside its range "
+                        f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds")
             if abs(command - sent) > self._max_jump:
-                return (f"joint '{limit.name}': command {command:.6g} rad is {abs(command - sent):.3g} rad away from "
+                return (f"joint '{joint.name}': command {command:.6g} rad is {abs(command - sent):.3g} rad away from "
                         f"{sent:.6g} rad where the arm is told to be; at most {self._max_jump:g} rad at once "
                         "(parameter max_jump_rad); the arm holds")
         return ""
 
-    def _brake(self, joint: int, change: float, period_s: float) -> None:
-        velocity = self._velocities[joint]
+    def _brake(self, index: int, change: float, period_s: float) -> None:
+        velocity = self._velocities[index]
         velocity -= min(max(velocity, -change), change)
-        self._velocities[joint] = velocity
-        self.sent[joint] += velocity * period_s
-        self._targets[joint] = self.sent[joint]
+        self._velocities[index] = velocity
+        self.sent[index] += velocity * period_s
+        self._targets[index] = self.sent[index]
 
-    def _approach(self, joint: int, command: float, limit: MotionLimits, period_s: float) -> None:
+    def _approach(self, index: int, command: float, joint: CheckedJoint, period_s: float) -> None:
         """Go to the command at once if velocity and acceleration allow it, else as fast as they do.
 
         "At once" also asks that the joint can be as fast as the commands are in the next cycle, lest it run past them.
         """
-        position, velocity = self.sent[joint], self._velocities[joint]
-        top, change = limit.max_velocity, limit.max_acceleration * period_s
-        pace = (command - self._targets[joint]) / period_s
-        self._targets[joint] = command
+        position, velocity = self.sent[index], self._velocities[index]
+        slowest, fastest = joint.velocity_range(position)
+        deceleration = joint.limits.max_acceleration
+        change = deceleration * period_s
+        pace = (command - self._targets[index]) / period_s
+        self._targets[index] = command
         wanted = (command - position) / period_s
         at_once = max(abs(wanted - velocity), abs(wanted - pace)) <= change * (1.0 + _SLACK)
-        if not at_once or abs(wanted) > top * (1.0 + _SLACK):
-            pace = min(max(pace, -top), top)
-            behind = command - pace * period_s - position
-            goal = pace + math.copysign(_closing_speed(abs(behind), limit.max_acceleration, period_s), behind)
-            velocity += min(max(min(max(goal, -top), top) - velocity, -change), change)
-            self._velocities[joint] = velocity
-            self.sent[joint] = position + velocity * period_s
-        else:
-            self._velocities[joint] = wanted
-            self.sent[joint] = command
+        if at_once and slowest * (1.0 + _SLACK) <= wanted <= fastest * (1.0 + _SLACK):
+            self._velocities[index] = wanted
+            self.sent[index] = command
+            return
+        pace = min(max(pace, slowest), fastest)
+        behind = command - pace * period_s - position
+        goal = pace + math.copysign(_closing_speed(abs(behind), deceleration, period_s), behind)
+        velocity += min(max(min(max(goal, slowest), fastest) - velocity, -change), change)
+        self._velocities[index] = velocity
+        self.sent[index] = position + velocity * period_s
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:

@@ -2,30 +2,39 @@
 """The connection to an arm as the control loop sees it: the newest state, and whether commands get through.
 
 Two processes hold ur-rtde (rtde_process.py). A thread starts them, and starts them again when a connection fails; the
-control loop only takes datagrams from them and sends datagrams to them.
+control loop only takes datagrams from them and sends datagrams to them. That the arm is silent is for the process that
+listens to say: a loop that comes late itself knows nothing of it.
 """
 from __future__ import annotations
 
 import logging
-import math
 import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from modular_framework_drivers.ur.arm_messages import FAILED, READY, STATE, ArmState, servo_message
-from modular_framework_drivers.ur.arm_modes import robot_fault
+from modular_framework_drivers.ur.arm_messages import (
+    CONNECTING,
+    FAILED,
+    READY,
+    STATE,
+    TAKEN,
+    ArmState,
+    servo_message,
+)
+from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, robot_fault
 from modular_framework_drivers.ur.child_process import ChildProcess
+from modular_framework_drivers.ur.state_watch import SilenceWatch
 
 LOGGER = logging.getLogger("rosout.ur_arm")
 _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
 _RETRY_S = 0.5                  # between two attempts to connect
-_CONNECT_TIMEOUT_S = 5.0        # for the first state
-_PROGRAM_TIMEOUT_S = 15.0       # for the upload of the program
+_START_TIMEOUT_S = 30.0         # for a process to start; a busy computer takes its time
+_CONNECT_TIMEOUT_S = 5.0        # from then to the first state
+_PROGRAM_TIMEOUT_S = 15.0       # from then until the program is uploaded and runs
+_MUTE_S = 0.5                   # a process that says nothing for so long does nothing either
 _STOP_PATIENCE_S = 1.5          # for the arm to come to rest when the link is closed
-_MAX_POSITION = 2.0 * math.pi + 0.2
-_MAX_SPEED = 2.0 * math.pi      # of a measured joint; twice what a UR5's does [rad/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +49,7 @@ class LinkSettings:
         payload_centre_m: its centre of mass in the flange frame [m].
         lookahead_s: of servoj, 0.03 to 0.2 [s].
         gain: of servoj, 100 to 2000.
+        real_time: whether the processes that hold ur-rtde ask for real-time scheduling.
     """
 
     address: str
@@ -49,16 +59,37 @@ class LinkSettings:
     payload_centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lookahead_s: float = 0.03
     gain: float = 2000.0
+    real_time: bool = True
 
 
-@dataclass(slots=True)
-class _Stream:
-    """A process that reads states, since when, and whether it delivered any or has failed."""
+class _Helper:
+    """A process that holds ur-rtde.
 
-    process: ChildProcess
-    since_s: float
-    delivered: bool = False
-    failed: bool = False
+    Attributes:
+        process: itself.
+        works: whether it has delivered a state, or is ready for commands.
+        failed: whether it is of no more use.
+        silence: since when it owes a message.
+        owes: whether it owes one.
+    """
+
+    __slots__ = ("process", "works", "failed", "silence", "owes", "_patience_s", "_since_s")
+
+    def __init__(self, process: ChildProcess, now_s: float) -> None:
+        self.process = process
+        self.works = self.failed = self.owes = False
+        self.silence = SilenceWatch(now_s)
+        self._since_s, self._patience_s = now_s, _START_TIMEOUT_S
+
+    def connects(self, now_s: float, patience_s: float) -> None:
+        """It has started, and has `patience_s` [s] from now on to connect."""
+        self._since_s, self._patience_s = now_s, patience_s
+
+    def too_late(self, now_s: float) -> str:
+        """Why it takes too long to work; "" when it does not."""
+        if self.works or self.failed or now_s - self._since_s <= self._patience_s:
+            return ""
+        return f"within {self._patience_s:g} s"
 
 
 class RtdeLink:
@@ -74,10 +105,8 @@ class RtdeLink:
         self._settings = settings
         self._closing = threading.Event()
         self._keeper: threading.Thread | None = None
-        self._states: _Stream | None = None
-        self._control: ChildProcess | None = None
-        self._given_up: ChildProcess | None = None
-        self._control_since_s = 0.0
+        self._states: _Helper | None = None
+        self._control: _Helper | None = None
         self._program_wanted = False
         self.state: ArmState | None = None
         self.lost = "the first attempt is under way"
@@ -106,7 +135,8 @@ class RtdeLink:
         """Give up commanding until the next `request_program`."""
         self.commanding = False
         self._program_wanted = False
-        self._given_up = self._control
+        if self._control is not None:
+            self._control.failed = True
         self.program_failure = reason
         self.program_failed_s = time.monotonic()
 
@@ -117,77 +147,84 @@ class RtdeLink:
         if states is not None:
             self._take_states(states, now_s)
         if control is not None:
-            self._take_answers(control)
+            self._take_answers(control, now_s)
 
-    def servo(self, positions: Sequence[float], time_s: float) -> bool:
-        """Send the joints to `positions` [rad] within `time_s` [s]; False when that could not be sent."""
+    def servo(self, positions: Sequence[float], time_s: float) -> None:
+        """Send the joints to `positions` [rad] within `time_s` [s]."""
         control = self._control
-        return self.commanding and control is not None and control.send(servo_message(positions, time_s))
+        if self.commanding and control is not None:
+            control.process.send(servo_message(positions, time_s))
+            control.owes = True
 
-    def _take_states(self, stream: _Stream, now_s: float) -> None:
-        newest: ArmState | None = None
-        for message in stream.process.messages():
+    def _take_states(self, states: _Helper, now_s: float) -> None:
+        newest, heard = b"", False
+        for message in states.process.messages():
+            heard = True
             if message[:1] == STATE:
-                newest = ArmState.unpacked(message)
+                newest = message
+            elif message == CONNECTING:
+                states.connects(now_s, _CONNECT_TIMEOUT_S)
             elif message[:1] == FAILED:
-                self._lose(stream, message[1:].decode(errors="replace"))
-        if stream.failed:
+                self._lose(states, message[1:].decode(errors="replace"))
+        silent_s = states.silence.look(now_s, heard)
+        if states.failed:
             return
-        if newest is not None and self._plausible(newest):
+        if newest:
             if self.lost:
                 LOGGER.info("arm at %s: connected", self._settings.address)
-            self.state, self.lost, stream.delivered = newest, "", True
-        if stream.process.ended:
-            self._lose(stream, "the process that reads the arm's state ended")
-        elif stream.delivered and self.state is not None \
-                and now_s - self.state.received_s > self._settings.timeout_s:
-            self._lose(stream, f"nothing from the arm for {self._settings.timeout_s:g} s")
+            self.state, self.lost, states.works = ArmState.unpacked(newest), "", True
+        if states.process.ended:
+            self._lose(states, "the process that reads the arm's state ended")
+        elif states.works and silent_s > _MUTE_S:
+            self._lose(states, f"the process that reads the arm's state has said nothing for {_MUTE_S:g} s")
 
-    def _plausible(self, state: ArmState) -> bool:
-        """Whether an arm can be in that state so soon after the last one; garbage on the line cannot."""
-        if not all(abs(position) <= _MAX_POSITION for position in state.positions):
-            return False
-        if self.lost or self.state is None:
-            return True
-        reach = _MAX_SPEED * (state.received_s - self.state.received_s) + 0.05
-        return all(abs(new - old) <= reach for new, old in zip(state.positions, self.state.positions, strict=True))
-
-    def _lose(self, stream: _Stream, reason: str) -> None:
+    def _lose(self, states: _Helper, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
             self.drop_program("its program was given up when the link was lost")
-        if not stream.failed:
-            stream.failed = True
+        if not states.failed:
+            states.failed = True
             self.lost = reason
 
-    def _take_answers(self, control: ChildProcess) -> None:
-        for message in control.messages():
-            if message == READY:
-                self.commanding = self._program_wanted
-            elif message[:1] == FAILED:
+    def _take_answers(self, control: _Helper, now_s: float) -> None:
+        playing = self.state is not None and self.state.runtime_state == PROGRAM_PLAYING
+        answered = not control.owes or not playing
+        for message in control.process.messages():
+            if message == TAKEN:
+                answered, control.owes = True, False
+            elif message == CONNECTING:
+                control.connects(now_s, _PROGRAM_TIMEOUT_S)
+            elif message == READY:
+                control.works = True
+                self.commanding = self._program_wanted and not control.failed
+            elif message[:1] == FAILED and not control.failed:
                 self.drop_program(message[1:].decode(errors="replace"))
-        if control.ended and self._program_wanted:
+        if control.failed:
+            return
+        if control.process.ended:
             self.drop_program("the process that commands the arm ended")
+        elif control.silence.look(now_s, answered) > _MUTE_S:
+            self.drop_program(f"the process that commands the arm has taken no command for {_MUTE_S:g} s")
 
     def _keep(self) -> None:
         next_attempt_s = 0.0
         while not self._closing.wait(_KEEPER_PERIOD_S):
             now_s = time.monotonic()
             try:
-                if self._states is not None and self._is_over(self._states, now_s):
-                    stream, self._states = self._states, None
-                    stream.process.end()
+                if self._states is None and now_s >= next_attempt_s:
                     next_attempt_s = now_s + _RETRY_S
-                elif self._states is None and now_s >= next_attempt_s:
+                    self._states = self._start("state", ["--timeout", str(self._settings.timeout_s)], now_s)
+                elif self._states is not None and self._is_over(self._states, now_s):
+                    states, self._states = self._states, None
+                    states.process.end()
                     next_attempt_s = now_s + _RETRY_S
-                    self._states = _Stream(self._start("state", ["--timeout", str(self._settings.timeout_s)]), now_s)
                 self._keep_program(now_s)
             except OSError as error:
                 self._tell_not_started(error)
         if self._states is not None:
             self._states.process.end()
         if self._control is not None:
-            self._control.end(_STOP_PATIENCE_S)
+            self._control.process.end(_STOP_PATIENCE_S)
         self._states = self._control = None
 
     def _tell_not_started(self, error: OSError) -> None:
@@ -197,29 +234,31 @@ class RtdeLink:
         else:
             self.drop_program(reason)
 
-    def _is_over(self, stream: _Stream, now_s: float) -> bool:
-        if not stream.delivered and not stream.failed and now_s - stream.since_s > _CONNECT_TIMEOUT_S:
-            stream.failed = True
-            self.lost = f"no state from the arm within {_CONNECT_TIMEOUT_S:g} s of connecting"
-        return stream.failed
+    def _is_over(self, states: _Helper, now_s: float) -> bool:
+        late = states.too_late(now_s)
+        if late:
+            states.failed = True
+            self.lost = f"no state from the arm {late} of connecting"
+        return states.failed
 
     def _keep_program(self, now_s: float) -> None:
+        control = self._control
         wanted = self._program_wanted and not self.lost
-        possible = self.state is not None and not robot_fault(self.state, self._settings.address)
-        if self._control is not None and (not wanted or self._control.ended or self._control is self._given_up):
-            process, self._control = self._control, None
-            process.end()
-        elif self._control is None and wanted and possible:
-            settings = self._settings
-            scale = [] if settings.speed_scale is None else ["--speed-scale", str(settings.speed_scale)]
-            self._control = self._start("control", [
-                *scale, "--payload", str(settings.payload_kg), "--payload-centre",
-                *map(str, settings.payload_centre_m), "--lookahead", str(settings.lookahead_s),
-                "--gain", str(settings.gain)])
-            self._control_since_s = now_s
-        elif self._control is not None and not self.commanding and now_s - self._control_since_s > _PROGRAM_TIMEOUT_S:
-            self.drop_program(f"the program was not accepted within {_PROGRAM_TIMEOUT_S:g} s")
+        if control is None:
+            if wanted and self.state is not None and not robot_fault(self.state, self._settings.address):
+                self._control = self._start("control", self._control_arguments(), now_s)
+        elif not wanted or control.failed:
+            self._control, control.failed = None, True
+            control.process.end()
+        elif late := control.too_late(now_s):
+            self.drop_program(f"the program was not accepted {late}")
 
-    def _start(self, role: str, arguments: Sequence[str]) -> ChildProcess:
-        return ChildProcess(_MODULE, [role, self._settings.address, *arguments])
+    def _control_arguments(self) -> list[str]:
+        settings = self._settings
+        scale = [] if settings.speed_scale is None else ["--speed-scale", str(settings.speed_scale)]
+        return [*scale, "--payload", str(settings.payload_kg), "--payload-centre", *map(str, settings.payload_centre_m),
+                "--lookahead", str(settings.lookahead_s), "--gain", str(settings.gain)]
 
+    def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _Helper:
+        real_time = ["--real-time"] if self._settings.real_time else []
+        return _Helper(ChildProcess(_MODULE, [role, self._settings.address, *real_time, *arguments]), now_s)

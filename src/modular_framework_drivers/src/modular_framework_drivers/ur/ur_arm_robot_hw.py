@@ -19,7 +19,7 @@ from modular_framework_control.node_handle import NodeHandle, ParameterError, jo
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, PROGRAM_STOPPED, robot_fault
-from modular_framework_drivers.ur.arm_parameters import read_link_settings, read_motion_limits, read_prefix
+from modular_framework_drivers.ur.arm_parameters import read_checked_joints, read_link_settings, read_prefix
 from modular_framework_drivers.ur.command_check import CommandCheck
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
 
@@ -67,7 +67,7 @@ class UrArmHardware(RobotHW):
             self._settings = read_link_settings(robot_hw_nh)
             names = [self._prefix + name for name in JOINT_NAMES]
             max_jump = read_number(robot_hw_nh, "max_jump_rad", 0.5)
-            self._check = CommandCheck(read_motion_limits(names, root_nh), max_jump)
+            self._check = CommandCheck(read_checked_joints(names, root_nh), max_jump)
         except ParameterError as error:
             LOGGER.error("%s in %s: %s", type(self).__name__, where, error)
             return False

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What counts as silence of the arm, and what as one of its states."""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modular_framework_drivers.ur.arm_messages import ArmState
+from modular_framework_drivers.ur.state_watch import SilenceWatch, follows
+
+SIX = (0.1,) * 6
+STATE = ArmState(100.0, 5.0, SIX, SIX, SIX, SIX, 1.0, 1.0, 7, 1, 2)
+
+
+def next_state(**changes: object) -> ArmState:
+    return replace(STATE, **{"received_s": 100.008, "timestamp_s": 5.008, **changes})  # type: ignore[arg-type]
+
+
+def test_silence_is_the_time_since_something_was_heard_for_who_listens_all_the_time() -> None:
+    watch, now_s = SilenceWatch(0.0), 0.0
+    for _ in range(120):
+        now_s += 0.001
+        silent_s = watch.look(now_s, heard=False)
+    assert silent_s == pytest.approx(0.12)
+    assert watch.look(now_s + 0.001, heard=True) == 0.0
+
+
+@given(st.lists(st.floats(0.0, 30.0), max_size=5))
+def test_time_in_which_nobody_listened_is_no_silence(absences: list[float]) -> None:
+    watch, now_s = SilenceWatch(0.0), 0.0
+    for absence_s in absences:
+        now_s += absence_s
+        silent_s = watch.look(now_s, heard=False)
+        assert silent_s <= 0.02 * len(absences)
+
+
+def test_a_state_a_cycle_later_follows() -> None:
+    assert follows(STATE, None)
+    assert follows(next_state(positions=(0.12,) * 6), STATE)
+
+
+@pytest.mark.parametrize("changes", [
+    {"timestamp_s": math.nan}, {"timestamp_s": 4.9},
+    {"positions": (math.nan, *SIX[1:])}, {"positions": (6.6, *SIX[1:])}, {"positions": (0.3, *SIX[1:])}])
+def test_garbage_does_not_follow(changes: dict[str, object]) -> None:
+    assert not follows(next_state(**changes), STATE)
