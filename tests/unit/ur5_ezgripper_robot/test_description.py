@@ -44,7 +44,9 @@ def test_tool0_is_where_the_manufacturers_table_puts_it(model: pinocchio.Model, 
     angles = np.random.default_rng(seed).uniform(-math.pi, math.pi, 6)
     # The controller's base is base_link turned by half a turn about z.
     base = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0, 0, math.pi), np.array([0, 0, 0.86])).homogeneous
-    found = placement(model, np.append(angles, 0.0), "tool0").homogeneous
+    state = np.append(angles, 0.0)
+    assert np.allclose(placement(model, state, "base").homogeneous, base, atol=1e-9)
+    found = placement(model, state, "tool0").homogeneous
     assert np.allclose(found, base @ flange_by_table(angles), atol=1e-6)
 
 
@@ -52,8 +54,8 @@ def test_joints_and_links_have_the_documented_names(urdf: str) -> None:
     robot = URDF.from_xml_string(urdf)
     assert robot.name == "ur5_with_ezgripper"
     assert [joint.name for joint in robot.joints if joint.type == "revolute" and joint.mimic is None] == [*ARM, KNUCKLE]
-    expected = {"world", "base_link", "shoulder_link", "upper_arm_link", "forearm_link", "wrist_1_link", "wrist_2_link",
-                "wrist_3_link", "ee_link", "tool0", "eg_manipulator"}
+    expected = {"world", "base_link", "base", "shoulder_link", "upper_arm_link", "forearm_link", "wrist_1_link",
+                "wrist_2_link", "wrist_3_link", "ee_link", "tool0", "eg_manipulator"}
     links = {link.name for link in robot.links}
     assert expected <= links
     assert all("ezgripper" in name for name in links - expected)
