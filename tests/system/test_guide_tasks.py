@@ -19,14 +19,14 @@ API = TESTS.parent / "src" / "modular_framework_api"
 GUIDE_TASKS = TESTS / "guide_tasks"
 OWN_TASKS = TESTS / "system" / "tasks"
 NAMED = yaml.safe_load((API / "config" / "named_joint_states.yaml").read_text())
-TASK_TIMEOUT_S = 90.0
+TASK_TIMEOUT_S = 180.0
 AT_POSE_RAD = 0.03
 
 JOINTS = """
 import json, rospy
 from sensor_msgs.msg import JointState
 rospy.init_node("look", anonymous=True)
-message = rospy.wait_for_message("joint_states", JointState, timeout=20)
+message = rospy.wait_for_message("joint_states", JointState, timeout=60)
 print(json.dumps(dict(zip(message.name, message.position))))
 """
 
@@ -62,7 +62,7 @@ def run_task(session: RosSession, script: Path) -> subprocess.CompletedProcess[s
 
 def assert_arm_at(session: RosSession, pose: str) -> None:
     """Looks where the simulated arm is."""
-    look = subprocess.run([sys.executable, "-c", JOINTS], env=session.env, capture_output=True, text=True, timeout=60,
+    look = subprocess.run([sys.executable, "-c", JOINTS], env=session.env, capture_output=True, text=True, timeout=120,
                           check=True)
     joints = json.loads(look.stdout.splitlines()[-1])
     away = {joint: abs(joints[joint] - value) for joint, value in NAMED[pose].items()}

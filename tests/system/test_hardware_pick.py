@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The real-robot branch of the framework, on devices in software: `simulation:=false` picks an object and holds it."""
+"""The real-robot branch of the framework, on devices in software: `simulation:=false` picks an object and holds it.
+
+Both ways to drive the gripper: as hardware of a controller beside the arm, and by its own server of the action Grasp,
+which the framework's spawner starts, with the arm alone in the list of hardware.
+"""
 from __future__ import annotations
 
 import csv
@@ -11,14 +15,17 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from ros_session import RosSession, free_port
 
 TASK_TIMEOUT_S = 240.0
 WRAPPER = """<launch>
   <arg name="arm_address"/>
   <arg name="port"/>
+  <arg name="own_server"/>
   <include file="$(find modular_framework_api)/launch/start_framework.launch">
     <arg name="simulation" value="false"/>
+    <arg name="controller_file" value="ur5_controller.yaml" if="$(arg own_server)"/>
     <arg name="connection_file" value="connection_emulators.yaml"/>
     <arg name="task_constructor_script" value="pick_and_hold.yaml"/>
     <arg name="generated_state_machine_name" value="pick_and_hold.py"/>
@@ -28,6 +35,16 @@ WRAPPER = """<launch>
   </include>
   <param name="ur_robot_hw/robot_ip_address" value="$(arg arm_address)"/>
   <param name="ezgripper_robot_hw/port_name" value="$(arg port)"/>
+  <group if="$(arg own_server)">
+    <param name="port_name" value="$(arg port)"/>
+    <rosparam>
+      robot_hardware: [ur_robot_hw]
+      package_manipulator_action_server: modular_framework_drivers
+      manipulator_controller_node_name: ezgripper_grasp_action_server
+      manipulator_controller_action_server_type: ezgripper_grasp_action_server
+      ezgripper_grasp_action_server: {link_timeout: 2.0}
+    </rosparam>
+  </group>
 </launch>"""
 
 # Runs as a node of its own and prints the points of every trajectory that the arm was to follow.
@@ -50,7 +67,8 @@ print(json.dumps(plans))
 """
 
 
-def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tmp_path: Path) -> None:
+@pytest.mark.parametrize("own_server", [False, True], ids=["gripper as hardware", "gripper with its own server"])
+def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tmp_path: Path, own_server: bool) -> None:
     draw = random.Random(os.urandom(8))
     address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
     port, path_log = tmp_path / "gripper", tmp_path / "path.csv"
@@ -60,14 +78,15 @@ def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tm
         emulators = session.launch_package("modular_framework_drivers", "emulators.launch", arm_address=address,
                                            arm_log=path_log, gripper_port=port, gripper_object=1.3,
                                            gripper_command_port=free_port())
-        framework = session.launch(WRAPPER, arm_address=address, port=port)
+        framework = session.launch(WRAPPER, arm_address=address, port=port, own_server=str(own_server).lower())
         framework.wait(TASK_TIMEOUT_S)
-        plans = json.loads(watcher.communicate(timeout=20)[0].splitlines()[-1])
+        plans = json.loads(watcher.communicate(timeout=60)[0].splitlines()[-1])
     finally:
         watcher.kill()
     log = framework.log()
     assert "Task 'pick_and_hold' ended with outcome 'successful_pipeline': SUCCEEDED" in log, log
     assert emulators.alive(), emulators.log()
+    assert ("ezgripper_grasp_action_server" in log) is own_server
     emulators.stop()
     commanded, actual = read_path(path_log)
     assert len(plans) >= 4, "to the pregrasp, to the grasp, up, to where the object is held"

@@ -61,6 +61,8 @@ class FakeMoveGroup:
         reason: Reason reported on the planning report topic.
         execution_error: Error code of executing.
         slow: True lets a motion last until it is cancelled.
+        moving: Set when a motion begins.
+        looks: How often the scene was asked for.
         objects: Collision objects of the scene.
     """
 
@@ -68,6 +70,7 @@ class FakeMoveGroup:
         self.reach, self.blocked = 1.0, 1.0
         self.plan_error, self.reason = 0, ""
         self.execution_error, self.slow, self.canceled = 0, False, False
+        self.moving, self.looks = threading.Event(), 0
         self.positions = {"jx": 0.0, "jy": 0.0, "f": 0.02}
         self.objects: list[CollisionObject] = []
         self.requests: list = []
@@ -90,6 +93,13 @@ class FakeMoveGroup:
         box.primitive_poses = [type(box.pose)()]
         box.pose.position.x, box.pose.position.y, box.pose.position.z = centre
         self.objects = [*self.objects, box]
+
+    def wait_for_listeners(self, timeout_s: float = 60.0) -> None:
+        """Waits until somebody listens to the reports of failed plans."""
+        deadline = time.monotonic() + timeout_s
+        while not self._report.get_num_connections():
+            assert time.monotonic() < deadline, "nobody listens to the planning reports"
+            time.sleep(0.02)
 
     def _publish(self) -> None:
         with contextlib.suppress(rospy.ROSException):
@@ -129,11 +139,13 @@ class FakeMoveGroup:
             ContactInformation(contact_body_1="palm", contact_body_2="wall")])
 
     def _scene(self, request):
+        self.looks += 1
         response = GetPlanningSceneResponse()
         response.scene.world.collision_objects = self.objects
         return response
 
     def _execute(self, goal):
+        self.moving.set()
         while self.slow and not self._server.is_preempt_requested():
             time.sleep(0.01)
         result = ExecuteTrajectoryResult()

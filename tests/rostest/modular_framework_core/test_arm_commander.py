@@ -29,7 +29,7 @@ def commander(ros_session):
     with pytest.raises(CommanderError, match="no planning group 'leg'"):
         ArmCommander("leg").connect(0.3)
     made = ArmCommander("arm")
-    made.connect(20.0)
+    made.connect(60.0)
     made.fake = fake
     return made
 
@@ -84,12 +84,12 @@ def test_threads_do_not_mix_their_targets(commander) -> None:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(20)
+        thread.join(60)
     assert ends == {number: number / 10 for number in range(6)}
 
 
 def test_a_failed_plan_tells_the_reported_reason_and_falls_back_on_the_codes_name(commander) -> None:
-    time.sleep(0.3)
+    commander.fake.wait_for_listeners()
     commander.fake.plan_error, commander.fake.reason = MoveItErrorCodes.GOAL_IN_COLLISION, "'palm' touches 'wall'"
     result = commander.plan_to_joint_value_target({"jx": 0.0})
     assert not result.success
@@ -124,11 +124,14 @@ def test_executing_tells_the_truth(commander) -> None:
 def test_a_stop_cancels_the_motion(commander) -> None:
     plan = commander.plan_to_joint_value_target({"jx": 0.0})
     commander.fake.slow = True
-    threading.Timer(0.3, commander.stop).start()
+    commander.fake.moving.clear()
+    threading.Thread(target=lambda: commander.fake.moving.wait(60.0) and commander.stop(), daemon=True).start()
     result = commander.execute_plan(plan)
     assert not result
     assert result.error_code == MoveItErrorCodes.PREEMPTED
-    time.sleep(0.2)
+    deadline = time.monotonic() + 30.0
+    while not commander.fake.canceled and time.monotonic() < deadline:
+        time.sleep(0.02)
     assert commander.fake.canceled
 
 

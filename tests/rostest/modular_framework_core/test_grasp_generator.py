@@ -33,7 +33,7 @@ class Watcher:
         rospy.Subscriber("grasp_generated/reason", String, lambda message: self.reasons.append(message.data))
         rospy.Subscriber("grasp_generated", Bool, lambda message: self.signals.append(message.data))
 
-    def wait(self, count: int, timeout_s: float = 30.0) -> tuple[bool, str]:
+    def wait(self, count: int, timeout_s: float = 90.0) -> tuple[bool, str]:
         deadline = time.monotonic() + timeout_s
         while len(self.signals) < count or len(self.reasons) < count:
             assert time.monotonic() < deadline, f"{self.signals} {self.reasons}"
@@ -52,7 +52,7 @@ def scene(ros_session, ros_launch) -> FakeMoveGroup:
 
 def get_grasp():
     proxy = rospy.ServiceProxy("get_grasp", srv.GetStandardisedGrasp)
-    proxy.wait_for_service(10)
+    proxy.wait_for_service(60)
     return proxy("")
 
 
@@ -124,8 +124,11 @@ def test_an_object_that_comes_back_under_its_name_gives_grasps_again(scene) -> N
     rospy.set_param("top_down_grasp_generator/object_name", "")
     rospy.set_param("top_down_grasp_generator/name_prefix", "again_")
     scene.objects = [item for item in scene.objects if item.id != "box__link"]
+    looks, deadline = scene.looks, time.monotonic() + 60.0
+    while scene.looks < looks + 4:  # what was signalled of the box before has been heard, and that it is gone was seen
+        assert time.monotonic() < deadline, "the generator does not look at the scene any more"
+        time.sleep(0.02)
     count = len(scene.watcher.signals)
-    time.sleep(0.8)  # three looks of the generator at the scene
     scene.add_box("box__link", (0.04, 0.07, 0.1), (0.1, 0.45, 0.89))
     signal, reason = scene.watcher.wait(count + 1)
     assert signal, reason

@@ -67,7 +67,7 @@ def hand(ros_launch) -> FakeHand:
     fake = FakeHand()
     ros_launch(LAUNCH)
     fake.client = actionlib.SimpleActionClient("moveit_grasp_action_server", GraspAction)
-    assert fake.client.wait_for_server(rospy.Duration(30))
+    assert fake.client.wait_for_server(rospy.Duration(90))
     return fake
 
 
@@ -75,7 +75,7 @@ def send(hand: FakeHand, stage: int) -> tuple[int, tuple[bool, bool, bool], str]
     pose = generate_pose_stamped_message("world", (0, 0, 0), (0, 0, 0))
     message = get_standardised_grasp(["a", "b"], [0.2, 0.4], [1.5, 1.5], [1.0, 1.0], [1.0, 1.0], pose, pose, pose)
     hand.client.send_goal(GraspGoal(GraspCommand(grasp_state=stage, grasp=message, max_torque=400.0)))
-    assert hand.client.wait_for_result(rospy.Duration(20))
+    assert hand.client.wait_for_result(rospy.Duration(60))
     result = hand.client.get_result()
     flags = (result.pregrasped.data, result.grasped.data, result.postgrasped.data)
     return hand.client.get_state(), flags, hand.client.get_goal_status_text()

@@ -59,14 +59,14 @@ def simulation(ros_session, ros_launch, tmp_path_factory: pytest.TempPathFactory
       <node name="managers" pkg="modular_framework_core" type="managers" output="screen"/>
       <node name="sensors_tf2_broadcaster" pkg="modular_framework_core" type="sensors_tf2_broadcaster" output="screen"
             args="{folder}/sensors.yaml"/></launch>""")
-    ros_session.wait_for_service("/update_acm_entry", 20)
-    ros_session.wait_for_service("/delete_gazebo_mapping", 20)
+    ros_session.wait_for_service("/update_acm_entry", 60)
+    ros_session.wait_for_service("/delete_gazebo_mapping", 60)
     return fake
 
 
 def manage(simulation: FakeSimulation, *arguments: str) -> tuple[int, str]:
     done = subprocess.run(["rosrun", "modular_framework_core", "manage_object", *arguments], env=simulation.session.env,
-                          capture_output=True, text=True, timeout=60, check=False)
+                          capture_output=True, text=True, timeout=120, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -118,14 +118,14 @@ def test_arguments_without_sense_end_with_their_own_code(simulation: FakeSimulat
 def test_the_launch_file_spawns_too(simulation: FakeSimulation) -> None:
     path = Path(__file__).parents[3] / "src" / "modular_framework_core" / "launch" / "manage_object.launch"
     launch = simulation.session.launch(path, object_type="box", object_position="0 -0.3 1")
-    launch.wait(60)
+    launch.wait(120)
     assert simulation.models["box"].initial_pose.position.y == -0.3, launch.log()
 
 
 def test_the_frames_of_the_sensors_are_on_tf_and_wrong_ones_are_named(simulation: FakeSimulation) -> None:
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer)
-    transform = buffer.lookup_transform("world", "simulated_kinect2", rospy.Time(0), rospy.Duration(10)).transform
+    transform = buffer.lookup_transform("world", "simulated_kinect2", rospy.Time(0), rospy.Duration(60)).transform
     listener.unregister()
     assert (transform.translation.x, transform.translation.z) == (-0.1645, 2.72)
     assert "'incomplete'" in simulation.session.log()
@@ -138,20 +138,22 @@ def test_the_file_of_sensors_is_read_again_on_request(simulation: FakeSimulation
     assert added(pose, "corner").success
     simulation.sensors.write_text("camera: {frame_id: camera_frame, initial_pose: corner}\n"
                                   "lost: {frame_id: lost_frame, initial_pose: nowhere}\n")
-    answer = rospy.ServiceProxy("reload_sensor_frames", Trigger)()
+    reload = rospy.ServiceProxy("reload_sensor_frames", Trigger)
+    reload.wait_for_service(60)
+    answer = reload()
     assert not answer.success
     assert "sensors.yaml:2" in answer.message and "no pose named 'nowhere' is stored" in answer.message
     assert "'simulated_kinect2' is not in the file any more" in answer.message
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer)
-    transform = buffer.lookup_transform("world", "camera_frame", rospy.Time(0), rospy.Duration(10)).transform
+    transform = buffer.lookup_transform("world", "camera_frame", rospy.Time(0), rospy.Duration(60)).transform
     listener.unregister()
     assert (transform.translation.x, transform.translation.z) == (0.5, 1.5)
 
 
 def test_the_sensors_node_needs_its_file(simulation: FakeSimulation) -> None:
     done = subprocess.run(["rosrun", "modular_framework_core", "sensors_tf2_broadcaster", "__name:=other"],
-                          env=simulation.session.env, capture_output=True, text=True, timeout=60, check=False)
+                          env=simulation.session.env, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert "expected one" in done.stdout + done.stderr
 
@@ -165,5 +167,5 @@ def test_every_manager_runs_as_a_node_of_its_own(simulation: FakeSimulation, exe
     launch = simulation.session.launch(
         f'<launch><group ns="alone"><node name="{executable}" pkg="modular_framework_core" type="{executable}" '
         'required="true" output="screen"/></group></launch>')
-    simulation.session.wait_for_service(f"/alone/{service}", 30)
+    simulation.session.wait_for_service(f"/alone/{service}", 60)
     launch.stop()

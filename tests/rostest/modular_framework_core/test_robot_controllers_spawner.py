@@ -60,12 +60,12 @@ def spawn(ros_launch: Callable[..., Any], robot_package: Path) -> Iterator[Calla
 
 
 def result(process: subprocess.Popen[str]) -> tuple[int, str]:
-    output, _ = process.communicate(timeout=30.0)
+    output, _ = process.communicate(timeout=90.0)
     return process.returncode, output
 
 
 def states() -> dict[str, str]:
-    rospy.wait_for_service("controller_manager/list_controllers", 10.0)
+    rospy.wait_for_service("controller_manager/list_controllers", 60.0)
     reply = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)()
     return {entry.name: entry.state for entry in reply.controller}
 
@@ -89,7 +89,7 @@ def test_it_waits_for_every_hardware_and_names_the_missing_topic(spawn: Callable
     rospy.set_param("/hand_hw", {"topic_to_wait_for": "hand_ready"})
     arm_ready = rospy.Publisher("arm_ready", Bool, queue_size=1, latch=True)
     arm_ready.publish(True)
-    code, output = result(spawn("some_robot", "good.yaml", "_timeout:=0.5", "_give_up_after:=1.5"))
+    code, output = result(spawn("some_robot", "good.yaml", "_timeout:=3.0", "_give_up_after:=4.5"))
     assert code == 1
     assert "topic /hand_ready of hardware 'hand_hw'" in output
     assert "still waiting" in output and "topic /arm_ready" not in output

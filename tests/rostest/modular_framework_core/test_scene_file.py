@@ -18,14 +18,14 @@ LAUNCH = """<launch><include file="$(find ur5_ezgripper_moveit_config)/launch/mo
 
 def publish(session, *arguments: object, node: str = "moveit_publish_scene_from_text") -> tuple[int, str]:
     done = subprocess.run(["rosrun", "modular_framework_core", node, *map(str, arguments)],
-                          env=session.env, capture_output=True, text=True, timeout=90, check=False)
+                          env=session.env, capture_output=True, text=True, timeout=180, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
 def session(ros_launch):
     started = ros_launch(LAUNCH)
-    started.wait_for_service("/apply_planning_scene", 60)
+    started.wait_for_service("/apply_planning_scene", 150)
     return started
 
 

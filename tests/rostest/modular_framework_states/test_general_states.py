@@ -42,7 +42,7 @@ def managers(ros_launch, tmp_path_factory: pytest.TempPathFactory):
     file = tmp_path_factory.mktemp("config") / "states.yaml"
     file.write_text("up: {a: 1}\n")
     session = ros_launch(LAUNCH.format(file=file))
-    session.wait_for_service("/get_object_type", 20)
+    session.wait_for_service("/get_object_type", 60)
     return session
 
 
@@ -62,17 +62,17 @@ def names(kind: str) -> list[str]:
 def test_wait_takes_its_time_and_ends_when_stopped() -> None:
     begun = time.monotonic()
     assert run(Wait(0.3))[0] == "success"
-    assert 0.3 <= time.monotonic() - begun < 2.0
+    assert 0.3 <= time.monotonic() - begun < 10.0
     state = Wait(60.0)
     threading.Timer(0.2, state.request_preempt).start()
     begun = time.monotonic()
     assert run(state)[0] == "fail"
-    assert state.reason == "stopped on request" and time.monotonic() - begun < 2.0
+    assert state.reason == "stopped on request" and time.monotonic() - begun < 20.0
 
 
 def test_wait_for_message_takes_any_type_and_passes_over_what_is_not_expected() -> None:
     publisher = rospy.Publisher("points", PointStamped, queue_size=10)
-    state = WaitForMessage("points", 10.0, {"point": {"x": 2.0}}, output_keys=("message",))
+    state = WaitForMessage("points", 60.0, {"point": {"x": 2.0}}, output_keys=("message",))
 
     def publish() -> None:
         while publisher.get_num_connections() == 0:
@@ -97,7 +97,7 @@ def test_wait_for_message_and_other_subscribers_of_its_node_do_not_disturb_each_
     publisher = rospy.Publisher("shared_points", PointStamped, queue_size=1, latch=True)
     publisher.publish(PointStamped())
     before = rospy.Subscriber("shared_points", PointStamped, heard.append)
-    state = WaitForMessage("shared_points", 10.0, {"point": {"x": 0.0}})
+    state = WaitForMessage("shared_points", 60.0, {"point": {"x": 0.0}})
     assert run(state)[0] == "success", state.reason
     before.unregister()
     nobody = WaitForMessage("unknown_points", 0.3)
@@ -130,7 +130,7 @@ class Gripper:
     """An action server that closes, or refuses, or never ends."""
 
     def __init__(self) -> None:
-        self.preempted = False
+        self.preempted = threading.Event()
         self._server = actionlib.SimpleActionServer("hand", GripperCommandAction, self._execute, auto_start=False)
         self._server.start()
 
@@ -138,7 +138,7 @@ class Gripper:
         if goal.command.position > 1.0:
             while not self._server.is_preempt_requested():
                 time.sleep(0.01)
-            self.preempted = True
+            self.preempted.set()
             self._server.set_preempted()
         elif goal.command.position < 0.0:
             self._server.set_aborted(GripperCommandResult(), "fingers do not open that far")
@@ -159,7 +159,7 @@ def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:
     for state, reason in cases:
         assert run(state)[0] == "fail"
         assert reason in state.reason, state.reason
-    assert gripper.preempted
+    assert gripper.preempted.wait(30.0)
     assert GoalStatus.ABORTED == 4
 
 
@@ -182,7 +182,7 @@ def test_a_metric_is_published_and_must_be_a_number() -> None:
     heard: list[dict[str, object]] = []
     rospy.Subscriber("task_metrics", String, lambda message: heard.append(json.loads(message.data)))
     assert run(LogMetric("height", 0.25, unit="m"))[0] == "success"
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while not heard and time.monotonic() < deadline:
         time.sleep(0.02)
     assert (heard[0]["name"], heard[0]["value"], heard[0]["unit"]) == ("height", 0.25, "m")

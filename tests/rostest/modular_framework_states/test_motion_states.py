@@ -88,7 +88,7 @@ def managers(ros_launch):
     rospy.set_param("robot_description_semantic", SRDF)
     rospy.set_param("manipulator_group_name", "hand")
     session = ros_launch(LAUNCH)
-    session.wait_for_service("/get_trajectory", 20)
+    session.wait_for_service("/get_trajectory", 60)
     add = rospy.ServiceProxy("add_trajectory", srv.AddJointTrajectory)
     add(trajectory((0.5, 0.5), (1.0, 1.5)), "there")
     add(trajectory((0.5, 2.5), (1.0, 1.5)), "through_the_wall")

@@ -21,6 +21,7 @@ import smach
 from modular_framework_core import srv
 from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspResult, StandardisedGrasp
+from modular_framework_states.states import wait_for_signal
 from modular_framework_states.states.allow_manipulator_collisions import AllowManipulatorCollisions
 from modular_framework_states.states.grasp import Grasp
 from modular_framework_states.states.move import Move
@@ -42,6 +43,7 @@ class FakeArm:
         self.stuck = False
         self.fault = ""
         self.slow = False
+        self.moving = threading.Event()
         self.stopped = False
         self.plans: list[tuple[dict[str, float], dict[str, float] | None]] = []
 
@@ -63,6 +65,7 @@ class FakeArm:
         return SimpleNamespace(success=True, reason="", trajectory=trajectory(start, joints["j"]))
 
     def execute_plan(self, plan, stop_requested=lambda: False):
+        self.moving.set()
         while self.slow:
             if stop_requested():
                 self.stopped = True
@@ -105,17 +108,27 @@ def run(state: smach.State, **userdata: object) -> tuple[str, smach.UserData]:
     return machine.execute(), machine.userdata
 
 
+def stop_when(begun: threading.Event, state: smach.State) -> None:
+    """Asks a state to stop as soon as what it drives has begun, however long a busy machine takes until then."""
+
+    def ask() -> None:
+        assert begun.wait(60.0)
+        state.request_preempt()
+
+    threading.Thread(target=ask, daemon=True).start()
+
+
 def call(name: str, service_type, **fields):
     proxy = rospy.ServiceProxy(name, service_type)
-    proxy.wait_for_service(20)
+    proxy.wait_for_service(60)
     return proxy(**fields)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def managers(ros_launch):
     session = ros_launch(LAUNCH)
-    session.wait_for_service("/get_object_type", 20)
-    session.wait_for_service("/get_modified_acm", 20)
+    session.wait_for_service("/get_object_type", 60)
+    session.wait_for_service("/get_modified_acm", 60)
     state = JointState(name=["j"], position=[1.0])
     call("add_joint_state", srv.AddJointState, joint_state=state, joint_state_name="one")
     call("add_grasp", srv.AddStandardisedGrasp, grasp_message=grasp_message(), grasp_name="g")
@@ -139,7 +152,7 @@ def stored_plan(name: str) -> RobotTrajectory:
 def test_a_signal_sent_before_the_state_runs_is_not_lost() -> None:
     publisher = rospy.Publisher("early", Bool, queue_size=1, latch=True)
     publisher.publish(True)
-    state = WaitForSignal("early", timeout=5.0)
+    state = WaitForSignal("early", timeout=30.0)
     time.sleep(0.5)
     assert run(state)[0] == "success"
     started = time.monotonic()
@@ -159,8 +172,9 @@ class WaitForSignalOnce(smach.State):
         return self._state.execute(userdata)
 
 
-def test_a_false_signal_is_negative_and_its_reason_is_passed_on() -> None:
-    state = WaitForSignal("refused", timeout=5.0)
+def test_a_false_signal_is_negative_and_its_reason_is_passed_on(monkeypatch) -> None:
+    monkeypatch.setattr(wait_for_signal, "REASON_WAIT_S", 30.0)
+    state = WaitForSignal("refused", timeout=30.0)
     rospy.Publisher("refused/reason", String, queue_size=1, latch=True).publish("nothing there")
     rospy.Publisher("refused", Bool, queue_size=1, latch=True).publish(False)
     assert run(state)[0] == "fail"
@@ -306,7 +320,7 @@ def test_a_plan_that_starts_elsewhere_is_not_executed(arm: FakeArm) -> None:
 def test_a_stop_ends_the_motion(arm: FakeArm) -> None:
     arm.slow = True
     state = Move(input_keys=["selected_plan"], outcomes=("success", "preempted", "fail"))
-    threading.Timer(0.3, state.request_preempt).start()
+    stop_when(arm.moving, state)
     assert run(state, arm_commander=arm, selected_plan=trajectory(0.0, 1.0))[0] == "preempted"
     assert arm.stopped
 
@@ -323,13 +337,15 @@ def test_a_missing_or_empty_plan_fails(arm: FakeArm) -> None:
 
 @pytest.fixture(scope="module")
 def hand():
-    fake = SimpleNamespace(flags=(True, True, True), succeed=True, wait=False, stopped=False)
+    fake = SimpleNamespace(flags=(True, True, True), succeed=True, wait=False, moving=threading.Event(),
+                           stopped=threading.Event())
 
     def on_goal(goal):
+        fake.moving.set()
         while fake.wait and not server.is_preempt_requested():
             time.sleep(0.01)
         if server.is_preempt_requested():
-            fake.stopped = True
+            fake.stopped.set()
             server.set_preempted()
             return
         result = GraspResult(*(Bool(flag) for flag in fake.flags))
@@ -354,11 +370,11 @@ def test_the_flag_of_the_stage_and_the_status_decide(hand, grasp_type, flags, su
 
 def test_a_stop_cancels_the_hand(hand) -> None:
     hand.wait = True
+    hand.moving.clear()
     state = Grasp("grasp", "g", outcomes=("success", "preempted", "fail"))
-    threading.Timer(0.5, state.request_preempt).start()
+    stop_when(hand.moving, state)
     assert run(state, manipulator_controller_client=hand.client, max_torque=400)[0] == "preempted"
-    time.sleep(0.2)
-    assert hand.stopped
+    assert hand.stopped.wait(30.0)
     hand.wait = False
 
 

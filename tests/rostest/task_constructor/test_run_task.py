@@ -47,13 +47,15 @@ class Stay(FrameworkState):
         return self.stopped()
 """,
     "nap.py": """
+import rospy
+
 from modular_framework_core.framework_state import FrameworkState
 
 
 class Nap(FrameworkState):
     def execute(self, userdata):
-        self.wait_until(lambda: False, 0.8)
-        return self.succeed()
+        woken = self.wait_until(lambda: rospy.has_param("/alarm"), 60.0, 0.1)
+        return self.succeed() if woken else self.fail("overslept")
 """,
     "deaf.py": """
 import threading
@@ -118,7 +120,7 @@ class TaskProcess:
         for line in self.process.stdout:
             self.lines.append((time.monotonic(), line))
 
-    def end(self, timeout_s: float = 20.0) -> tuple[int, str]:
+    def end(self, timeout_s: float = 90.0) -> tuple[int, str]:
         """Answers the exit code and all output."""
         code = self.process.wait(timeout_s)
         self._reader.join(timeout_s)
@@ -133,8 +135,9 @@ class TaskProcess:
 def run(ros_session: RosSession, tmp_path: Path) -> Iterator[Callable[..., TaskProcess]]:
     states = tmp_path / "states"
     states.mkdir()
-    if rospy.has_param("/run_task"):
-        rospy.delete_param("/run_task")
+    for name in ("/run_task", "/alarm"):
+        if rospy.has_param(name):
+            rospy.delete_param(name)
     for file, text in STATES.items():
         (states / file).write_text(text)
     started: list[TaskProcess] = []
@@ -157,7 +160,7 @@ class Heard:
         self.messages: list[str] = []
         self._subscriber = rospy.Subscriber(topic, String, lambda message: self.messages.append(message.data))
 
-    def wait_for(self, condition: Callable[[list[str]], bool], timeout_s: float = 15.0) -> None:
+    def wait_for(self, condition: Callable[[list[str]], bool], timeout_s: float = 60.0) -> None:
         end = time.monotonic() + timeout_s
         while not condition(self.messages):
             assert time.monotonic() < end, f"not heard within {timeout_s} s; heard: {self.messages}"
@@ -195,12 +198,16 @@ def test_another_outcome_exits_with_1_and_tells_the_reason_of_the_state(run) -> 
 def test_the_outcome_and_the_states_are_published(run, status: Heard) -> None:
     outcome = Heard("task_outcome")
     nap = "states:\n  - Nap: {source: nap, transitions: {success: A, fail: A}}\n"
-    run(BAD.replace("states:\n", nap)).end()
+    process = run(BAD.replace("states:\n", nap))
+    status.wait_for(lambda messages: any(
+        event["event"] == "running" and event["active"] == ["Nap"] and event["state_elapsed_s"] >= 0.3
+        for event in map(json.loads, messages)))
+    rospy.set_param("/alarm", True)
+    process.end()
     outcome.wait_for(lambda messages: messages == ["gave_up"])
     outcome.close()
+    status.wait_for(lambda messages: json.loads(messages[-1])["event"] == "task_end")
     events = [event for event in map(json.loads, status.messages) if event["state"] != "Nap"]
-    assert any(event["event"] == "running" and event["active"] == ["Nap"] and event["state_elapsed_s"] >= 0.3
-               for event in map(json.loads, status.messages))
     assert [(event["event"], event["state"]) for event in events] == [("start", "A"), ("end", "A"), ("task_end", "")]
     assert events[1]["outcome"] == "fail"
     assert events[1]["reason"] == "the door is locked"
@@ -259,8 +266,10 @@ def test_a_signal_stops_the_running_state_within_a_second(run, status: Heard, nu
 def test_the_stop_service_stops_the_running_state_within_a_second(run, status: Heard) -> None:
     process = run(LONG)
     wait_for_start(status)
+    stop = rospy.ServiceProxy("/run_task/stop", Trigger)
+    stop.wait_for_service(60.0)
     before = time.monotonic()
-    assert rospy.ServiceProxy("/run_task/stop", Trigger)().success
+    assert stop().success
     code, output = process.end()
     assert process.ended_at() - before < STOPPED_WITHIN_S
     assert code == 1, output
@@ -281,8 +290,8 @@ def test_the_record_of_a_run_tells_of_every_state(run, tmp_path: Path) -> None:
     assert (record["task"], record["outcome"], record["succeeded"]) == ("tiny", "gave_up", False)
     (state,) = record["states"]
     assert (state["path"], state["outcome"], state["reason"]) == ("A", "fail", "the door is locked")
-    assert 0.0 <= state["started_s"] <= state["ended_s"] < 10.0
-    assert abs(record["begun"] - time.time()) < 30.0
+    assert 0.0 <= state["started_s"] <= state["ended_s"] < 60.0
+    assert abs(record["begun"] - time.time()) < 120.0
 
 
 def test_a_state_in_a_concurrence_in_a_nested_machine_is_stopped_too(run, status: Heard) -> None:
@@ -329,7 +338,7 @@ def test_a_launch_ends_with_its_task(ros_session: RosSession, tmp_path: Path) ->
         <param name="task_constructor_script" value="{tmp_path}/tiny.yaml"/>
         <param name="states_directory" value="{tmp_path}"/></node></launch>"""
     )
-    launch.wait(20.0)
+    launch.wait(90.0)
     assert "Task 'tiny' ended with outcome 'done': SUCCEEDED" in launch.log()
 
 

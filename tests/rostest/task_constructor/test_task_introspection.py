@@ -15,22 +15,21 @@ import rosgraph
 import rospy
 from ros_session import RosSession
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from std_msgs.msg import Empty
 
 STAY = """
 import rospy
-from std_msgs.msg import Empty
 
 from modular_framework_core.framework_state import FrameworkState
 
 
 class Stay(FrameworkState):
+    def __init__(self, until: str, outcomes=("success", "fail")):
+        super().__init__(outcomes)
+        self._until = until
+
     def execute(self, userdata):
-        heard = []
-        subscriber = rospy.Subscriber("/go_on", Empty, heard.append)
-        self.wait_until(lambda: bool(heard), 20.0)
-        subscriber.unregister()
-        return self.succeed() if heard else self.fail("nobody said go on")
+        told = self.wait_until(lambda: rospy.has_param(f"/go_on/{self._until}"), 60.0, 0.1)
+        return self.succeed() if told else self.fail("nobody said go on")
 """
 
 PICK = """
@@ -39,7 +38,7 @@ source: state_machine
 node_name: pick_like
 outcomes: [done, gave_up]
 states:
-  - Select: {source: stay, transitions: {success: Plan, fail: gave_up}}
+  - Select: {source: stay, until: selected, transitions: {success: Plan, fail: gave_up}}
   - Plan:
       source: concurrent_state_machine
       outcomes: [planned, gave_up]
@@ -47,15 +46,15 @@ states:
       outcome_map: {planned: {PlanPregrasp: success, PlanGrasp: success}}
       transitions: {planned: Pick, gave_up: gave_up}
       states:
-        - PlanPregrasp: {source: stay}
-        - PlanGrasp: {source: stay}
+        - PlanPregrasp: {source: stay, until: planned}
+        - PlanGrasp: {source: stay, until: planned}
   - Pick:
       source: state_machine
       outcomes: [done, gave_up]
       transitions: {done: done, gave_up: gave_up}
       states:
-        - Close: {source: stay, transitions: {success: Lift, fail: gave_up}}
-        - Lift: {source: stay, transitions: {success: done, fail: gave_up}}
+        - Close: {source: stay, until: closed, transitions: {success: Lift, fail: gave_up}}
+        - Lift: {source: stay, until: lifted, transitions: {success: done, fail: gave_up}}
 """
 
 
@@ -80,7 +79,7 @@ class Viewer:
         return sorted(self.status[path].active_states) if path in self.status else ["not seen"]
 
 
-def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> bool:
+def until(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
     end = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > end:
@@ -92,6 +91,8 @@ def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> bool:
 @pytest.fixture()
 def task(ros_session: RosSession, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     (tmp_path / "stay.py").write_text(STAY)
+    if rospy.has_param("/go_on"):
+        rospy.delete_param("/go_on")
     script = tmp_path / "pick_like.yaml"
     script.write_text(PICK)
     command = ["rosrun", "modular_framework_core", "run_task", str(script), f"_states_directory:={tmp_path}"]
@@ -106,25 +107,24 @@ def task(ros_session: RosSession, tmp_path: Path) -> Iterator[subprocess.Popen[s
 
 def test_a_viewer_follows_the_active_states_of_a_nested_task_to_its_end(task) -> None:
     viewer = Viewer()
-    go_on = rospy.Publisher("/go_on", Empty, queue_size=1)
 
-    def step(path: str, active: list[str]) -> None:
+    def step(path: str, active: list[str], done: str) -> None:
         assert until(lambda: viewer.active(path) == active), f"{path}: {viewer.active(path)} instead of {active}"
-        assert until(lambda: go_on.get_num_connections() >= 1)
-        time.sleep(0.1)  # the second of two states listens over the connection of the first
-        go_on.publish()
+        rospy.set_param(f"/go_on/{done}", True)
 
-    step("/pick_like", ["Select"])
+    assert until(lambda: viewer.active("/pick_like") == ["Select"]), viewer.active("/pick_like")
     assert until(lambda: set(viewer.structure) == {"/pick_like", "/pick_like/Plan", "/pick_like/Pick"})
     assert viewer.structure["/pick_like"].children == ["Select", "Plan", "Pick"]
     assert viewer.structure["/pick_like/Plan"].children == ["PlanPregrasp", "PlanGrasp"]
-    step("/pick_like/Plan", ["PlanGrasp", "PlanPregrasp"])
-    step("/pick_like/Pick", ["Close"])
-    assert viewer.active("/pick_like") == ["Pick"]
+    step("/pick_like", ["Select"], "selected")
+    step("/pick_like/Plan", ["PlanGrasp", "PlanPregrasp"], "planned")
+    assert until(lambda: viewer.active("/pick_like/Pick") == ["Close"])
+    assert until(lambda: viewer.active("/pick_like") == ["Pick"])
+    step("/pick_like/Pick", ["Close"], "closed")
     assert isinstance(pickle.loads(base64.b64decode(viewer.status["/pick_like"].local_data)), dict)
-    step("/pick_like/Pick", ["Lift"])
+    step("/pick_like/Pick", ["Lift"], "lifted")
     assert until(lambda: viewer.active("/pick_like") == [])
-    assert task.wait(10.0) == 0, task.stdout.read()
+    assert task.wait(60.0) == 0, task.stdout.read()
 
 
 def test_a_viewer_cannot_change_a_task_and_a_shown_task_stops_at_once(task) -> None:
@@ -134,8 +134,8 @@ def test_a_viewer_cannot_change_a_task_and_a_shown_task_stops_at_once(task) -> N
     assert not [topic for topic, _ in subscribed if topic.endswith("/smach/container_init")]
     asked = time.monotonic()
     task.send_signal(signal.SIGINT)
-    assert task.wait(5.0) == 1
-    assert time.monotonic() - asked < 3.0
+    assert task.wait(60.0) == 1
+    assert time.monotonic() - asked < 10.0  # the state would stay for a minute
     output = task.stdout.read()
     assert "Traceback" not in output, output
     assert "not shown" not in output

@@ -59,7 +59,8 @@ from modular_framework_core.stop_requests import stop_requested
 EXECUTE_ACTION = "execute_trajectory"
 PLANNERS_SERVICE = "query_planner_interface"
 REPORT_TOPIC = "move_group/planning_report"
-REPORT_WAIT_S = 0.3
+REPORT_WAIT_S = 2.0  # for the reason of a move_group that reports reasons, on a busy machine
+REPORTER_WAIT_S = 0.3  # where nobody is known to report them
 CLOCK_WAIT_S = 0.3
 REPORTS_KEPT = 64
 SERVICE_TIMEOUT_S = 10.0
@@ -330,7 +331,8 @@ class ArmCommander:
         return _no_plan(code, self._reported_reason(name, code))
 
     def _reported_reason(self, name: str, code: int) -> str:
-        wait_until(lambda: name in self._reports, REPORT_WAIT_S)
+        is_reported = self._subscribers[1].get_num_connections() > 0
+        wait_until(lambda: name in self._reports, REPORT_WAIT_S if is_reported else REPORTER_WAIT_S)
         reason = str(self._reports.get(name, {}).get("reason", ""))
         return f"{error_name(code)}: {reason}" if reason else error_name(code)
 

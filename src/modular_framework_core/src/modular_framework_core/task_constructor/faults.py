@@ -60,7 +60,7 @@ class FaultList:
             self._faults.append(Fault(place, message))
 
     def add_cause(self, place: Place, message: str) -> None:
-        """Note a fault of a value that cannot be read at all: further faults of that value would only follow from it."""
+        """Note a fault of a value that cannot be read at all: more faults of that value would only follow from it."""
         self.add(place, message)
         self._settled.add(place)
 

@@ -57,7 +57,8 @@ def write(task: TaskSpec, file: Path) -> None:
     try:
         file.write_bytes(content)
     except OSError as error:
-        raise GraphError(f"{file} cannot be written: {error.strerror}; name a file in a folder that is there") from error
+        reason = f"{file} cannot be written: {error.strerror}; name a file in a folder that is there"
+        raise GraphError(reason) from error
 
 
 def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: str | None) -> None:
