@@ -170,6 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)    # ctrl-c in the terminal is for the control loop, which ends us
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))     # not what the starter happened to have
     with socket.socket(fileno=options.channel) as channel:
+        channel.setblocking(True)     # one made where sockets have a default timeout, as rospy sets it, does not block
         try:
             if options.role == "state":
                 report_states(options, channel)
