@@ -41,6 +41,7 @@ def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSessi
         watcher.kill()
     assert exit_code == 0, launch.log()
     assert "Task 'simulation_pick' ended with outcome 'successful_pipeline': SUCCEEDED" in launch.log()
+    assert launch.log().splitlines()[-1] == "run_framework: the task succeeded"
     lifted = {name: last - first for name, (first, last) in heights.items()}
     assert max(lifted.values()) > LIFTED_M, lifted
     assert sum(height > LIFTED_M for height in lifted.values()) == 1, lifted

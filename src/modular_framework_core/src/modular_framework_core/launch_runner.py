@@ -21,6 +21,11 @@ import rospkg
 
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
+ENDINGS = {  # by exit code of the task
+    0: "the task succeeded",
+    1: "the task did not succeed; the line that begins with 'Task', and those before it, say why",
+    2: "the task could not be run; a message above says why",
+}
 
 
 @dataclass
@@ -123,4 +128,6 @@ def _verdict(watcher: EndWatcher) -> int:
     if watcher.task_exit_code is None:
         print("run_framework: stopped before the task ended", file=sys.stderr)
         return 1
+    ending = ENDINGS.get(watcher.task_exit_code, f"the task's node ended with exit code {watcher.task_exit_code}")
+    print(f"run_framework: {ending}")  # last, below what roslaunch says of the nodes it stops
     return watcher.task_exit_code
