@@ -100,6 +100,31 @@ def make_rig(arm: EmulatedArm) -> Iterator[Callable[..., Rig]]:
     arm.order("slider", value=1.0)
 
 
+@pytest.fixture(scope="module")
+def running() -> Iterator[Rig]:
+    """A driver with an emulated arm of its own; it outlives faults, so tests share it."""
+    emulated = EmulatedArm()
+    shared = Rig(emulated)
+    shared.until(lambda: shared.hw.ready)
+    yield shared
+    shared.hw.close()
+    emulated.close()
+
+
+@pytest.fixture
+def rig(running: Rig) -> Rig:
+    """The shared driver, following an arm that is well."""
+    for order in ("restore", "release_emergency_stop", "unlock", "power_on"):
+        running.arm.order(order)
+    running.arm.order("slider", value=1.0)
+    running.cycle()
+    running.until(lambda: "being made again" not in running.hw.fault())
+    running.run(0.1, running.positions)
+    assert running.resume() == ""
+    running.until(lambda: running.hw.ready)
+    return running
+
+
 def test_it_starts_says_what_it_does_and_leaves_the_arm_where_it_is(
         make_rig: Callable[..., Rig], caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "rosout.ur_arm")
@@ -116,8 +141,7 @@ def test_it_starts_says_what_it_does_and_leaves_the_arm_where_it_is(
     assert len(unused) == 1 and "control_pc_ip_address" in unused[0] and "robot_program_path" not in unused[0]
 
 
-def test_it_follows_a_motion(make_rig: Callable[..., Rig]) -> None:
-    rig = make_rig()
+def test_it_follows_a_motion(rig: Rig) -> None:
     start, worst = rig.positions, 0.0
     for step in range(200):
         goal = list(start)
@@ -144,32 +168,29 @@ def test_the_wrench_at_the_tool_is_a_sensor(make_rig: Callable[..., Rig]) -> Non
     ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
     ("stop_program", "the program on the arm was stopped"), ("cut", "link to the arm"), ("freeze", "link to the arm"),
     ("garbage", "link to the arm")])
-def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(make_rig: Callable[..., Rig], order: str,
-                                                               reason: str) -> None:
-    rig = make_rig()
+def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, order: str, reason: str) -> None:
     start = rig.positions
     for step in range(40):
         rig.cycle([position + 0.001 * step for position in start])
     rig.arm.order(order)
     rig.until(lambda: rig.hw.fault() != "")
     assert reason in rig.hw.fault()
-    rig.run(0.5)
+    rig.run(0.2)
     assert rig.hw.fault() != "" and [handle.command for handle in rig.handles] == rig.positions
     for remedy in ("restore", "unlock", "release_emergency_stop", "power_on"):
         rig.arm.order(remedy)
     rig.until(lambda: "being made again" not in rig.hw.fault())
-    rig.run(0.5)
+    rig.run(0.2)
     assert "resume" in rig.hw.fault(), "it must not go on by itself"
     standing = rig.positions
     assert rig.resume() == "" and rig.hw.fault() == ""
     rig.run(0.3)
     assert rig.positions == pytest.approx(standing, abs=1e-4)
-    rig.run(1.0, start)
-    assert rig.positions == pytest.approx(start, abs=1e-3)
+    rig.cycle(start)
+    rig.until(lambda: rig.positions == pytest.approx(start, abs=1e-3))
 
 
-def test_resume_says_what_is_to_be_done_first(make_rig: Callable[..., Rig]) -> None:
-    rig = make_rig()
+def test_resume_says_what_is_to_be_done_first(rig: Rig) -> None:
     rig.arm.order("protective_stop")
     rig.until(lambda: rig.hw.fault() != "")
     assert "unlock_protective_stop" in rig.resume()
@@ -197,8 +218,7 @@ def test_an_arm_that_cannot_be_reached_is_named_and_waited_for(make_rig: Callabl
     rig.until(lambda: rig.hw.ready)
 
 
-def test_a_pause_is_no_fault_but_stops_the_clock(make_rig: Callable[..., Rig]) -> None:
-    rig = make_rig()
+def test_a_pause_is_no_fault_but_stops_the_clock(rig: Rig) -> None:
     scaling = rig.hw.get(SpeedScalingInterface).handles[0]
     assert scaling.factor == 1.0 and scaling.joints == tuple(handle.name for handle in rig.handles)
     rig.arm.order("slider", value=0.1)
@@ -213,8 +233,7 @@ def test_a_pause_is_no_fault_but_stops_the_clock(make_rig: Callable[..., Rig]) -
     assert rig.positions == pytest.approx([position + 0.05 for position in start], abs=1e-3)
 
 
-def test_a_pause_in_the_midst_of_commands_is_none_either(make_rig: Callable[..., Rig]) -> None:
-    rig = make_rig()
+def test_a_pause_in_the_midst_of_commands_is_none_either(rig: Rig) -> None:
     start = rig.positions
     for step in range(300):
         if step % 30 == 10:
@@ -256,9 +275,7 @@ def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitt
 
 
 @pytest.mark.parametrize("command", [math.nan, 7.0, 1.0])
-def test_a_command_that_cannot_be_meant_is_refused_and_the_arm_holds(make_rig: Callable[..., Rig],
-                                                                    command: float) -> None:
-    rig = make_rig()
+def test_a_command_that_cannot_be_meant_is_refused_and_the_arm_holds(rig: Rig, command: float) -> None:
     start = rig.positions
     bad = list(start)
     bad[2] = start[2] + command
@@ -269,8 +286,7 @@ def test_a_command_that_cannot_be_meant_is_refused_and_the_arm_holds(make_rig: C
     assert rig.hw.fault() == ""
 
 
-def test_packages_that_come_late_or_not_at_all_do_not_move_the_arm_elsewhere(make_rig: Callable[..., Rig]) -> None:
-    rig = make_rig()
+def test_packages_that_come_late_or_not_at_all_do_not_move_the_arm_elsewhere(rig: Rig) -> None:
     start = rig.positions
     rig.arm.order("lose", every=3)
     rig.arm.order("delay", seconds=0.05)

@@ -133,6 +133,10 @@ class RtdeLink:
 
     def drop_program(self, reason: str) -> None:
         """Give up commanding until the next `request_program`."""
+        LOGGER.error("arm at %s: takes no commands: %s", self._settings.address, reason)
+        self._drop(reason)
+
+    def _drop(self, reason: str) -> None:
         self.commanding = False
         self._program_wanted = False
         if self._control is not None:
@@ -181,7 +185,7 @@ class RtdeLink:
     def _lose(self, states: _Helper, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
-            self.drop_program("its program was given up when the link was lost")
+            self._drop("its program was given up when the link was lost")
         if not states.failed:
             states.failed = True
             self.lost = reason

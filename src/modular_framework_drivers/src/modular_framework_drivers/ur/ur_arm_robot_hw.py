@@ -190,7 +190,7 @@ class UrArmHardware(RobotHW):
             if self._following:
                 return ""
             if self._link.program_failure:
-                break
+                return self.fault() or self._program_failure(self._link)
         return self.fault() or f"the program on the arm did not start within {timeout_s:g} s"
 
     def _current_fault(self) -> str:
@@ -212,11 +212,12 @@ class UrArmHardware(RobotHW):
         link = self._link
         if link is None or self._following:
             return ""
-        if link.program_failure and self._cause_may_follow(link):
-            return ""
         if link.program_failure:
-            return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
+            return "" if self._cause_may_follow(link) else self._program_failure(link)
         return f"the arm at {self.address} is being made ready for commands"
+
+    def _program_failure(self, link: RtdeLink) -> str:
+        return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
 
     def _cause_may_follow(self, link: RtdeLink) -> bool:
         """A stop of the arm ends its program, and that may be known before the stop itself."""
