@@ -26,7 +26,7 @@ from modular_framework_control.ros_controller_manager import RosControllerManage
 from modular_framework_control.ros_node_handle import RosNodeHandle
 
 PERIOD_S = 0.01
-WAIT_S = 10.0
+WAIT_S = 30.0
 
 
 class HinderedRobotHW(MockRobotHW):
@@ -102,6 +102,10 @@ class SteppedRobot:
             self.time_s = round(self.time_s + PERIOD_S, 9)
             self._cycle(PERIOD_S)
 
+    def stand(self) -> None:
+        """Let a cycle pass while time stands still."""
+        self._cycle(0.0)
+
     def run(self, duration_s: float) -> None:
         """Let some time [s] pass."""
         self.step(round(duration_s / PERIOD_S))
@@ -109,6 +113,20 @@ class SteppedRobot:
     def flush(self) -> None:
         """Let everything be published that the controllers have told so far."""
         self._manager._outbox.flush(WAIT_S)
+
+    def count_submissions(self, name: str) -> list[float]:
+        """A list that grows with everything handed to a controller from now on: when, in simulated time."""
+        controller = next(entry.controller for entry in self._manager.manager._loaded if entry.name == name)
+        submit, times_s = controller.submit, []
+
+        def counted(*arguments: Any) -> None:
+            try:
+                submit(*arguments)
+            finally:
+                times_s.append(self.time_s)
+
+        controller.submit = counted
+        return times_s
 
     def wait_for(self, action: Callable[[], Any]) -> Any:
         """Do something that waits for ROS or for the loop, while time stands still; answers what it returned."""
@@ -163,6 +181,7 @@ class Arm:
         self.states: list[JointTrajectoryControllerState] = []
         self._subscriber = rospy.Subscriber(f"{name}/state", JointTrajectoryControllerState, self.states.append)
         self._command = rospy.Publisher(f"{name}/command", JointTrajectory, queue_size=5)
+        self._taken = robot.count_submissions(name)
         self.action = actionlib.ActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
         assert robot.wait_for(lambda: self.action.wait_for_server(rospy.Duration(WAIT_S)))
         robot.wait_until(lambda: self._command.get_num_connections() and self._subscriber.get_num_connections())
@@ -197,9 +216,11 @@ class Arm:
         return bool(handle.get_comm_state() == actionlib.CommState.ACTIVE)
 
     def command(self, message: JointTrajectory) -> None:
-        """Publish on the topic `command`, and wait until the controller must have it."""
+        """Publish on the topic `command`, and wait until the controller has taken or refused it."""
+        before = len(self._taken)
         self._command.publish(message)
-        self._robot.wait_for(lambda: time.sleep(0.1))
+        self._robot.wait_until(lambda: len(self._taken) > before)
+        self._robot.stand()
 
     def trace(self, duration_s: float) -> list[JointTrajectoryControllerState]:
         """Let time pass and answer the state of every cycle; the controller must publish that often."""

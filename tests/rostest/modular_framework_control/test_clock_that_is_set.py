@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import actionlib
@@ -39,13 +39,13 @@ def clock(ros_session: Any) -> Iterator[SetClock]:
         rospy.set_param(f"~{name}", value)
     rospy.set_param("/states", {"type": "joint_state_controller/JointStateController"})
     rospy.set_param("/arm", {"type": "position_controllers/JointTrajectoryController", "joints": ["shoulder"],
-                             "constraints": {"goal_time": 1.0}})
+                             "constraints": {"goal_time": 10.0}})
     system, ended = SetClock(), threading.Event()
     node = RobotHwNode(ended, LoopTime(system))
     node.connect()
     loop = threading.Thread(target=node.run)
     loop.start()
-    rospy.wait_for_service("controller_manager/switch_controller", 20.0)
+    rospy.wait_for_service("controller_manager/switch_controller", 60.0)
     for name in ("states", "arm"):
         assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)(name).ok
     switch = rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)
@@ -59,7 +59,7 @@ def clock(ros_session: Any) -> Iterator[SetClock]:
 @pytest.fixture
 def arm(clock: SetClock) -> actionlib.SimpleActionClient:
     client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
-    assert client.wait_for_server(rospy.Duration(10.0))
+    assert client.wait_for_server(rospy.Duration(30.0))
     return client
 
 
@@ -71,27 +71,33 @@ def move(client: actionlib.SimpleActionClient, position: float, duration_s: floa
     client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
 
 
+def wait_until(condition: Callable[[], Any]) -> None:
+    end = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < end, "it did not become true in time"
+        time.sleep(0.01)
+
+
 @pytest.mark.parametrize("step_s", [-HOUR_S, HOUR_S, -0.5])
 def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_clock_that_was_set(
         clock: SetClock, arm: actionlib.SimpleActionClient, step_s: float) -> None:
-    states: list[JointState] = []
-    here = rospy.wait_for_message("joint_states", JointState, 5.0).position[0]
-    subscriber = rospy.Subscriber("joint_states", JointState, states.append)
+    told: list[tuple[JointState, float]] = []
+    here = rospy.wait_for_message("joint_states", JointState, 30.0).position[0]
+    subscriber = rospy.Subscriber("joint_states", JointState, lambda message: told.append((message, clock())))
     begun_s = time.monotonic()
     move(arm, here + 1.0, 2.0)
-    while not states or states[-1].position[0] < here + 0.1:
-        assert time.monotonic() - begun_s < 10.0
-        time.sleep(0.01)
+    wait_until(lambda: told and told[-1][0].position[0] > here + 0.1)
     clock.set_by_s += step_s
-    assert arm.wait_for_result(rospy.Duration(10.0))
-    took_s, told_s = time.monotonic() - begun_s, clock()
-    subscriber.unregister()
+    assert arm.wait_for_result(rospy.Duration(30.0))
+    assert time.monotonic() - begun_s >= 1.9, "it must not be carried to its end at once"
     assert arm.get_state() == GoalStatus.SUCCEEDED, arm.get_goal_status_text()
-    assert took_s >= 1.9, "it must not be carried to its end at once"
-    assert states[-1].position[0] == pytest.approx(here + 1.0, abs=0.05)
-    fastest = max(abs(state.velocity[0]) for state in states)
+    fastest = max(abs(message.velocity[0]) for message, _ in list(told))
     assert fastest < 0.8, "the curve of this goal is never faster than 0.75 rad/s"
-    assert told_s - 1.0 < states[-1].header.stamp.to_sec() <= told_s + 0.01
+    told.clear()
+    wait_until(lambda: len(told) >= 5)
+    subscriber.unregister()
+    assert told[-1][0].position[0] == pytest.approx(here + 1.0, abs=1e-6)
+    assert -0.01 < min(heard_s - message.header.stamp.to_sec() for message, heard_s in told) < 0.4
 
 
 def test_a_header_stamp_counts_by_the_clock_as_it_is_now(clock: SetClock, arm: actionlib.SimpleActionClient) -> None:
@@ -99,9 +105,9 @@ def test_a_header_stamp_counts_by_the_clock_as_it_is_now(clock: SetClock, arm: a
     time.sleep(0.1)
     begun_s = time.monotonic()
     move(arm, 0.0, 0.3, stamp_s=clock() + 0.7)
-    assert arm.wait_for_result(rospy.Duration(10.0))
+    assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.SUCCEEDED
     assert time.monotonic() - begun_s > 0.9
     move(arm, 0.5, 0.3, stamp_s=clock() - 5.0)
-    assert arm.wait_for_result(rospy.Duration(10.0))
+    assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.REJECTED and "in the past" in arm.get_goal_status_text()

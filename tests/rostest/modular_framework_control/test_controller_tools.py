@@ -47,18 +47,18 @@ def tool(ros_launch: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
 
 
 def run(process: subprocess.Popen[str]) -> tuple[int, str]:
-    output, _ = process.communicate(timeout=30.0)
+    output, _ = process.communicate(timeout=60.0)
     return process.returncode, output
 
 
 def states() -> dict[str, str]:
-    rospy.wait_for_service("controller_manager/list_controllers", 15.0)
+    rospy.wait_for_service("controller_manager/list_controllers", 60.0)
     reply = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)()
     return {entry.name: entry.state for entry in reply.controller}
 
 
 def wait_until(expected: dict[str, str]) -> None:
-    deadline = time.monotonic() + 15.0
+    deadline = time.monotonic() + 60.0
     while states() != expected:
         assert time.monotonic() < deadline, states()
         time.sleep(0.05)
@@ -74,7 +74,7 @@ def test_the_spawner_waits_spawns_and_cleans_up_at_its_end(tool: Callable[..., A
     ready.publish(True)
     wait_until({"states": "running", "arm": "running", "spare": "running"})
     process.send_signal(signal.SIGINT)
-    assert process.wait(10.0) == 0
+    assert process.wait(30.0) == 0
     assert states() == {}
 
 
@@ -85,10 +85,10 @@ def test_an_unspawner_stops_and_starts_again_at_its_end(tool: Callable[..., Any]
     unspawner = tool("unspawner", "arm")
     wait_until({"arm": "stopped"})
     unspawner.send_signal(signal.SIGTERM)
-    assert unspawner.wait(10.0) == 0
+    assert unspawner.wait(30.0) == 0
     assert states() == {"arm": "running"}
     spawner.send_signal(signal.SIGINT)
-    assert spawner.wait(10.0) == 0
+    assert spawner.wait(30.0) == 0
 
 
 def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
@@ -116,7 +116,7 @@ def test_groups_are_listed_started_and_exchanged(tool: Callable[..., Any]) -> No
 
 
 def test_statistics_of_the_controllers_are_published(tool: Callable[..., Any]) -> None:
-    message = rospy.wait_for_message("controller_manager/statistics", ControllersStatistics, 10.0)
+    message = rospy.wait_for_message("controller_manager/statistics", ControllersStatistics, 30.0)
     figures = {entry.name: entry for entry in message.controller}
     assert {name: entry.running for name, entry in figures.items()} == {"states": True, "arm": False, "jog": True}
     jog = figures["jog"]

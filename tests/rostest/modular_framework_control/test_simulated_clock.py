@@ -30,7 +30,7 @@ LAUNCH = """
 
 
 class ClockSource:
-    """Publishes /clock, twice as fast as real time, unless it stands still."""
+    """Publishes /clock, half as fast as real time, unless it stands still."""
 
     def __init__(self) -> None:
         self.time_s = 10.0
@@ -45,7 +45,7 @@ class ClockSource:
             if self.running:
                 self.time_s += 0.01
                 self._publisher.publish(Clock(rospy.Time.from_sec(self.time_s)))
-            time.sleep(0.005)
+            time.sleep(0.02)
 
     def close(self) -> None:
         """Publish no more."""
@@ -57,7 +57,7 @@ class ClockSource:
 def clock(ros_launch: Callable[..., Any]) -> Iterator[ClockSource]:
     ros_launch(LAUNCH)
     source = ClockSource()
-    rospy.wait_for_service("controller_manager/switch_controller", 20.0)
+    rospy.wait_for_service("controller_manager/switch_controller", 60.0)
     assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)("arm").ok
     assert rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)(["arm"], [], 2, False, 0.0).ok
     yield source
@@ -67,7 +67,7 @@ def clock(ros_launch: Callable[..., Any]) -> Iterator[ClockSource]:
 @pytest.fixture
 def arm(clock: ClockSource) -> actionlib.SimpleActionClient:
     client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
-    assert client.wait_for_server(rospy.Duration(10.0))
+    assert client.wait_for_server(rospy.Duration(30.0))
     return client
 
 
@@ -79,9 +79,9 @@ def move(client: actionlib.SimpleActionClient, position: float, duration_s: floa
 def test_a_goal_takes_its_time_on_the_simulated_clock(clock: ClockSource, arm: actionlib.SimpleActionClient) -> None:
     begun_s = clock.time_s
     move(arm, 0.5, 1.0)
-    assert arm.wait_for_result(rospy.Duration(10.0))
+    assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.SUCCEEDED
-    assert 1.0 - 1e-6 <= clock.time_s - begun_s < 1.5
+    assert clock.time_s - begun_s >= 1.0 - 1e-6, "by real time it would have ended at half of that"
 
 
 def test_while_the_clock_stands_still_so_does_the_goal(clock: ClockSource, arm: actionlib.SimpleActionClient) -> None:
@@ -90,7 +90,7 @@ def test_while_the_clock_stands_still_so_does_the_goal(clock: ClockSource, arm: 
     clock.running = False
     assert not arm.wait_for_result(rospy.Duration(0.8))
     clock.running = True
-    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.SUCCEEDED
 
 
@@ -99,14 +99,16 @@ def test_after_the_clock_jumps_back_goals_end_and_new_ones_are_followed(
     move(arm, 3.0, 20.0)
     time.sleep(0.3)
     clock.time_s = 1.0
-    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.PREEMPTED
     move(arm, 0.2, 0.5)
-    assert arm.wait_for_result(rospy.Duration(5.0))
+    assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.SUCCEEDED
     statuses: list[float] = []
     subscriber = rospy.Subscriber("arm/follow_joint_trajectory/status", GoalStatusArray,
                                   lambda message: statuses.append(message.header.stamp.to_sec()))
-    time.sleep(0.9)
+    end = time.monotonic() + 30.0
+    while len(statuses) < 4:
+        assert time.monotonic() < end, "the status topic must survive the jump"
+        time.sleep(0.05)
     subscriber.unregister()
-    assert len(statuses) > 3, "the status topic must survive the jump"
