@@ -15,6 +15,9 @@ from task_folders import GOOD_TASK, TEMPLATES, World
 import smach
 from modular_framework_core.task_constructor import loading
 from modular_framework_core.task_constructor.generator import GenerationError, default_output_directory, literal
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
+from modular_framework_core.task_record import TaskRecorder
+from modular_framework_core.task_runner import TaskRun
 
 HEADER = "name: t\nsource: state_machine\noutcomes: [success, fail]\nstates:\n"
 
@@ -88,6 +91,21 @@ def test_the_keys_of_a_nested_machine_are_handed_to_its_container(world: World, 
     header = f"{HEADER}  - M:\n      source: {template}\n{keys}{produced}"
     text = world.generate(f"{header}      states:\n        - {inner}\n")
     assert "input_keys=['a', 'b']," in text and "output_keys=['c']," in text
+
+
+def test_a_state_that_cannot_be_made_is_told_with_its_place_in_the_task(world: World, tmp_path: Path) -> None:
+    (tmp_path / "own_states" / "picky.py").write_text(
+        "import smach\n\n\nclass Picky(smach.State):\n    def __init__(self, size):\n"
+        "        raise ValueError(f'size is {size}, allowed is 0 or more')\n")
+    text = f"{HEADER}  - M:\n      source: state_machine\n      states:\n        - A: {{source: move}}\n" \
+           "        - B: {source: picky, size: -1, transitions: {success: success, fail: fail}}\n"
+    world.states = StateCatalogue([tmp_path / "own_states"])
+    module = loading.load_module(world.write(text.replace("move}", "move, transitions: {success: B}}")))
+    running = TaskRun("t", loading.machine_factory(module), TaskRecorder())
+    running.start()
+    assert running.wait(30.0)
+    assert running.result().error == \
+        "the state machine could not be made: 't.yaml:9:11': ValueError: size is -1, allowed is 0 or more"
 
 
 def test_a_nested_machine_shares_the_userdata_object_when_asked(world: World) -> None:

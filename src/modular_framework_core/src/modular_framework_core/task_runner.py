@@ -16,6 +16,10 @@ EXIT_FAILED = 1
 EXIT_NOT_RUN = 2
 
 
+PLACE_MARK = "(  # defined in "
+"""What generated modules write between the call of a state's class and its place in the task."""
+
+
 @dataclass(frozen=True, slots=True)
 class TaskResult:
     """How a task ended.
@@ -116,7 +120,7 @@ class TaskRun:
             if self._stop.is_set():
                 self._result = self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
             else:
-                text = f"the state machine could not be made: {type(error).__name__}: {error}"
+                text = f"the state machine could not be made: {_where_defined(error)}{type(error).__name__}: {error}"
                 self._result = self._ended("not run", EXIT_NOT_RUN, text)
             return
         self._recorder.attach(machine)
@@ -142,3 +146,10 @@ class TaskRun:
 
     def _ended(self, outcome: str, exit_code: int, error: str) -> TaskResult:
         return TaskResult(self._name, outcome, exit_code, self._recorder.failures(), error)
+
+
+def _where_defined(error: Exception) -> str:
+    """Return the place in the task of the state whose constructor raised, and ": "; nothing where it is not known."""
+    lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__)]
+    places = [line.partition(PLACE_MARK)[2] for line in lines if PLACE_MARK in line]
+    return f"{places[-1]}: " if places else ""

@@ -64,6 +64,9 @@ class StateBuilder:
                 may_be_empty = key != "outcomes"
                 header_fields.names(options[key], f"state '{label}': {key}", self._faults, may_be_empty=may_be_empty)
         outcomes = self._state_outcomes(options, source)
+        if "outcomes" in options and outcomes is not None and len(outcomes) < 2 and source.is_framework_state:
+            self._faults.add(options["outcomes"].place, f"state '{label}': outcomes has only '{outcomes[0]}'; it needs "
+                             "at least two, the first for success and the last for failure, as [success, fail]")
         values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
         return (
             StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), place),

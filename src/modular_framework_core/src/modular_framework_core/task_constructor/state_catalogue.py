@@ -53,6 +53,7 @@ class StateSource:
         class_name: name of the class.
         options: what its constructor takes, by name.
         takes_any_option: whether its constructor takes further keyword arguments (or is not known).
+        is_framework_state: whether it is derived from ``FrameworkState``, which needs two outcomes at least.
         doc: docstring of the class.
     """
 
@@ -61,6 +62,7 @@ class StateSource:
     class_name: str
     options: dict[str, StateOption]
     takes_any_option: bool
+    is_framework_state: bool
     doc: str
 
     def default_names(self, key: str) -> tuple[str, ...] | None:
@@ -145,7 +147,19 @@ def _read_state(name: str, file: Path) -> StateSource:
             f"{', '.join(classes) or 'no class'}"
         )
     options, takes_any = _constructor_options(classes[wanted], classes, {**_imported(tree, file), **_aliases(tree)})
-    return StateSource(name, file, wanted, options, takes_any, ast.get_docstring(classes[wanted]) or "")
+    is_ours = _is_framework_state(classes[wanted], classes)
+    return StateSource(name, file, wanted, options, takes_any, is_ours, ast.get_docstring(classes[wanted]) or "")
+
+
+def _is_framework_state(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> bool:
+    others = {name: found for name, found in classes.items() if name != node.name}
+    names = [_base_name(base) for base in node.bases]
+    return "FrameworkState" in names or any(
+        _is_framework_state(others[name], others) for name in names if name in others)
+
+
+def _base_name(base: ast.expr) -> str:
+    return base.attr if isinstance(base, ast.Attribute) else str(getattr(base, "id", ""))
 
 
 def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
@@ -176,7 +190,7 @@ def _constructor_options(
         if isinstance(item, ast.FunctionDef) and item.name == "__init__":
             return _arguments(item.args, aliases)
     for base in node.bases:
-        base_name = base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "")
+        base_name = _base_name(base)
         if base_name in classes and base_name != node.name:
             return _constructor_options(classes[base_name], classes, aliases)
         if base_name in BASE_DEFAULTS:
