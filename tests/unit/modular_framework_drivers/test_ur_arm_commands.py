@@ -107,7 +107,7 @@ class FakeProcess:
 
     started: list[FakeProcess]
     refused: OSError | None
-    mute: str       # role of the one that says nothing after its first message
+    mute: str       # role of the one that says nothing; of the one that reads, after its first message
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
         if FakeProcess.refused is not None:
@@ -118,7 +118,7 @@ class FakeProcess:
         self._said = self._taken = False
 
     def messages(self) -> Iterator[bytes]:
-        if self.role == FakeProcess.mute and self._said:
+        if self.role == FakeProcess.mute and (self._said or self.role == "control"):
             return
         if self.role == "state":
             self._said = True
@@ -207,3 +207,27 @@ def test_a_process_that_hangs_is_told_and_replaced(link: RtdeLink, role: str, sa
     link.request_program()
     until(link, lambda: link.commanding)
     assert [process.ended for process in FakeProcess.started if process.role == role] == [True, False]
+
+
+def test_a_link_that_is_lost_before_the_arm_ever_followed_needs_nobody_to_resume(link: RtdeLink) -> None:
+    FakeProcess.mute = "control"
+    link.connect()
+    link.request_program()
+    until(link, lambda: len(FakeProcess.started) == 2)
+    FakeProcess.started[0].ended = True
+    until(link, lambda: "ended" in link.lost)
+    FakeProcess.mute = ""
+    until(link, lambda: link.commanding)
+    assert link.program_failure == ""
+
+
+def test_a_link_that_is_lost_afterwards_does(link: RtdeLink) -> None:
+    link.connect()
+    link.request_program()
+    until(link, lambda: link.commanding)
+    FakeProcess.started[0].ended = True
+    until(link, lambda: "ended" in link.lost)
+    until(link, lambda: link.lost == "")
+    time.sleep(0.1)
+    link.poll()
+    assert not link.commanding and "given up" in link.program_failure

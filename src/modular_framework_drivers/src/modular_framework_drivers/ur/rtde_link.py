@@ -108,6 +108,7 @@ class RtdeLink:
         self._states: _Helper | None = None
         self._control: _Helper | None = None
         self._program_wanted = False
+        self._has_commanded = False
         self.state: ArmState | None = None
         self.lost = "the first attempt is under way"
         self.commanding = False
@@ -185,7 +186,8 @@ class RtdeLink:
     def _lose(self, states: _Helper, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
-            self._drop("its program was given up when the link was lost")
+            if self._has_commanded:    # before that nothing has moved, and nobody needs to be asked to begin again
+                self._drop("its program was given up when the link was lost")
         if not states.failed:
             states.failed = True
             self.lost = reason
@@ -200,7 +202,8 @@ class RtdeLink:
                 control.connects(now_s, _PROGRAM_TIMEOUT_S)
             elif message == READY:
                 control.works = True
-                self.commanding = self._program_wanted and not control.failed
+                self.commanding = self._program_wanted and not control.failed and not self.lost
+                self._has_commanded |= self.commanding
             elif message[:1] == FAILED and not control.failed:
                 self.drop_program(message[1:].decode(errors="replace"))
         if control.failed:
