@@ -6,7 +6,6 @@ A module says what it needs by a mark: `pytest.mark.move_group(service=..., laun
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,6 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 from planning_wire import ARM, GRIPPER, LAUNCH, START, FakeArm, call, tip_pose  # noqa: E402
-
-HEARD_S = 0.2  # ten joint states: the node has heard where the robot is
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +54,7 @@ def session(ros_launch: Callable[..., Any], needs: Needs) -> Any:
 def arm(session: Any, needs: Needs) -> Iterator[FakeArm]:
     """The robot."""
     arm = FakeArm(with_gripper=needs.gripper)
-    time.sleep(HEARD_S)
+    arm.settle()
     yield arm
     arm.close()
 
@@ -71,9 +68,8 @@ def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
     start = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}
     arm.cancelled.clear()
     arm.grips.clear()
-    if arm.positions != start:
-        arm.positions.update(start)
-        time.sleep(HEARD_S)
+    arm.positions.update(start)
+    arm.settle()
     assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
     yield
     assert session.alive(), session.log()

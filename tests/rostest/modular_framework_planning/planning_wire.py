@@ -28,10 +28,11 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     OrientationConstraint,
     PlanningScene,
+    PlanningSceneComponents,
     PositionConstraint,
     RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPositionFK
+from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetPositionFK
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header, String
@@ -61,6 +62,7 @@ class FakeArm:
         self._server = actionlib.SimpleActionServer("arm_trajectory_controller/follow_joint_trajectory",
                                                     FollowJointTrajectoryAction, self._follow, auto_start=False)
         self._server.start()
+        self.durations_s: list[float] = []  # of the motions it was given
         self.grips: list[float] = []
         if with_gripper:
             self._gripper = actionlib.SimpleActionServer("ezgripper_controller/gripper_cmd", GripperCommandAction,
@@ -73,6 +75,25 @@ class FakeArm:
         self._timer.shutdown()
         self._timer.join(1.0)
 
+    def settle(self) -> None:
+        """Returns when the node knows where the robot is."""
+        def is_known() -> bool:
+            state = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(
+                PlanningSceneComponents.ROBOT_STATE)).scene.robot_state.joint_state
+            known = dict(zip(state.name, state.position, strict=True))
+            return all(abs(known[name] - value) < 1e-9 for name, value in self.positions.items())
+
+        until(is_known, "the robot's position in the node")
+
+    def until_moving(self, joint: str = ARM[0]) -> None:
+        """Returns when a motion has begun at the start."""
+        place = START[ARM.index(joint)]
+        until(lambda: abs(self.positions[joint] - place) > 1e-3, "the begin of the motion")
+
+    def tell(self) -> None:
+        """Publishes joint states at once."""
+        self._publish(None)
+
     def _publish(self, _: Any) -> None:
         if rospy.is_shutdown():
             return
@@ -81,6 +102,7 @@ class FakeArm:
 
     def _follow(self, goal: Any) -> None:
         begun = time.monotonic()
+        self.durations_s.append(goal.trajectory.points[-1].time_from_start.to_sec())
         for point in goal.trajectory.points:
             while time.monotonic() - begun < point.time_from_start.to_sec():
                 if self._server.is_preempt_requested():
@@ -97,8 +119,16 @@ class FakeArm:
         self._gripper.set_succeeded(GripperCommandResult(position=goal.command.position, reached_goal=True))
 
 
+def until(condition: Callable[[], Any], what: str, timeout_s: float = 30.0) -> None:
+    """Waits: long enough for a busy computer, and not for ever."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"{what} did not come within {timeout_s} s"
+        time.sleep(0.01)
+
+
 def call(name: str, kind: Any, *args: Any) -> Any:
-    rospy.wait_for_service(name, 10.0)
+    rospy.wait_for_service(name, 30.0)
     return rospy.ServiceProxy(name, kind)(*args)
 
 
@@ -173,10 +203,7 @@ class Reports:
         self.heard: list[dict[str, Any]] = []
         subscriber = rospy.Subscriber("move_group/planning_report", String,
                                       lambda message: self.heard.append(json.loads(message.data)))
-        deadline = time.monotonic() + 10.0
-        while subscriber.get_num_connections() == 0:
-            assert time.monotonic() < deadline, "nobody publishes planning reports"
-            time.sleep(0.01)
+        until(subscriber.get_num_connections, "the publisher of planning reports")
         time.sleep(0.5)
 
 
@@ -185,17 +212,16 @@ def reports() -> Reports:
     return Reports()
 
 
-def report_of(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
-    """What the work returned and the planning report it caused."""
-    heard = reports().heard
-    time.sleep(0.05)  # what was published before is here
-    known = len(heard)
+def report_of(work: Callable[[], Any], *kinds: str) -> tuple[Any, dict[str, Any]]:
+    """What the work returned and the last planning report it caused, of one of these kinds if any are named."""
+    heard, begun = reports().heard, rospy.get_time()
     result = work()
-    deadline = time.monotonic() + 5.0
-    while len(heard) == known and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert len(heard) > known, "no planning report within 5 s"
-    return result, heard[-1]
+
+    def caused() -> list[dict[str, Any]]:
+        return [item for item in heard if item["time"] >= begun and (not kinds or item["kind"] in kinds)]
+
+    until(caused, "a planning report")
+    return result, caused()[-1]
 
 
 def joint_goal(name: str, value: float) -> Constraints:

@@ -31,7 +31,7 @@ GREEN, RED = (0.2, 0.8, 0.3), (0.9, 0.15, 0.1)
 LAST_WORDS = [""]
 
 
-def until(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) -> None:
+def until(condition: Callable[[], bool], what: str, timeout_s: float = 30.0) -> None:
     deadline = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline, f"{what}: not within {timeout_s} s; the marker says '{LAST_WORDS[-1]}'"
@@ -54,7 +54,7 @@ class Rviz:
         self._panel = {name: rospy.Publisher(f"/rviz/moveit/{name}", Empty, queue_size=1)
                        for name in ("plan", "execute", "stop", "update_start_state", "update_goal_state")}
         self.custom_goal = rospy.Publisher("/rviz/moveit/update_custom_goal_state", RobotState, queue_size=1)
-        until(lambda: self.marker is not None, "the marker", 60.0)
+        until(lambda: self.marker is not None, "the marker", 120.0)
         publishers = (self._feedback, self.custom_goal, *self._panel.values())
         until(lambda: all(item.get_num_connections() for item in publishers), "ears for the panel")
         time.sleep(1.0)  # a marker server takes feedback of a second client as a conflict during the first second
@@ -103,7 +103,7 @@ class Rviz:
 def arm(ros_launch: Callable[..., Any]) -> Iterator[FakeArm]:
     session = ros_launch(WITH_MARKER)
     arm = FakeArm()
-    session.wait_for_service("plan_kinematic_path", 60.0)
+    session.wait_for_service("plan_kinematic_path", 120.0)
     assert plan(request()).error_code.val == OK  # what is made on first use is made now
     ask = PositionIKRequest(group_name="arm_and_manipulator", avoid_collisions=True)
     ask.pose_stamped.header.frame_id, ask.pose_stamped.pose = "world", Pose(Point(*NEAR), DOWN)
@@ -141,14 +141,14 @@ def test_the_marker_can_be_dragged_in_six_ways_and_has_a_menu(rviz: Rviz) -> Non
 def test_a_dragged_goal_is_planned_to_and_executed_by_the_menu(rviz: Rviz, arm: FakeArm) -> None:
     rviz.drag(Pose(Point(*NEAR), DOWN))
     until(lambda: rviz.goal_is_at(*NEAR) and rviz.color == GREEN, "the dragged goal")
-    _, report = report_of(lambda: rviz.select("Plan"))
-    assert report["kind"] == "plan" and report["error_code"] == OK
+    _, report = report_of(lambda: rviz.select("Plan"), "plan")
+    assert report["error_code"] == OK
     until(lambda: rviz.status.startswith("planned"), "the plan")
     until(lambda: bool(rviz.motions), "the planned motion on display")
     assert arm.positions["elbow_joint"] == START[2], "planning does not move the robot"
     end = rviz.motions[-1].trajectory[0].joint_trajectory.points[-1].positions
     rviz.select("Execute")
-    until(lambda: rviz.status == "executed", "the execution", 30.0)
+    until(lambda: rviz.status == "executed", "the execution", 60.0)
     assert np.allclose([arm.positions[name] for name in ARM], end, atol=1e-6)
     rviz.select("Execute")
     until(lambda: "nothing is planned" in rviz.status, "the refusal to do it twice")
@@ -158,7 +158,7 @@ def test_a_goal_in_collision_is_red_and_says_what_touches(rviz: Rviz) -> None:
     assert add(box("crate", *NEAR, (0.2, 0.2, 0.2)))
     rviz.drag(Pose(Point(*NEAR), DOWN))
     until(lambda: rviz.color == RED and "crate" in rviz.status, "the red goal")
-    _, report = report_of(lambda: rviz.select("Plan"))
+    _, report = report_of(lambda: rviz.select("Plan"), "plan")
     assert report["error_code"] == MoveItErrorCodes.GOAL_IN_COLLISION
     until(lambda: "crate" in rviz.status and "mm deep" in rviz.status, "the reason in words")
 
@@ -178,7 +178,7 @@ def test_what_is_no_pose_is_ignored(rviz: Rviz) -> None:
 
 def test_a_random_goal_is_valid_and_the_marker_goes_there(rviz: Rviz) -> None:
     rviz.select("Random valid goal")
-    until(lambda: rviz.status == "random goal" and rviz.color == GREEN, "a random goal", 20.0)
+    until(lambda: rviz.status == "random goal" and rviz.color == GREEN, "a random goal")
 
 
 def test_plan_and_execute_can_be_stopped(rviz: Rviz, arm: FakeArm) -> None:
@@ -189,9 +189,9 @@ def test_plan_and_execute_can_be_stopped(rviz: Rviz, arm: FakeArm) -> None:
           "the goal from the topic")
     arm.cancelled.clear()
     rviz.select("Plan and execute")
-    until(lambda: abs(arm.positions["shoulder_pan_joint"] - START[0]) > 0.05, "the robot moves", 20.0)
+    until(lambda: abs(arm.positions["shoulder_pan_joint"] - START[0]) > 0.05, "the robot moves")
     rviz.select("Stop")
-    assert arm.cancelled.wait(5.0)
+    assert arm.cancelled.wait(20.0)
     until(lambda: "stop" in rviz.status or "cancel" in rviz.status, "the stop in words")
 
 
@@ -201,9 +201,9 @@ def test_the_topics_of_moveits_panel_are_honoured(rviz: Rviz, arm: FakeArm) -> N
     rviz.drag(Pose(Point(*NEAR), DOWN))
     until(lambda: rviz.goal_is_at(*NEAR), "the dragged goal")
     rviz.press("plan")
-    until(lambda: rviz.status.startswith("planned"), "the plan", 20.0)
+    until(lambda: rviz.status.startswith("planned"), "the plan")
     rviz.press("execute")
-    until(lambda: rviz.status == "executed", "the execution", 30.0)
+    until(lambda: rviz.status == "executed", "the execution", 60.0)
     assert arm.positions["elbow_joint"] != START[2]
     rviz.select("Start: follow the robot")
     until(lambda: not rviz.ghosts["start"], "no ghost of the start")
@@ -215,5 +215,5 @@ def test_the_chosen_planner_is_asked_for(rviz: Rviz) -> None:
     until(lambda: rviz.status.startswith("planner:") and "RRTstar" in rviz.status, "the choice")
     rviz.drag(Pose(Point(*NEAR), DOWN))
     until(lambda: rviz.goal_is_at(*NEAR), "the dragged goal")
-    _, report = report_of(lambda: rviz.select("Plan"))
+    _, report = report_of(lambda: rviz.select("Plan"), "plan")
     assert "RRTstar" in report["planner_id"]

@@ -43,7 +43,7 @@ def session(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFac
     (package / "src").mkdir()
     (package / "src/my_planners.py").write_text(guide_planner())
     session = ros_launch(LAUNCH.replace("<launch>", PARAMETERS.format(package=package)))
-    session.wait_for_service("plan_kinematic_path", 30.0)
+    session.wait_for_service("plan_kinematic_path", 120.0)
     session.arm = FakeArm()
     assert add(box("wall", 0.33, 0.42, 1.0, (0.12, 0.12, 0.4)))
     return session

@@ -50,7 +50,7 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 
 @pytest.fixture(scope="module")
 def scene(ros_launch: Callable[..., Any]) -> Iterator[PlanningSceneInterface]:
     session = ros_launch(LAUNCH)
-    session.wait_for_service("apply_planning_scene", 60.0)
+    session.wait_for_service("apply_planning_scene", 120.0)
     roscpp_initialize([])
     yield PlanningSceneInterface()
     assert session.alive(), session.log()
@@ -68,7 +68,7 @@ def empty(scene: PlanningSceneInterface) -> None:
     assert scene.get_known_object_names() == [] and scene.get_attached_objects() == {}
 
 
-def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+def until(condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
     deadline = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline, f"not so within {timeout_s} s"

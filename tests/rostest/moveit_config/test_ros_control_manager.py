@@ -46,7 +46,7 @@ def session() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def arm(session: None, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
     session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_kinematic_path", 60.0)
+    session.wait_for_service("plan_kinematic_path", 120.0)
     wait_for_controllers(3)
     yield commander("panda_arm")
 

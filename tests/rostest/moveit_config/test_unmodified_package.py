@@ -32,7 +32,7 @@ def workspace() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def demo(workspace: None, ros_launch: Callable[..., Any]) -> Iterator[Any]:
     session = ros_launch(PACKAGES / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
-    session.wait_for_service("plan_kinematic_path", 60.0)
+    session.wait_for_service("plan_kinematic_path", 120.0)
     yield session
     assert session.alive(), session.log()
 
@@ -104,15 +104,16 @@ def test_a_stop_leaves_the_robot_on_its_way(arm: MoveGroupCommander) -> None:
     arm.set_max_velocity_scaling_factor(0.2)
     arm.set_named_target("reaching")
     assert arm.go(wait=False)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 30.0
     while np.allclose(arm.get_current_joint_values(), READY, atol=0.02):
         assert time.monotonic() < deadline, "the motion has not begun"
     arm.stop()
-    time.sleep(0.5)
-    stopped = arm.get_current_joint_values()
-    time.sleep(0.5)
-    assert arm.get_current_joint_values() == stopped
-    assert not np.allclose(stopped, REACHING, atol=0.05)
+    places = [[], arm.get_current_joint_values()]
+    while places[-1] != places[-2]:
+        assert time.monotonic() < deadline + 30.0, "the robot does not stop"
+        time.sleep(0.5)
+        places.append(arm.get_current_joint_values())
+    assert not np.allclose(places[-1], REACHING, atol=0.05)
     arm.set_max_velocity_scaling_factor(1.0)
 
 

@@ -182,7 +182,7 @@ def test_a_motion_that_takes_too_long_is_stopped(clock: Any, settings: Any, spec
     thread.join(0.1)
     assert not ended
     clock(rospy.Time.from_sec(100.0 + late_s))
-    thread.join(5.0)
+    thread.join(20.0)
     assert ended[0].code is ErrorCode.TIMED_OUT
     assert controllers.cancelled == ["arm"]
 
@@ -222,7 +222,7 @@ def test_closing_stops_the_motion_and_waits_until_it_has_ended() -> None:
     while not controllers.sent:
         time.sleep(0.005)
     execution.close()
-    thread.join(5.0)
+    thread.join(20.0)
     assert ended
     assert controllers.cancelled == ["arm"]
     execution.close()  # a second time does nothing

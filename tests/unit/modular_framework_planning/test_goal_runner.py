@@ -52,14 +52,16 @@ class Handle:
     set_rejected = set_aborted
 
 
-def run(work: Callable[..., Any], *names: str) -> list[Handle]:
-    """Sends goals one right after the other and waits for their ends."""
+def run(work: Callable[..., Any], *names: str, all_sent: threading.Event | None = None) -> list[Handle]:
+    """Sends goals one right after the other, tells that they are sent, and waits for their ends."""
     runner = GoalRunner("some_action", ExecuteTrajectoryAction, work)
     handles = [Handle(name) for name in names]
     for handle in handles:
         runner._on_goal(handle)
+    if all_sent is not None:
+        all_sent.set()
     for handle in handles:
-        assert handle.ended.wait(5.0), f"goal '{handle.name}' did not end within 5 s"
+        assert handle.ended.wait(20.0), f"goal '{handle.name}' did not end within 20 s"
     return handles
 
 
@@ -69,13 +71,13 @@ def test_a_new_goal_ends_the_one_before_and_one_given_up_while_waiting_never_beg
     def work(goal: str, cancelled: threading.Event, _: Any) -> tuple[None, bool, str]:
         begun.append(goal)
         if goal == "first":
-            assert cancelled.wait(5.0)
-            third_is_here.wait(0.2)  # the first takes a while to stop; second and third wait for their turn
+            assert cancelled.wait(20.0)
+            assert all_sent.wait(20.0)  # the first takes a while to stop; second and third wait for their turn
             return None, False, "stopped"
         return None, True, "done"
 
-    third_is_here = threading.Event()
-    first, second, third = run(work, "first", "second", "third")
+    all_sent = threading.Event()
+    first, second, third = run(work, "first", "second", "third", all_sent=all_sent)
     assert (first.outcome, second.outcome, third.outcome) == ("canceled", "canceled", "succeeded")
     assert begun == ["first", "third"] and not second.accepted
 
@@ -96,7 +98,7 @@ def test_a_goal_that_comes_while_the_one_before_is_cleared_away_does_not_lock_th
     runner = GoalRunner("some_action", ExecuteTrajectoryAction, lambda *_: (None, True, "done"))
     first, second = SlowToName("first", server_lock), Handle("second", server_lock)
     runner._on_goal(first)
-    assert clearing.wait(5.0)
+    assert clearing.wait(20.0)
 
     def hand_over() -> None:
         with server_lock:
@@ -104,5 +106,5 @@ def test_a_goal_that_comes_while_the_one_before_is_cleared_away_does_not_lock_th
 
     thread = threading.Thread(target=hand_over, daemon=True)
     thread.start()
-    thread.join(5.0)
-    assert not thread.is_alive() and second.ended.wait(5.0)
+    thread.join(20.0)
+    assert not thread.is_alive() and second.ended.wait(20.0)

@@ -63,6 +63,7 @@ class WatchedMotion:
         self._look()
         self._refuse_blocked()
         self._begun = rospy.Time.now()
+        self._record()
         watcher = threading.Thread(target=self._accompany, args=(cancelled,), daemon=True)
         watcher.start()
         try:
@@ -82,7 +83,7 @@ class WatchedMotion:
                                 f"rest of the motion is blocked: {self._blocked}; plan again, or ask for replan")
 
     def _accompany(self, cancelled: threading.Event) -> None:
-        pause_s, due_s = min(PERIOD_S, self._period_s), 0.0
+        pause_s, due_s = min(PERIOD_S, self._period_s), time.monotonic() + self._period_s
         while not self._ended.is_set():
             if cancelled.is_set():
                 self._stop.set()

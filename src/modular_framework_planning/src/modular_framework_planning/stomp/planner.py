@@ -73,7 +73,7 @@ def _failure(problem: PlanningProblem, settings: StompSettings, begun: float, mo
     contacts = problem.checker.contacts(middle, include_fixed=False)
     violated = "" if problem.constraints is None else problem.constraints.describe(middle)
     return PlanningError(reason.code, f"{reason.reason}; in its best motion {len(invalid)} of {len(motion)} timesteps "
-                         f"are invalid: {describe_contacts(contacts) if contacts else violated}")
+                         f"are invalid: {describe_contacts(contacts) if contacts else violated}", contacts)
 
 
 class _Attempt:
