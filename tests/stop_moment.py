@@ -82,8 +82,13 @@ class Stop:
         return asdict(self) | {"faults": self.faults()}
 
 
-def stop_a_pick(moment_s: float, after: str = "first state running") -> Stop | None:
+def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motion: bool = False) -> Stop | None:
     """Starts the framework and presses Ctrl-C some time [s] after a text in its log.
+
+    Args:
+        moment_s: That time.
+        after: That text.
+        in_motion: Whether the time begins only when the arm moves as well, which a busy machine may be slow to do.
 
     Returns:
         What that did; None when the task had ended before, or ended by itself as the keys were pressed.
@@ -97,6 +102,8 @@ def stop_a_pick(moment_s: float, after: str = "first state running") -> Stop | N
     try:
         launch = session.run_framework(gui="false", rviz="false")
         _until(launch, after, START_TIMEOUT_S)
+        if in_motion:
+            _until_it_moves(launch, speeds)
         time.sleep(moment_s)
         if LAST_WORD in launch.log() or not launch.alive():
             _tell_failure(launch.log())
@@ -146,6 +153,15 @@ def _until(launch: Launch, text: str, timeout_s: float) -> float:
         assert launch.alive() or text in launch.log(), launch.log()
         time.sleep(0.01)
     return time.monotonic()
+
+
+def _until_it_moves(launch: Launch, speeds: Path) -> None:
+    """Waits until the arm was last seen moving."""
+    end = time.monotonic() + START_TIMEOUT_S
+    while not [line for line in speeds.read_text().splitlines()[-2:]
+               if len(line.split()) == 2 and float(line.split()[1]) > AT_REST_RAD_S]:
+        assert time.monotonic() < end and launch.alive(), f"the arm did not move:\n{launch.log()}"
+        time.sleep(0.02)
 
 
 def _left(session: RosSession, watcher: int) -> tuple[str, ...]:
