@@ -207,7 +207,7 @@ def level(model: RobotModel, tolerance: float) -> KinematicConstraints:
     return KinematicConstraints(model, (), (), (turn,))
 
 
-@pytest.mark.parametrize("tolerance", [0.8, 0.1])
+@pytest.mark.parametrize("tolerance", [0.8, 0.1, 0.02])
 def test_path_constraints_hold_along_the_whole_motion(model: RobotModel, pipeline: PlanningPipeline,
                                                       tolerance: float) -> None:
     constraints = level(model, tolerance)

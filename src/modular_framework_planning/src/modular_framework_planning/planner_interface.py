@@ -97,12 +97,16 @@ class PlanningProblem:
             self.constraints is None or self.constraints.satisfied(self.motion.whole(values)))
 
     def edge_is_valid(self, first: Array, second: Array, step: float | None = None) -> bool:
-        """Whether the straight motion is free and satisfies the path constraints (its start is not looked at)."""
+        """Whether the straight motion is free and satisfies the path constraints (its start is not looked at).
+
+        Constraints are looked at no more finely than the last check does.
+        """
         step = step or self.step
         if not self.motion.edge_is_free(first, second, step):
             return False
         if self.constraints is None:
             return True
+        step = max(step, self.settings.motion_step)
         count = max(1, int(np.ceil(float(np.abs(second - first).max()) / step)))
         return all(self.constraints.satisfied(self.motion.whole(first + number / count * (second - first)))
                    for number in range(1, count + 1))
