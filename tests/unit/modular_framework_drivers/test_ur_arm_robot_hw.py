@@ -137,6 +137,7 @@ def test_it_starts_says_what_it_does_and_leaves_the_arm_where_it_is(
     assert rig.arm.state()["payload_kg"] == "0.4"
     assert rig.arm.state()["slider"] == "0.5"
     assert rig.hw.get(SpeedScalingInterface).handles[0].factor == pytest.approx(0.5)
+    assert rig.hw.get(ForceTorqueSensorInterface).get_handle("wrench").frame_id == "base"   # a link of the description
     unused = [record.getMessage() for record in caplog.records if "not used" in record.getMessage()]
     assert len(unused) == 1 and "control_pc_ip_address" in unused[0] and "robot_program_path" not in unused[0]
 

@@ -35,7 +35,7 @@ from modular_framework_drivers.ur.arm_messages import (
 from modular_framework_drivers.ur.state_watch import SilenceWatch, follows
 
 _PRIORITY = 60               # the control loop has 80
-_POLL_PERIOD_S = 0.001
+_POLL_PERIOD_S = 0.002
 _ALIVE_PERIOD_S = 0.02
 _STOP_DECELERATION = 10.0    # at the end of a connection [rad/s^2]
 _VARIABLES = ["timestamp", "actual_q", "actual_qd", "actual_current", "actual_TCP_force", "target_speed_fraction",
