@@ -78,17 +78,34 @@ def test_the_spawner_waits_spawns_and_cleans_up_at_its_end(tool: Callable[..., A
     assert states() == {}
 
 
-def test_an_unspawner_stops_and_starts_again_at_its_end(tool: Callable[..., Any]) -> None:
-    spawner = tool("spawner", "--stopped", "arm")
-    wait_until({"arm": "initialized"})
-    assert run(tool("controller_manager", "start", "arm"))[0] == 0
+def test_an_unspawner_keeps_controllers_stopped_and_starts_them_at_its_end(tool: Callable[..., Any]) -> None:
     unspawner = tool("unspawner", "arm")
-    wait_until({"arm": "stopped"})
+    spawner = tool("spawner", "arm", "states")
+    wait_until({"arm": "stopped", "states": "running"})
+    assert run(tool("controller_manager", "start", "arm"))[0] == 0
+    wait_until({"arm": "stopped", "states": "running"})
     unspawner.send_signal(signal.SIGTERM)
     assert unspawner.wait(30.0) == 0
-    assert states() == {"arm": "running"}
+    assert states() == {"arm": "running", "states": "running"}
     spawner.send_signal(signal.SIGINT)
     assert spawner.wait(30.0) == 0
+    assert states() == {}
+
+
+def test_a_spawner_starts_what_it_can_and_tells_what_it_cannot(tool: Callable[..., Any]) -> None:
+    process = tool("spawner", "--timeout", "1", "--wait-for", "robot_awake", "states", "absent", "arm")
+    awake = rospy.Publisher("robot_awake", Bool, queue_size=1, latch=True)
+    for line in process.stdout:
+        if "topic /robot_awake has not said True for 1 s" in line:
+            break
+    awake.publish(True)
+    wait_until({"states": "running", "arm": "running"})
+    process.send_signal(signal.SIGINT)
+    code, output = run(process)
+    assert code == 1 and states() == {}
+    for text in ("Loading controller: states", "Failed to load absent", "Controller Spawner: Loaded controllers: "
+                 "states, arm", "Started controllers: states, arm", "not spawned: absent"):
+        assert text in output, output
 
 
 def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
@@ -129,7 +146,7 @@ def test_statistics_of_the_controllers_are_published(tool: Callable[..., Any]) -
 def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:
     processes = {"controller 'absent' was not loaded": tool("controller_manager", "load", "absent"),
                  "name at least one controller": tool("controller_manager", "start"),
-                 "waited 1 s for service /elsewhere/controller_manager/load_controller":
+                 "waited 1 s for service /elsewhere/controller_manager/list_controllers":
                      tool("spawner", "--timeout", "1", "--namespace", "/elsewhere", "arm")}
     for words, process in processes.items():
         code, output = run(process)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import rospy
 import yaml
+from controller_manager_msgs.srv import SwitchControllerRequest
 from std_msgs.msg import Bool
 
 from modular_framework_control.node_handle import join_names
@@ -22,10 +23,14 @@ from modular_framework_control.ros_controller_manager_client import (
 )
 
 LAST_CALLS_TIMEOUT_S = 2.0
+INHIBIT_PERIOD_S = 1.0
 
 
 def spawner_main() -> int:
-    """Load and start controllers, wait for the end of this process, then stop and unload them in reverse."""
+    """Load and start controllers, wait for the end of this process, then stop and unload them in reverse.
+
+    What cannot be loaded is told, and the others are started all the same; the exit code tells of it in the end.
+    """
     parser = argparse.ArgumentParser(prog="spawner", description=spawner_main.__doc__)
     parser.add_argument("--stopped", action="store_true", help="load the controllers but do not start them")
     parser.add_argument("--wait-for", metavar="TOPIC", help="wait until this std_msgs/Bool topic says True")
@@ -34,7 +39,7 @@ def spawner_main() -> int:
 
 
 def unspawner_main() -> int:
-    """Stop controllers, wait for the end of this process, then start them again."""
+    """Keep controllers stopped, whoever starts them, until the end of this process; then start them again."""
     parser = argparse.ArgumentParser(prog="unspawner", description=unspawner_main.__doc__)
     _add_common(parser)
     return _run(parser, "unspawner", _unspawn)
@@ -104,21 +109,40 @@ def names_of(arguments: Sequence[str]) -> list[str]:
 
 
 def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
+    client.list_controllers()
     if arguments.wait_for:
-        _wait_for_topic(arguments.wait_for, math.inf if arguments.no_timeout else arguments.timeout, ended)
+        _wait_for_topic(arguments.wait_for, arguments.timeout, ended)
     for path in arguments.files:
         _set_parameters(path, arguments.namespace)
     loaded: list[str] = []
+    failed: list[str] = []
     try:
-        for name in arguments.controllers:
-            client.load(name)
-            loaded.append(name)
-        if not arguments.stopped:
-            client.switch(loaded, [])
-        rospy.loginfo("%s controllers: %s", "loaded" if arguments.stopped else "started", ", ".join(loaded))
+        for name in arguments.controllers if not ended.is_set() else ():
+            rospy.loginfo("Loading controller: %s", name)
+            if _done(lambda name=name: client.load(name), f"Failed to load {name}"):
+                loaded.append(name)
+            else:
+                failed.append(name)
+        rospy.loginfo("Controller Spawner: Loaded controllers: %s", ", ".join(loaded))
+        if loaded and not arguments.stopped:
+            if _done(lambda: client.switch(loaded, []), f"Failed to start controllers: {', '.join(loaded)}"):
+                rospy.loginfo("Started controllers: %s", ", ".join(loaded))
+            else:
+                failed += loaded
         _wait_for_end(ended)
     finally:
         _clean_up(client, loaded)
+    if failed:
+        raise ControllerManagerClientError(f"not spawned: {', '.join(failed)}")
+
+
+def _done(action: Callable[[], None], failure: str) -> bool:
+    try:
+        action()
+    except ControllerManagerClientError as error:
+        rospy.logerr("%s: %s", failure, error)
+        return False
+    return True
 
 
 def _set_parameters(path: Path, namespace: str) -> None:
@@ -144,13 +168,20 @@ def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
 
 
 def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
-    client.switch([], arguments.controllers)
-    rospy.loginfo("stopped controllers: %s", ", ".join(arguments.controllers))
+    inhibited: dict[str, None] = {}
     try:
-        _wait_for_end(ended)
+        while not ended.is_set() and not rospy.is_shutdown():
+            running = [entry.name for entry in client.list_controllers()
+                       if entry.name in arguments.controllers and entry.state == "running"]
+            if running:
+                rospy.loginfo("Inhibiting controllers: %s", ", ".join(running))
+                client.switch([], running, SwitchControllerRequest.BEST_EFFORT)
+                inhibited |= dict.fromkeys(running)
+            ended.wait(INHIBIT_PERIOD_S)
     finally:
-        client.timeout_s = LAST_CALLS_TIMEOUT_S
-        client.switch(arguments.controllers, [])
+        if inhibited:
+            client.timeout_s = LAST_CALLS_TIMEOUT_S
+            client.switch(list(inhibited), [], SwitchControllerRequest.BEST_EFFORT)
 
 
 def _wait_for_end(ended: threading.Event) -> None:
@@ -158,14 +189,16 @@ def _wait_for_end(ended: threading.Event) -> None:
         pass
 
 
-def _wait_for_topic(topic: str, timeout_s: float, ended: threading.Event) -> None:
+def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> None:
+    """Returns when the topic says True, or at the end; a topic that stays silent for long is told once."""
     ready = threading.Event()
     subscriber = rospy.Subscriber(topic, Bool, lambda message: ready.set() if message.data else None)
-    deadline = time.monotonic() + timeout_s
-    while not ready.wait(0.1):
-        if time.monotonic() > deadline or ended.is_set():
-            raise ControllerManagerClientError(f"waited {timeout_s:.0f} s for topic {rospy.resolve_name(topic)} to say "
-                                               "True in vain")
+    warn_at_s = time.monotonic() + warn_after_s
+    while not ready.wait(0.1) and not ended.is_set():
+        if time.monotonic() > warn_at_s:
+            rospy.logwarn("Controller Spawner: topic %s has not said True for %.0f s; waiting for it still",
+                          rospy.resolve_name(topic), warn_after_s)
+            warn_at_s = math.inf
     subscriber.unregister()
 
 
