@@ -19,6 +19,7 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_of, request, until
+from std_msgs.msg import String
 
 PAN = "shoulder_pan_joint"
 GOAL_PAN = START[0] - 1.2
@@ -164,6 +165,17 @@ def test_a_cancel_while_moving_stops_the_arm(client: Any, arm: FakeArm) -> None:
     assert client.wait_for_result(rospy.Duration(20.0))
     assert client.get_result().error_code.val == MoveItErrorCodes.PREEMPTED
     assert client.get_state() == GoalStatus.PREEMPTED and arm.cancelled.wait(20.0)
+
+
+def test_the_word_stop_on_the_topic_stops_the_arm(client: Any, arm: FakeArm) -> None:
+    events = rospy.Publisher("trajectory_execution_event", String, queue_size=1)
+    until(events.get_num_connections, "the listener to the topic")
+    client.send_goal(goal(**SLOW))
+    arm.until_moving()
+    events.publish("stop")
+    assert client.wait_for_result(rospy.Duration(20.0))
+    assert client.get_result().error_code.val == MoveItErrorCodes.PREEMPTED
+    assert arm.cancelled.wait(20.0) and arm.positions[PAN] > GOAL_PAN + 0.1
 
 
 def test_a_cancel_while_planning_ends_the_planning(client: Any) -> None:
