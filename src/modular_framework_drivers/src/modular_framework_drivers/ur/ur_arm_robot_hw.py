@@ -39,9 +39,10 @@ class UrArmHardware(RobotHW):
     underscore is put between; `speed_scale` [0..1]: what to set the speed slider to, untouched when not given;
     `payload_mass_kg` 0 and `payload_center_of_mass_m` [0, 0, 0]: of the manipulator, in the flange frame;
     `link_timeout` 0.12 [s]: without news for so long the link counts as lost; `servoj_gain` 2000 and
-    `servoj_lookahead_time` 0.03 [s]; `max_jump_rad` 0.5: a command further from the last one is refused.
+    `servoj_lookahead_time` 0.03 [s]; `max_jump_rad` 0.5: a command further from the last one is refused;
+    `real_time` true: the processes that hold the link ask for real-time scheduling.
     `control_pc_ip_address` and `robot_program_path` are accepted and not used. In the root namespace:
-    `robot_description` and `joint_limits/<joint>/...` (also has_acceleration_limits, max_acceleration).
+    `robot_description` and `joint_limits/<joint>/...`: limits and soft limits.
 
     The efforts of the joint states are motor currents [A], as in ur_robot_driver.
     """
