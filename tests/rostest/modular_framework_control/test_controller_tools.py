@@ -143,6 +143,16 @@ def test_statistics_of_the_controllers_are_published(tool: Callable[..., Any]) -
     assert run(tool("controller_manager", "kill", "states"))[0] == 0
 
 
+def test_a_spawner_that_waits_for_its_manager_can_be_ended(tool: Callable[..., Any]) -> None:
+    process = tool("spawner", "--no-timeout", "--namespace", "/elsewhere", "arm")
+    for line in process.stdout:
+        if "Waiting for service /elsewhere/controller_manager/load_controller" in line:
+            break
+    process.send_signal(signal.SIGINT)
+    code, output = run(process)
+    assert code == 1 and "told to end while waiting" in output
+
+
 def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:
     processes = {"controller 'absent' was not loaded": tool("controller_manager", "load", "absent"),
                  "name at least one controller": tool("controller_manager", "start"),

@@ -73,19 +73,19 @@ def states(robot: SteppedRobot) -> dict[str, str]:
     return {entry.name: entry.state for entry in robot.wait_for(service).controller}
 
 
-@pytest.mark.parametrize(("start_asap", "meanwhile"), [(True, "running"), (False, "stopped")])
+@pytest.mark.parametrize(("start_asap", "meanwhile"), [(True, "running"), (False, "waiting")])
 def test_start_asap_starts_what_is_ready_and_without_it_all_start_together(robot: SteppedRobot, start_asap: bool,
                                                                           meanwhile: str) -> None:
     switch = Switch(robot, start_asap, 0.0)
     robot.run(60.0)
-    assert states(robot) == {"arm": meanwhile, "gripper": "stopped"}
+    assert states(robot) == {"arm": meanwhile, "gripper": "waiting"}
     assert not switch.answered, "without a timeout it waits as long as the hardware takes"
     robot.hardware["slow"].switching = SwitchState.DONE
     assert switch.ok()
     assert states(robot) == {"arm": "running", "gripper": "running"}
 
 
-@pytest.mark.parametrize(("start_asap", "arm"), [(True, "running"), (False, "stopped")])
+@pytest.mark.parametrize(("start_asap", "arm"), [(True, "running"), (False, "aborted")])
 def test_when_the_time_is_up_the_rest_is_not_started_and_the_answer_is_no(
         robot: SteppedRobot, start_asap: bool, arm: str, caplog: pytest.LogCaptureFixture) -> None:
     switch = Switch(robot, start_asap, 5.0)
@@ -93,17 +93,17 @@ def test_when_the_time_is_up_the_rest_is_not_started_and_the_answer_is_no(
     assert not switch.answered
     robot.run(0.2)
     assert not switch.ok()
-    assert states(robot) == {"arm": arm, "gripper": "stopped"}
+    assert states(robot) == {"arm": arm, "gripper": "aborted"}
     names = "gripper" if start_asap else "arm, gripper"
     assert f"hardware was not ready within 5.0 s to start: {names}" in caplog.text
     robot.hardware["slow"].switching = SwitchState.DONE
     robot.run(1.0)
-    assert states(robot) == {"arm": arm, "gripper": "stopped"}, "what was given up must not start later"
+    assert states(robot) == {"arm": arm, "gripper": "aborted"}, "what was given up must not start later"
 
 
 def test_hardware_that_cannot_switch_is_told(robot: SteppedRobot, caplog: pytest.LogCaptureFixture) -> None:
     switch = Switch(robot, True, 5.0)
     robot.hardware["slow"].switching = SwitchState.ERROR
     assert not switch.ok()
-    assert states(robot) == {"arm": "running", "gripper": "stopped"}
+    assert states(robot) == {"arm": "running", "gripper": "aborted"}
     assert "hardware refused to switch for 'gripper'" in caplog.text

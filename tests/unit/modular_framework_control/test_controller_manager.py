@@ -276,4 +276,4 @@ def test_hardware_that_takes_too_long_or_refuses_fails_the_switch(slow: Any) -> 
     assert "hardware refused to switch for 'left'" in str(slow.switch(["left"], [], STRICT, True))
     slow.robot_hw.accepts = False
     assert "refused to prepare" in str(slow.switch(["left"], []))
-    assert slow.states()["left"] == "initialized"
+    assert slow.states()["left"] == "aborted"

@@ -39,7 +39,7 @@ class ControllerReport:
 
     Attributes:
         info: name, type and claimed joints.
-        state: initialized, running or stopped.
+        state: initialized, running, stopped, waiting or aborted.
         failure: why the controller was stopped by the manager; "" when it was not.
         statistics: its update times since it was started last.
     """
@@ -237,6 +237,7 @@ class ControllerManager:
                 return
         with self._slot_lock:
             self._pending = None
+            request.give_up()
         if not request.done.is_set():
             raise ControllerError(f"the control loop did not carry out the switch: it made no cycle for "
                                   f"{self._update_wait_s:.1f} s; is it running, or paused?")

@@ -18,11 +18,16 @@ LOGGER = logging.getLogger("rosout.controller_manager")
 
 
 class ControllerState(Enum):
-    """States of a loaded controller, by the names `list_controllers` reports."""
+    """States of a loaded controller, by the names `list_controllers` reports.
+
+    One that is to start is waiting until the hardware is ready for it, and aborted when it does not get ready.
+    """
 
     INITIALIZED = "initialized"
     RUNNING = "running"
     STOPPED = "stopped"
+    WAITING = "waiting"
+    ABORTED = "aborted"
 
 
 class Strictness(IntEnum):
@@ -49,7 +54,7 @@ class Strictness(IntEnum):
 
 @dataclass(slots=True)
 class LoadedController:
-    """A controller and what the manager knows of it; `state` and `fault` are written by the control loop only.
+    """A controller and what the manager knows of it; the control loop writes `state` and `fault`.
 
     Attributes:
         failure: why the manager stopped it; "" when it did not.
@@ -224,8 +229,14 @@ class SwitchRequest:
         if self._waiting and 0.0 < self.timeout_s < time_s - begun_s:
             names = ", ".join(entry.name for entry in self._waiting)
             self.errors.append(f"hardware was not ready within {self.timeout_s} s to start: {names}")
-            self._waiting.clear()
+            self.give_up()
         return not self._waiting
+
+    def give_up(self) -> None:
+        """Start no more of the controllers that still wait."""
+        for entry in self._waiting:
+            entry.state = ControllerState.ABORTED
+        self._waiting.clear()
 
     def _begin(self, robot_hw: RobotHW, time_s: float) -> None:
         self._begun_s = time_s
@@ -234,6 +245,8 @@ class SwitchRequest:
             if entry.running:
                 entry.stop(time_s)
         self._waiting = list(self.plan.start)
+        for entry in self._waiting:
+            entry.state = ControllerState.WAITING
 
     def _advance(self, entries: list[LoadedController], result: SwitchState, time_s: float) -> None:
         if result is SwitchState.ONGOING:
@@ -241,6 +254,7 @@ class SwitchRequest:
         for entry in entries:
             self._waiting.remove(entry)
             if result is SwitchState.ERROR:
+                entry.state = ControllerState.ABORTED
                 self.errors.append(f"hardware refused to switch for '{entry.name}'")
                 continue
             failure = entry.start(time_s)

@@ -2,6 +2,7 @@
 """Asks a controller manager for something over ROS, and says which service failed when it does not answer."""
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -20,6 +21,8 @@ from controller_manager_msgs.srv import (
 
 from modular_framework_control.node_handle import join_names
 
+LAST_CALLS_TIMEOUT_S = 2.0
+
 
 class ControllerManagerClientError(Exception):
     """The controller manager is not there, does not answer, or refused."""
@@ -30,12 +33,18 @@ class ControllerManagerClient:
 
     Args:
         namespace: namespace of the robot; "" for that of the node.
-        timeout_s: how long to wait for a service [s of real time]; infinite waits for ever. May be changed.
+        timeout_s: how long to wait for a service [s of real time]; infinite waits for ever.
+        ended: set when nobody waits any more.
     """
 
-    def __init__(self, namespace: str = "", timeout_s: float = 30.0) -> None:
-        self._namespace = rospy.resolve_name(namespace) if namespace else rospy.get_namespace()
-        self.timeout_s = timeout_s
+    def __init__(self, namespace: str = "", timeout_s: float = 30.0, ended: threading.Event | None = None) -> None:
+        self.namespace = rospy.resolve_name(namespace) if namespace else rospy.get_namespace()
+        self._timeout_s = timeout_s
+        self._ended = ended if ended is not None else threading.Event()
+
+    def last_calls(self) -> ControllerManagerClient:
+        """A client for what is to be done at the end; it waits for a service that has gone for a short while only."""
+        return ControllerManagerClient(self.namespace, LAST_CALLS_TIMEOUT_S)
 
     def load(self, name: str) -> None:
         """Load a controller."""
@@ -72,9 +81,9 @@ class ControllerManagerClient:
             raise ControllerManagerClientError(f"{failure}; the log of the controller manager says why")
 
     def _call(self, service: str, kind: Any, *arguments: Any) -> Any:
-        name = join_names(self._namespace, f"controller_manager/{service}")
+        name = join_names(self.namespace, f"controller_manager/{service}")
         proxy = rospy.ServiceProxy(name, kind)
-        deadline = time.monotonic() + self.timeout_s
+        deadline = time.monotonic() + self._timeout_s
         while True:
             try:
                 proxy.wait_for_service(timeout=0.2)
@@ -82,6 +91,8 @@ class ControllerManagerClient:
             except rospy.ServiceException as error:
                 raise ControllerManagerClientError(f"service {name} failed: {error}") from error
             except rospy.ROSException as error:
+                if self._ended.is_set():
+                    raise ControllerManagerClientError(f"told to end while waiting for service {name}") from error
                 if time.monotonic() > deadline or rospy.is_shutdown():
-                    raise ControllerManagerClientError(f"waited {self.timeout_s:.0f} s for service {name} in vain; is "
+                    raise ControllerManagerClientError(f"waited {self._timeout_s:.0f} s for service {name} in vain; is "
                                                        "the simulation or the hardware's node running?") from error

@@ -22,7 +22,6 @@ from modular_framework_control.ros_controller_manager_client import (
     ControllerManagerClientError,
 )
 
-LAST_CALLS_TIMEOUT_S = 2.0
 INHIBIT_PERIOD_S = 1.0
 
 
@@ -77,7 +76,7 @@ def _run(parser: argparse.ArgumentParser, name: str,
     try:
         arguments.files = [Path(argument) for argument in arguments.controllers if Path(argument).is_file()]
         arguments.controllers = names_of(arguments.controllers)
-        action(ControllerManagerClient(arguments.namespace, timeout_s), arguments, ended)
+        action(ControllerManagerClient(arguments.namespace, timeout_s, ended), arguments, ended)
     except ControllerManagerClientError as error:
         rospy.logerr("%s", error)
         return 1
@@ -109,6 +108,8 @@ def names_of(arguments: Sequence[str]) -> list[str]:
 
 
 def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
+    rospy.loginfo("Controller Spawner: Waiting for service %s",
+                  join_names(client.namespace, "controller_manager/load_controller"))
     client.list_controllers()
     if arguments.wait_for:
         _wait_for_topic(arguments.wait_for, arguments.timeout, ended)
@@ -131,7 +132,7 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
                 failed += loaded
         _wait_for_end(ended)
     finally:
-        _clean_up(client, loaded)
+        _clean_up(client.last_calls(), loaded)
     if failed:
         raise ControllerManagerClientError(f"not spawned: {', '.join(failed)}")
 
@@ -157,7 +158,6 @@ def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
     """Stop and unload what was loaded; a manager that has gone meanwhile needs no cleaning."""
     if not loaded:
         return
-    client.timeout_s = LAST_CALLS_TIMEOUT_S
     try:
         states = {entry.name: entry.state for entry in client.list_controllers()}
         client.switch([], [name for name in loaded if states.get(name) == "running"])
@@ -180,8 +180,7 @@ def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, end
             ended.wait(INHIBIT_PERIOD_S)
     finally:
         if inhibited:
-            client.timeout_s = LAST_CALLS_TIMEOUT_S
-            client.switch(list(inhibited), [], SwitchControllerRequest.BEST_EFFORT)
+            client.last_calls().switch(list(inhibited), [], SwitchControllerRequest.BEST_EFFORT)
 
 
 def _wait_for_end(ended: threading.Event) -> None:
