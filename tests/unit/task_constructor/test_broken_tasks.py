@@ -65,10 +65,27 @@ def test_a_missing_key_is_told_beside_wrong_transitions_and_a_repeated_label_bes
     states = "{target: home, source: plan, transitions: {success: dne, fail: gave_up}}"
     text = f"name: t\nsource: state_machine\noutcomes: [done, gave_up]\nstates:\n  - A: {states}\n"
     faults = world.faults(text + "  - B: {source: use_arm, transitions: {success: done, fail: gave_up}}\n")
-    assert len(faults) == 2 and "target 'dne' is unknown" in faults[0] and "needs the userdata key" in faults[1]
+    assert len(faults) == 3 and "target 'dne' is unknown" in faults[0] and "'B' is never reached" in faults[1]
+    assert "needs the userdata key" in faults[2]
     faults = world.faults(text.replace("dne", "done") + "  - A: {source: plan, spede: 1.0}\n")
     assert len(faults) == 3 and "'target' is missing" in faults[0] and "is given twice" in faults[1]
     assert "did you mean 'speed'?" in faults[2]
+
+
+def test_faults_of_values_links_ways_outcomes_and_userdata_are_told_together(world: World) -> None:
+    faults = world.faults("""name: t
+source: state_machine
+outcomes: [done, gave_up, never]
+states:
+  - A: {source: plan, target: home, speed: quick, transitions: {success: Bb, fail: gave_up}}
+  - Bbb: {source: use_arm, transitions: {success: done, fail: gave_up}}
+  - C: {source: plan, target: home, transitions: {success: C, fail: C}}
+""")
+    expected = (":3:11: the outcome 'never' is never produced", ":5:44: state 'A' (plan): option 'speed'",
+                ":5:74: state 'A': transition target 'Bb'", ":6:5: state 'Bbb' needs the userdata key",
+                ":7:5: state 'C' is never reached")
+    assert len(faults) == len(expected)
+    assert all(wanted in fault for fault, wanted in zip(faults, expected, strict=True)), faults
 
 
 def test_the_good_tasks_have_no_fault(world: World) -> None:

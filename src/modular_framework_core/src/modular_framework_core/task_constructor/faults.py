@@ -83,12 +83,17 @@ def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
     return f"allowed: {', '.join(names)}" if names else empty
 
 
-def nearest(found: str, allowed: Iterable[str]) -> str:
-    """Return ``; did you mean 'x'?`` for the allowed name closest to the one found (or part of it), or nothing."""
-    names = [str(name) for name in allowed]
-    by_lower = {name.lower(): name for name in names}
+def closest(found: str, allowed: Iterable[str]) -> str | None:
+    """Return the allowed name closest to the one found (or part of it), None where none is close."""
+    by_lower = {str(name).lower(): str(name) for name in allowed}
     wanted = str(found).lower()
     matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
     if not matches and len(wanted) >= 3:
         matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
-    return f"; did you mean '{by_lower[matches[0]]}'?" if matches else ""
+    return by_lower[matches[0]] if matches else None
+
+
+def nearest(found: str, allowed: Iterable[str]) -> str:
+    """Return ``; did you mean 'x'?`` for the closest allowed name, or nothing."""
+    name = closest(found, allowed)
+    return f"; did you mean '{name}'?" if name is not None else ""

@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 
-from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
+from modular_framework_core.task_constructor.faults import FaultList, Place, closest, listing, nearest
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
 
@@ -48,7 +48,6 @@ def check_sequential(
         faults: where faults are noted.
     """
     targets = list(dict.fromkeys([*labels, *(outcomes or ())]))
-    before = len(faults)
     for child in children:
         transitions = child.transitions or {}
         for outcome, target in transitions.items():
@@ -66,16 +65,24 @@ def check_sequential(
                 f"state '{child.label}': no transition for {', '.join(map(repr, missing))}; "
                 f"add it to transitions, leading to one of: {', '.join(targets)}",
             )
-    all_clear = len(faults) == before and len(children) == len(labels) > 0
-    known = outcomes is not None and all(None not in (child.transitions, child.outcomes) for child in children)
-    if all_clear and known:
-        _check_ways(children, outcomes or (), place, faults)
+    if outcomes is not None and labels:
+        _check_ways(children, labels, outcomes, place, faults)
 
 
-def _check_ways(children: list[ChildLinks], outcomes: tuple[str, ...], place: Place, faults: FaultList) -> None:
-    """Note states no transition leads to, states that lead to no outcome, and outcomes nothing leads to."""
-    leads_to = {child.label: _targets(child, outcomes) for child in children}
-    reached = _closure(leads_to, [children[0].label] if children else [])
+def _check_ways(
+    children: list[ChildLinks], labels: list[str], outcomes: tuple[str, ...], place: Place, faults: FaultList
+) -> None:
+    """Note states no transition leads to, states that lead to no outcome, and outcomes nothing leads to.
+
+    What is wrong with a transition is noted by others: here a misspelt target is taken for the nearest one, and what
+    cannot be known may lead anywhere, so that nothing is noted that would be well once that is mended.
+    """
+    anywhere = {*labels, *outcomes}
+    leads_to = {label: anywhere for label in labels}
+    for child in children:
+        if labels.count(child.label) == 1:
+            leads_to[child.label] = _targets(child, outcomes, anywhere)
+    reached = _closure(leads_to, labels[:1])
     backwards: dict[str, set[str]] = {}
     for label, targets in leads_to.items():
         for target in targets:
@@ -91,11 +98,21 @@ def _check_ways(children: list[ChildLinks], outcomes: tuple[str, ...], place: Pl
     check_outcomes_produced(outcomes, set().union(*leads_to.values()), place, faults)
 
 
-def _targets(child: ChildLinks, outcomes: tuple[str, ...]) -> set[str]:
+def _targets(child: ChildLinks, outcomes: tuple[str, ...], anywhere: set[str]) -> set[str]:
     """Return what a child leads to; an outcome of the machine's own that has no transition leads there by its name."""
-    transitions = child.transitions or {}
-    by_name = {name for name in child.outcomes or () if name not in transitions and name in outcomes}
-    return {str(target.value) for target in transitions.values()} | by_name
+    if child.transitions is None or child.outcomes is None:
+        return anywhere
+    unlinked = {name for name in child.outcomes if name not in child.transitions}
+    if not unlinked <= set(outcomes):
+        return anywhere
+    meant = unlinked
+    for target in child.transitions.values():
+        name = str(target.value)
+        likely = name if name in anywhere else closest(name, sorted(anywhere))
+        if likely is None:
+            return anywhere
+        meant.add(likely)
+    return meant
 
 
 def _closure(leads_to: MappingABC[str, set[str]], start: Iterable[str]) -> set[str]:

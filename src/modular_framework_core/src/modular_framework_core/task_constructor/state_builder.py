@@ -30,6 +30,8 @@ class StateBuilder:
         self._states = states
         self._templates = templates
         self._faults = faults
+        self.value_faults = 0
+        """How many faults it noted in values of options, which leave the state's userdata known."""
 
     def build(
         self, label: str, place: Place, body: Mapping, scope: ParamsScope
@@ -54,11 +56,13 @@ class StateBuilder:
         for key in given:
             if key not in source.options and not (source.takes_any_option and key.isidentifier()):
                 self._faults.add_unknown(body.keys[key], what, key, source.options)
+        before = len(self._faults)
         for option in source.options.values():
             if option.required and option.name not in options:
                 self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
             elif option.name in options and option.name not in STATE_KEYS:
                 self._check_type(f"{what} '{option.name}'", option.type, options[option.name])
+        self.value_faults += len(self._faults) - before
         for key in STATE_KEYS:
             if key in options:
                 may_be_empty = key != "outcomes"

@@ -66,7 +66,7 @@ class TaskBuilder:
         if "node_name" in header.entries:
             node = header_fields.node_name(header.entries["node_name"], self._faults) or name
         root = self._machine(name, header, scope, None)
-        if root is not None and len(self._faults) == self._link_faults:
+        if root is not None and len(self._faults) == self._link_faults + self._state_builder.value_faults:
             machine_checks.check_userdata(root, self._provided_by(), self._faults)
         self._faults.raise_if_any()
         assert root is not None, "a machine that could not be built has left a fault"
