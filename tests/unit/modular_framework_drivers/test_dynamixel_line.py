@@ -11,7 +11,7 @@ import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler
 
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.ezgripper import mx64
+from modular_framework_drivers.ezgripper import dynamixel_bus, mx64
 from modular_framework_drivers.ezgripper.dynamixel_bus import (
     DynamixelBus,
     NoAnswerError,
@@ -98,11 +98,25 @@ def test_a_damaged_line_is_endured(line: DynamixelLine, bus: DynamixelBus, fault
     assert bus.retries > 0 or fault == "garbage"
 
 
-def test_an_answer_too_late_is_not_taken_for_that_to_another_question(line: DynamixelLine, bus: DynamixelBus) -> None:
+def test_an_answer_too_late_is_not_taken_for_that_to_another_question(line: DynamixelLine,
+                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dynamixel_bus, "LATE_S", 2.0)  # a busy computer makes answers later than the line does
+    bus = DynamixelBus(str(line.link), 57600, timeout_s=2.0)
+    bus.open()
     line.delay(0.045)
     assert bus.model_number(1) == 310
+    assert bus.retries > 0
     line.delay(0.0)
     assert bus.read(1, mx64.MAX_TORQUE) == (b"\xff\x03", ServoErrors.NONE)
+
+
+def test_answers_that_never_come_are_not_waited_for_longer_than_late_ones_take(line: DynamixelLine,
+                                                                              bus: DynamixelBus) -> None:
+    line.lose(2)
+    begun_s = time.monotonic()
+    assert [bus.model_number(1) for _ in range(4)] == [310] * 4
+    assert bus.retries > 0
+    assert time.monotonic() - begun_s < 2.0
 
 
 @pytest.mark.parametrize(("fault", "error", "hint"), [

@@ -20,7 +20,8 @@ from modular_framework_drivers.ezgripper.mx64 import MODEL_NUMBER, Register, Ser
 
 READ, WRITE = 2, 3
 WRITE_TIMEOUT_S = 0.5
-QUIET_S = 0.03
+LATE_S = 0.1
+"""An answer that comes later than this does not come [s]."""
 LEAST_TRIES = 3
 BAUDRATES = (9600, 19200, 57600, 115200, 500000, 1000000, 2000000, 3000000)
 BUS_ERRORS = ServoErrors.CHECKSUM | ServoErrors.INSTRUCTION | ServoErrors.RANGE | ServoErrors.ANGLE_LIMIT
@@ -137,17 +138,18 @@ class DynamixelBus:
         """Send one instruction until it is answered; the answer has `size` bytes."""
         if self._port is None:
             raise PortLostError(f"port {self._name} is not open")
-        damaged, silent, errors = False, False, ServoErrors.NONE
+        damaged, silent, errors = False, 0, ServoErrors.NONE
         tries, begun_s = 0, time.monotonic()
         while tries < LEAST_TRIES or time.monotonic() - begun_s < self._timeout_s:
             self.retries += tries > 0
             tries += 1
             packet = [0, 0, servo_id, len(parameters) + 2, instruction, *parameters, 0]
             try:
+                sent_s = time.monotonic()
                 answer, result, bits = self._packets.txRxPacket(self._port, packet)
-                silent |= result == COMM_RX_TIMEOUT
+                silent += result == COMM_RX_TIMEOUT
                 if silent and result == COMM_SUCCESS:
-                    self._drain(self._port)
+                    self._let_pass(self._port, silent * (size + 6), sent_s + LATE_S)
             except (OSError, termios.error) as error:
                 self.close()
                 raise PortLostError(f"port {self._name} is gone: {_reason(error)}; check the cable") from error
@@ -159,10 +161,10 @@ class DynamixelBus:
         raise NoAnswerError(self._silence(servo_id, damaged, tries))
 
     @staticmethod
-    def _drain(port: _Port) -> None:
-        """Let late answers to earlier tries go by, which say nothing about whose they are."""
-        while select.select([port.ser.fileno()], [], [], QUIET_S)[0]:
-            port.ser.read(256)
+    def _let_pass(port: _Port, late_bytes: int, end_s: float) -> None:
+        """Let late answers to earlier tries go by, which do not say whose they are."""
+        while late_bytes > 0 and select.select([port.ser.fileno()], [], [], max(0.0, end_s - time.monotonic()))[0]:
+            late_bytes -= len(port.ser.read(late_bytes))
 
     def _check(self, servo_id: int, errors: ServoErrors, what: str) -> None:
         if errors & BUS_ERRORS:
