@@ -132,7 +132,7 @@ def test_a_servo_out_of_reach_is_an_error_that_says_why(line: DynamixelLine, bus
     start_s = time.monotonic()
     with pytest.raises(error, match=hint):
         bus.read(1, mx64.READING)
-    assert time.monotonic() - start_s < 0.5
+    assert time.monotonic() - start_s < 1.5
 
 
 def test_another_baud_rate_is_named(line: DynamixelLine) -> None:
