@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -96,6 +97,8 @@ class SceneMonitor:
                     listener(scene)
             except rospy.ROSException as error:  # the node is going down
                 rospy.logdebug("the change of the planning scene was not told: %s", error)
+            except Exception:  # what one change does to one listener must not keep the next ones from all
+                rospy.logerr("a change of the planning scene was not told:\n%s", traceback.format_exc())
 
     def _publish(self, scene: PlanningScene, settings: SceneMonitorSettings) -> None:
         """Tells subscribers the wanted parts of what changed, or everything where they heard nothing for a while."""
@@ -136,15 +139,12 @@ class SceneMonitor:
             rospy.logwarn_throttle(5.0, "joint_states: %d names but %d positions; message ignored",
                                    len(message.name), len(message.position))
             return
-        changed = {}
-        for name, position in zip(message.name, message.position, strict=True):
-            number = self.model.index.get(name)
-            if number is not None and np.isfinite(position):
-                changed[name] = float(position)
-                self._stamps[number] = message.header.stamp
+        changed = {name: float(position) for name, position in zip(message.name, message.position, strict=True)
+                   if name in self.model.index and np.isfinite(position)}
         with self._lock:
             self._positions = self.model.merge(self._positions, changed)
             self._history.add(message.header.stamp.to_sec(), self._positions)
+            self._stamps.update({self.model.index[name]: message.header.stamp for name in changed})
         with self._arrived:
             self._arrivals += 1
             self._arrived.notify_all()
