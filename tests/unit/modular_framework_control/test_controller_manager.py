@@ -2,6 +2,7 @@
 """Loading, switching and unloading controllers, by the rules of ros_control."""
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -277,3 +278,47 @@ def test_hardware_that_takes_too_long_or_refuses_fails_the_switch(slow: Any) -> 
     slow.robot_hw.accepts = False
     assert "refused to prepare" in str(slow.switch(["left"], []))
     assert slow.states()["left"] == "aborted"
+
+
+def test_hardware_that_raises_in_a_switch_leaves_nothing_waiting(slow: Any) -> None:
+    def break_down(controller: ControllerInfo | None = None) -> SwitchState:
+        raise OSError("line is dead")
+
+    slow.robot_hw.switch_result = break_down
+    assert "hardware raised OSError: line is dead" in str(slow.switch(["left"], []))
+    assert slow.states()["left"] == "aborted"
+
+
+def test_a_switch_under_way_when_the_loop_ends_fails_at_once_and_no_other_is_begun(slow: Any) -> None:
+    slow.manager._update_wait_s = 30.0
+    slow.robot_hw.asks.update(left=10**6)
+    raised: list[str] = []
+
+    def ask() -> None:
+        with pytest.raises(ControllerError) as caught:
+            slow.manager.switch_controller(["left"], [])
+        raised.append(str(caught.value))
+
+    thread = threading.Thread(target=ask, daemon=True)
+    thread.start()
+    deadline_s = time.monotonic() + 10.0
+    while slow.states()["left"] != "waiting" and time.monotonic() < deadline_s:
+        slow.step()
+    begun_s = time.monotonic()
+    slow.manager.stop_all()
+    slow.manager.close()
+    thread.join(10.0)
+    assert time.monotonic() - begun_s < 10.0
+    assert raised == ["the switch was not carried out: the control loop has ended"]
+    assert slow.states() == {}
+
+
+def test_after_the_end_of_the_loop_a_switch_is_refused_at_once(loop: Any) -> None:
+    loop.manager._update_wait_s = 30.0
+    loop.manager.stop_all()
+    begun_s = time.monotonic()
+    with pytest.raises(ControllerError, match="the control loop has ended"):
+        loop.manager.switch_controller(["right"], [])
+    assert time.monotonic() - begun_s < 10.0
+    loop.step()
+    assert (loop.states()["left"], loop.states()["right"]) == ("stopped", "initialized")

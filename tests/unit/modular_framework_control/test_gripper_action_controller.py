@@ -142,3 +142,19 @@ def test_feedback_comes_at_its_rate(make_loop: Callable[..., Any]) -> None:
     loop.run(0.4)
     assert len(seen) == pytest.approx(8, abs=1)
     assert seen == sorted(seen)
+
+
+def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_lost(loop: Any) -> None:
+    class Effort(float):
+        """The controller is stopped while this is looked at."""
+
+        def __lt__(self, other: float) -> bool:
+            assert loop.switch([], ["gripper"]) is None
+            return float(self) < other
+
+    ticket = send(loop, 0.4, Effort(1.0))
+    assert (ticket.status, ticket.text) == (GoalStatus.REJECTED, "the controller was stopped")
+    assert loop.switch(["gripper"], []) is None
+    before = handle(loop).command
+    loop.run(0.1)
+    assert handle(loop).command == before

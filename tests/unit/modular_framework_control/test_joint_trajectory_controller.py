@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
+from modular_framework_control import joint_trajectory_controller
 from modular_framework_control.controller import ControllerError
 from modular_framework_control.goal_ticket import GoalStatus
 from modular_framework_control.hardware_interface import PositionJointInterface
@@ -352,3 +353,20 @@ def test_a_goal_that_ends_with_the_cycle_it_arrives_in_does_no_harm(loop: Any) -
         send(loop, (0.5, ZEROS), (1.0 + end_s, ZEROS), stamp_s=loop.time_s - 1.0)
         loop.step(2)
         assert loop.states()["arm"] == "running"
+
+
+def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_lost(
+        loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    order_of = joint_trajectory_controller.order_of
+
+    def stop_meanwhile(*arguments: Any) -> Any:
+        assert loop.switch([], ["arm"]) is None
+        return order_of(*arguments)
+
+    monkeypatch.setattr(joint_trajectory_controller, "order_of", stop_meanwhile)
+    ticket = send(loop, (0.5, (0.3, 0.1, 0.1)))
+    assert (ticket.status, ticket.text) == (GoalStatus.REJECTED, "the controller was stopped")
+    assert loop.switch(["arm"], []) is None
+    before = commands(loop)
+    loop.run(0.2)
+    assert commands(loop) == before

@@ -79,6 +79,7 @@ class ControllerManager:
         self._services = threading.RLock()
         self._slot_lock = threading.Lock()
         self._pending: SwitchRequest | None = None
+        self._ended = False
         self._loaded: tuple[LoadedController, ...] = ()
         self._detach: dict[str, Detach] = {}
         self._last_time_s = float("-inf")
@@ -138,6 +139,7 @@ class ControllerManager:
             except Exception as error:
                 LOGGER.exception("switch_controller: the hardware raised")
                 request.errors.append(f"hardware raised {type(error).__name__}: {error}")
+                request.give_up()
                 finished = True
             if finished:
                 self._pending = None
@@ -211,7 +213,7 @@ class ControllerManager:
 
         Raises:
             ControllerError: refused, in conflict over a joint, refused by the hardware, not started, or not carried
-                out because the control loop did not run.
+                out because the control loop did not run or has ended.
         """
         with self._services:
             plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop,
@@ -230,7 +232,11 @@ class ControllerManager:
 
     def _hand_over(self, request: SwitchRequest) -> None:
         """Put `request` into the slot of the loop and wait until it is done, as long as the loop runs."""
-        self._pending, seen = request, -1
+        with self._slot_lock:
+            if self._ended:
+                raise ControllerError("cannot switch controllers: the control loop has ended; start its node again")
+            self._pending = request
+        seen = -1
         while seen != request.cycles:
             seen = request.cycles
             if request.done.wait(self._update_wait_s):
@@ -268,7 +274,17 @@ class ControllerManager:
             self.types.reload()
 
     def stop_all(self) -> None:
-        """Stop every running controller, which ends their goals; the control loop must have ended."""
+        """Stop every running controller, which ends their goals, and refuse switches from now on, a pending one too.
+
+        The control loop must have ended. May be called twice.
+        """
+        with self._slot_lock:
+            self._ended = True
+            request, self._pending = self._pending, None
+            if request is not None:
+                request.errors.append("the switch was not carried out: the control loop has ended")
+                request.give_up()
+                request.done.set()
         for entry in self._loaded:
             if entry.running:
                 entry.stop(self._last_time_s)

@@ -103,7 +103,8 @@ class GripperActionController(Controller):
             ticket: where to report.
 
         Raises:
-            GripperGoalError: not a number, negative effort, or the controller does not run.
+            GripperGoalError: not a number, negative effort, or the controller does not run. When it is stopped
+                meanwhile, the ticket tells the rejection.
         """
         if not self._running:
             raise GripperGoalError("the controller is not running; start it first")
@@ -111,6 +112,8 @@ class GripperActionController(Controller):
             raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers and an "
                                    "effort of at least 0 (0 = default)")
         self._mailbox.append(_Order(position, max_effort, ticket))
+        if not self._running:
+            self._reject_waiting("the controller was stopped")
 
     def cancel(self, ticket: GripperTicket) -> None:
         """Ask the control loop to stop working on the goal of `ticket`."""
@@ -144,15 +147,19 @@ class GripperActionController(Controller):
         self._finish(status, self._state(False, False), text)
         self._reject_waiting(text)
 
+    def _next_from_mailbox(self) -> _Order | GripperTicket | None:
+        try:
+            return self._mailbox.popleft()
+        except IndexError:  # asking first would not do: two threads may empty it
+            return None
+
     def _reject_waiting(self, text: str) -> None:
-        while self._mailbox:
-            order = self._mailbox.popleft()
+        while (order := self._next_from_mailbox()) is not None:
             if isinstance(order, _Order):
                 order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), text)
 
     def update(self, time_s: float, period_s: float) -> None:
-        while self._mailbox:
-            order = self._mailbox.popleft()
+        while (order := self._next_from_mailbox()) is not None:
             if isinstance(order, _Order) and self._fault:
                 order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), self._fault)
             elif isinstance(order, _Order):

@@ -93,11 +93,14 @@ class JointTrajectoryController(Controller):
         """Hand a goal (with a ticket) or a command (without) to the control loop.
 
         Raises:
-            GoalRejectedError: it is malformed or the controller does not run; the ticket is left as it is.
+            GoalRejectedError: it is malformed or the controller does not run; the ticket is left as it is. When the
+                controller is stopped meanwhile, the ticket tells the rejection.
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
         self._mailbox.append(order_of(goal, ticket, self.joint_names, self._tolerances, self._allow_partial))
+        if not self._running:
+            self._reject_waiting("the controller was stopped")
 
     def cancel(self, ticket: TrajectoryTicket) -> None:
         """Ask the control loop to stop following the goal of `ticket`."""
@@ -152,9 +155,14 @@ class JointTrajectoryController(Controller):
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
         self._reject_waiting(text)
 
+    def _next_from_mailbox(self) -> TrajectoryOrder | TrajectoryTicket | None:
+        try:
+            return self._mailbox.popleft()
+        except IndexError:  # asking first would not do: two threads may empty it
+            return None
+
     def _reject_waiting(self, text: str) -> None:
-        while self._mailbox:
-            order = self._mailbox.popleft()
+        while (order := self._next_from_mailbox()) is not None:
             if isinstance(order, TrajectoryOrder) and order.ticket is not None:
                 order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
 
@@ -198,8 +206,7 @@ class JointTrajectoryController(Controller):
         self._command_rest()
 
     def _work_off_mailbox(self) -> None:
-        while self._mailbox:
-            order = self._mailbox.popleft()
+        while (order := self._next_from_mailbox()) is not None:
             if isinstance(order, TrajectoryOrder):
                 refusal = self._fault or self._take_up(order)
                 if refusal:

@@ -6,6 +6,7 @@ import signal
 import threading
 import time
 import traceback
+from collections.abc import Callable
 
 import rospy
 
@@ -141,16 +142,18 @@ class RobotHwNode:
         return 0.0, 0
 
     def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
-        """Stop the controllers, write what they leave as commands (velocities and efforts of 0), close everything."""
+        """Stop the controllers, write what they leave as commands (velocities and efforts of 0), close everything.
+
+        The robot comes first: to close is work on the network, which may take long, or fail.
+        """
         self._ended.set()
+        manager.manager.stop_all()
+        _attempt(f"last write of hardware {type(self._robot_hw).__name__}",
+                 lambda: self._robot_hw.write(self._last_s + self._period_s, self._period_s))
         starter.join(timeout=2.0)
-        self._readiness.close()
-        manager.close()
-        try:
-            self._robot_hw.write(self._last_s + self._period_s, self._period_s)
-        except Exception as error:  # a user's hardware may raise anything; what follows must be done all the same
-            rospy.logerr("last write of hardware %s raised %s", type(self._robot_hw).__name__, error)
-        self._report.close()
+        _attempt("closing the topics of ready hardware", self._readiness.close)
+        _attempt("closing the controllers", manager.close)
+        _attempt("closing the report of the loop", self._report.close)
 
     def _get_ready(self, manager: RosControllerManager) -> None:
         """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
@@ -165,6 +168,13 @@ class RobotHwNode:
             if not rospy.is_shutdown():
                 self._failure = str(error) or type(error).__name__
                 rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())
+
+
+def _attempt(what: str, action: Callable[[], None]) -> None:
+    try:
+        action()
+    except Exception as error:  # hardware and network may raise anything; what follows must be done all the same
+        rospy.logerr("%s raised %s: %s", what, type(error).__name__, error)
 
 
 def main() -> int:
