@@ -276,6 +276,28 @@ def test_a_warm_motor_is_reported_before_it_gives_up(line: DynamixelLine, grippe
     assert gripper.state().fault == ""
 
 
+class LockWatch(logging.Handler):
+    """Notes whether the gripper's lock was free whenever something was logged."""
+
+    def __init__(self, gripper: EzGripper) -> None:
+        super().__init__()
+        self._lock = gripper._lock
+        self.free: list[tuple[str, bool]] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.free.append((record.getMessage(), not self._lock.locked()))
+
+
+def test_nothing_is_logged_while_the_control_loop_would_wait_for_it(caplog: pytest.LogCaptureFixture) -> None:
+    gripper = EzGripper(GripperSettings("/nowhere"))
+    watch, logger = LockWatch(gripper), logging.getLogger("rosout.ezgripper")
+    caplog.set_level(logging.INFO, logger.name)
+    logger.addHandler(watch)
+    gripper._publish(gripper.state().reading, time.monotonic(), "")
+    logger.removeHandler(watch)
+    assert watch.free == [(f"{gripper.settings.name}: in use", True)]
+
+
 def test_a_gripper_that_comes_late_is_used(make_gripper: MakeGripper) -> None:
     line, gripper = make_gripper()
     line.unplug()

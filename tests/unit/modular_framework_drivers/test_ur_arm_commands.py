@@ -13,6 +13,7 @@ from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_drivers.ur import rtde_link, ur_arm_robot_hw
 from modular_framework_drivers.ur.arm_messages import READY, TAKEN, ArmState
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
+from modular_framework_drivers.ur.rtde_process import command_line
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 
 PERIOD_S = 0.008
@@ -176,6 +177,25 @@ def test_a_program_asked_for_at_once_after_it_was_given_up_is_a_new_one(link: Rt
     until(link, lambda: link.commanding)
     controls = [process for process in FakeProcess.started if process.role == "control"]
     assert [process.ended for process in controls] == [True, False]
+
+
+def test_a_program_asked_for_while_one_is_ready_is_a_new_one(link: RtdeLink) -> None:
+    link.connect()
+    link.request_program()
+    until(link, lambda: link.commanding)
+    link.request_program()    # as resume does when the arm stopped before it followed
+    assert not link.commanding
+    until(link, lambda: link.commanding)
+    controls = [process for process in FakeProcess.started if process.role == "control"]
+    assert [process.ended for process in controls] == [True, False] and link.program_failure == ""
+
+
+def test_small_and_negative_numbers_reach_the_process_that_commands_the_arm() -> None:
+    settings = LinkSettings("nowhere", speed_scale=0.00005, payload_kg=0.00002, payload_centre_m=(-0.00005, 0.0, -0.01))
+    options = command_line().parse_args(["control", "7", "nowhere", *RtdeLink(settings)._control_arguments()])
+    assert (options.speed_scale, options.payload) == (0.00005, 0.00002)
+    assert options.payload_centre == [-0.00005, 0.0, -0.01]
+    assert (options.lookahead, options.gain) == (0.03, 2000.0)
 
 
 def test_a_control_loop_that_comes_late_does_not_take_the_link_for_lost(link: RtdeLink) -> None:

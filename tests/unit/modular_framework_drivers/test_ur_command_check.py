@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modular_framework_control.joint_limits import JointLimits, SoftJointLimits
-from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints
 from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 
 NAMES = ("shoulder", "elbow")
 LIMITS = JointLimits(-2.0, 2.0, max_velocity=3.0, max_acceleration=40.0)
 DT_S = 0.008
+PERIODS_S = (0.0, 0.002, DT_S, 0.02)
 WILD = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-2.5, 2.5))
 
 
@@ -26,10 +27,11 @@ def checked(max_jump: float = 0.5, soft: SoftJointLimits | None = None) -> Comma
 
 
 @settings(deadline=None)
-@given(st.lists(st.tuples(WILD, WILD, st.sampled_from([0.0, 0.002, DT_S, 0.02])), max_size=60))
+@given(st.lists(st.tuples(WILD, WILD, st.sampled_from(PERIODS_S)), max_size=60))
 def test_whatever_is_commanded_the_arm_is_told_what_it_can_do(steps: list[tuple[float, float, float]]) -> None:
     check = checked()
     velocities = [0.0, 0.0]
+    longer_cycles = 3.0 * (PERIODS_S[-1] - PERIODS_S[1]) / 2.0    # what cycles that become shorter take from braking
     for first, second, period_s in steps:
         before = list(check.sent)
         check.admit([first, second], period_s)
@@ -40,20 +42,54 @@ def test_whatever_is_commanded_the_arm_is_told_what_it_can_do(steps: list[tuple[
         for velocity, old in zip(new, velocities, strict=True):
             assert abs(velocity) <= 3.0 * (1.0 + 1e-5)
             assert abs(velocity - old) <= 40.0 * period_s * (1.0 + 1e-5) + 1e-9
+        assert max(map(abs, check.sent)) <= 2.0 + longer_cycles
         velocities = new
 
 
 @settings(deadline=None)
-@given(amplitude=st.floats(0.01, 1.5), speed=st.floats(0.05, 2.5))
+@given(speed=st.floats(0.1, 3.0), end=st.floats(1.8, 2.0), period_s=st.sampled_from(PERIODS_S[1:]),
+       afterwards=st.sampled_from(["it stays", "it goes back", "it is refused"]))
+def test_a_command_that_stops_abruptly_at_the_end_of_the_range_does_not_send_the_arm_beyond(
+        speed: float, end: float, period_s: float, afterwards: str) -> None:
+    check = checked()
+    velocity = 0.0
+    for cycle in range(1, round(end / speed / period_s) + 100):
+        before, command = check.sent[0], min(speed * cycle * period_s, end)
+        if command == end and afterwards != "it stays":
+            command = end - 0.3 if afterwards == "it goes back" else math.nan
+        check.admit([command, -command], period_s)
+        assert max(map(abs, check.sent)) <= 2.0 + 1e-6
+        new = (check.sent[0] - before) / period_s
+        assert abs(new - velocity) <= 40.0 * period_s * (1.0 + 1e-5) + 1e-9
+        velocity = new
+    if afterwards == "it stays":
+        assert check.sent == pytest.approx([end, -end], abs=1e-6)
+
+
+@pytest.mark.parametrize("deceleration", [5.0, 39.9])
+def test_a_command_that_brakes_in_time_is_followed_exactly_to_the_end_of_the_range(deceleration: float) -> None:
+    check = checked(max_jump=4.0)
+    half_s = 2.5 / deceleration
+    start = 2.0 - deceleration * half_s * half_s
+    check.reset([start, -start])
+    for cycle in range(round(2.0 * half_s / DT_S) + 10):
+        time_s = min(cycle * DT_S, 2.0 * half_s)
+        way = 0.5 * deceleration * time_s * time_s
+        if time_s > half_s:
+            way = deceleration * (half_s * half_s - 0.5 * (2.0 * half_s - time_s) ** 2)
+        assert check.admit([start + way, -start - way], DT_S) == ""
+        assert check.sent == [start + way, -start - way]
+
+
+@settings(deadline=None)
+@given(amplitude=st.floats(0.01, 1.0), speed=st.floats(0.05, 2.5))
 def test_a_motion_within_the_limits_reaches_the_arm_unchanged(amplitude: float, speed: float) -> None:
     check = checked()
     rate = speed / amplitude
     if amplitude * rate * rate > 35.0:
         rate = math.sqrt(35.0 / amplitude)
     for cycle in range(300):
-        command = amplitude * (1.0 - math.cos(rate * cycle * DT_S)) / 1.0
-        if command > 2.0:
-            break
+        command = amplitude * (1.0 - math.cos(rate * cycle * DT_S))
         assert check.admit([command, -command], DT_S) == ""
         assert check.sent == [command, -command]
 
@@ -146,3 +182,10 @@ def test_the_limits_are_those_of_the_description_and_of_joint_limits_but_never_m
     assert shoulder.soft == SoftJointLimits(-1.0, 0.5, 15.0, 2.0)
     assert (elbow.limits.min_position, elbow.limits.max_position, elbow.limits.max_acceleration) == (-0.5, 0.5, 3.0)
     assert elbow.soft == SoftJointLimits(-0.4, 0.4, 10.0, 1.0)
+
+
+@pytest.mark.parametrize("what", ["velocity", "acceleration"])
+def test_a_joint_that_could_not_move_is_refused_with_its_parameter(what: str) -> None:
+    root = MappingNodeHandle({"joint_limits": {"elbow": {f"has_{what}_limits": True, f"max_{what}": 0.0}}})
+    with pytest.raises(ParameterError, match=f"/joint_limits/elbow/max_{what}: got 0"):
+        read_checked_joints(["elbow"], root)

@@ -43,8 +43,13 @@ def test_a_state_a_cycle_later_follows() -> None:
     assert follows(next_state(positions=(0.12,) * 6), STATE)
 
 
+def test_a_joint_that_turns_without_end_has_turned_often() -> None:
+    assert follows(next_state(positions=(*SIX[1:], 50.0)), None)
+    assert follows(next_state(positions=(*SIX[1:], 50.02)), replace(STATE, positions=(*SIX[1:], 50.0)))
+
+
 @pytest.mark.parametrize("changes", [
     {"timestamp_s": math.nan}, {"timestamp_s": 4.9},
-    {"positions": (math.nan, *SIX[1:])}, {"positions": (6.6, *SIX[1:])}, {"positions": (0.3, *SIX[1:])}])
+    {"positions": (math.nan, *SIX[1:])}, {"positions": (101.0, *SIX[1:])}, {"positions": (0.3, *SIX[1:])}])
 def test_garbage_does_not_follow(changes: dict[str, object]) -> None:
     assert not follows(next_state(**changes), STATE)

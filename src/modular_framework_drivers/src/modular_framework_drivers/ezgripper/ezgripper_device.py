@@ -239,9 +239,10 @@ class EzGripper:
 
     def _publish(self, reading: GripperReading, now_s: float, fault: str) -> None:
         with self._lock:
-            if self._state.fault and not fault:
-                LOGGER.info("%s: in use", self.settings.name)
+            recovered = self._state.fault and not fault
             self._state = GripperState(now_s, reading, self._grip.motion, self._grip.goal, self._ready, fault)
+        if recovered:    # not while the control loop may wait for the lock
+            LOGGER.info("%s: in use", self.settings.name)
 
     def _report(self, problem: str, level: int = logging.ERROR) -> None:
         """Publish a fault; log it when it is another one than before."""

@@ -60,7 +60,8 @@ class EzGripperManipulator:
             GraspCommandError: the gripper has a fault, time is up, or the motion was stopped.
         """
         self._refuse_fault(self._gripper.state())
-        number = self._gripper.command(motion.targets[self._joint], round(motion.efforts[self._joint] * FULL_TORQUE))
+        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # what was rounded is forgiven
+        number = self._gripper.command(position, round(motion.efforts[self._joint] * FULL_TORQUE))
         end_s = time.monotonic() + motion.timeout_s
         while True:
             state = self._gripper.state()

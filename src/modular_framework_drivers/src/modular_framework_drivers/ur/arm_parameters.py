@@ -77,6 +77,7 @@ def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJo
     joints = []
     for name in names:
         limits = limits_with_parameters(name, known.get(name, _UR_LIMITS), root_nh)
+        _refuse_standstill(limits, join_names(root_nh.namespace, f"joint_limits/{name}"))
         joints.append(CheckedJoint(name, replace(
             limits, min_position=max(limits.min_position, _UR_LIMITS.min_position),
             max_position=min(limits.max_position, _UR_LIMITS.max_position),
@@ -84,3 +85,10 @@ def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJo
             max_acceleration=min(limits.max_acceleration, _UR_LIMITS.max_acceleration),
         ), soft_limits_with_parameters(name, soft.get(name), root_nh)))
     return joints
+
+
+def _refuse_standstill(limits: JointLimits, where: str) -> None:
+    for key, value in (("max_velocity", limits.max_velocity), ("max_acceleration", limits.max_acceleration)):
+        if not value > 0.0:
+            raise ParameterError(f"parameter {where}/{key}: got {value:g}, there or in the robot description; expected "
+                                 "more than 0, else the joint cannot move")

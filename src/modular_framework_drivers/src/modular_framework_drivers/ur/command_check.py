@@ -35,12 +35,18 @@ class CheckedJoint:
     limits: JointLimits
     soft: SoftJointLimits | None = None
 
-    def velocity_range(self, position: float) -> tuple[float, float]:
-        """Smallest and largest velocity at `position` [rad]; where soft limits leave only the way back, also 0."""
-        if self.soft is None:
-            return -self.limits.max_velocity, self.limits.max_velocity
-        slowest, fastest = soft_velocities(position, self.limits, self.soft)
-        return min(slowest, 0.0), max(fastest, 0.0)
+    def velocity_range(self, position: float, period_s: float) -> tuple[float, float]:
+        """Smallest and largest velocity at `position` [rad] in a cycle of `period_s` [s].
+
+        So slow that the joint can stop within its range; where soft limits leave only the way back, also 0.
+        """
+        limits = self.limits
+        slowest, fastest = -limits.max_velocity, limits.max_velocity
+        if self.soft is not None:
+            slowest, fastest = soft_velocities(position, limits, self.soft)
+        below, above = max(position - limits.min_position, 0.0), max(limits.max_position - position, 0.0)
+        return (max(min(slowest, 0.0), -_closing_speed(below, limits.max_acceleration, period_s)),
+                min(max(fastest, 0.0), _closing_speed(above, limits.max_acceleration, period_s)))
 
 
 class CommandCheck:
@@ -116,7 +122,7 @@ class CommandCheck:
         "At once" also asks that the joint can be as fast as the commands are in the next cycle, lest it run past them.
         """
         position, velocity = self.sent[index], self._velocities[index]
-        slowest, fastest = joint.velocity_range(position)
+        slowest, fastest = joint.velocity_range(position, period_s)
         deceleration = joint.limits.max_acceleration
         change = deceleration * period_s
         pace = (command - self._targets[index]) / period_s
@@ -136,6 +142,11 @@ class CommandCheck:
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:
-    """Highest speed from which one can still stop within `distance` [m|rad], braking once per period."""
+    """Highest speed from which one can still stop within `distance` [m|rad], braking once per period.
+
+    A cycle at that speed leaves a distance whose closing speed is lower by what is braked in a cycle, or nothing.
+    """
     step = deceleration * period_s
-    return step * (math.sqrt(0.25 + 2.0 * distance / (step * period_s)) - 0.5)
+    cycles = distance / (step * period_s)                       # that it takes at the speed of one step
+    brakings = math.floor(math.sqrt(0.25 + 2.0 * cycles) - 0.5)
+    return step * (cycles / (brakings + 1) + 0.5 * brakings)

@@ -128,7 +128,10 @@ class RtdeLink:
             self._keeper = None
 
     def request_program(self) -> None:
-        """Have the program that takes commands uploaded as soon as the arm is connected."""
+        """Have the program that takes commands uploaded, anew if it was, as soon as the arm is connected."""
+        control = self._control
+        if control is not None and control.works:    # its program may have ended before the arm followed it
+            control.failed, self.commanding = True, False
         self.program_failure = ""
         self._program_wanted = True
 
@@ -262,10 +265,16 @@ class RtdeLink:
 
     def _control_arguments(self) -> list[str]:
         settings = self._settings
-        scale = [] if settings.speed_scale is None else ["--speed-scale", str(settings.speed_scale)]
-        return [*scale, "--payload", str(settings.payload_kg), "--payload-centre", *map(str, settings.payload_centre_m),
-                "--lookahead", str(settings.lookahead_s), "--gain", str(settings.gain)]
+        scale = [] if settings.speed_scale is None else ["--speed-scale", _written(settings.speed_scale)]
+        return [*scale, "--payload", _written(settings.payload_kg),
+                "--payload-centre", *map(_written, settings.payload_centre_m),
+                "--lookahead", _written(settings.lookahead_s), "--gain", _written(settings.gain)]
 
     def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _Helper:
         real_time = ["--real-time"] if self._settings.real_time else []
         return _Helper(ChildProcess(_MODULE, [role, self._settings.address, *real_time, *arguments]), now_s)
+
+
+def _written(number: float) -> str:
+    """For a command line, on which -5e-05 would be an option."""
+    return f"{number:.9f}"

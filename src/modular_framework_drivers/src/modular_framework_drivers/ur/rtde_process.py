@@ -153,8 +153,8 @@ def _newest(channel: socket.socket) -> bytes:
     return message
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the two processes; returns the exit code."""
+def command_line() -> argparse.ArgumentParser:
+    """What the processes are to be told."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("role", choices=("state", "control"))
     parser.add_argument("channel", type=int, help="file descriptor of the socket to the control loop")
@@ -166,7 +166,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--payload-centre", type=float, nargs=3, default=[0.0, 0.0, 0.0])
     parser.add_argument("--lookahead", type=float, default=0.03)
     parser.add_argument("--gain", type=float, default=2000.0)
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one of the two processes; returns the exit code."""
+    options = command_line().parse_args(arguments)
     signal.signal(signal.SIGINT, signal.SIG_IGN)    # ctrl-c in the terminal is for the control loop, which ends us
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))     # not what the starter happened to have
     with socket.socket(fileno=options.channel) as channel:

@@ -7,7 +7,7 @@ import math
 from modular_framework_drivers.ur.arm_messages import ArmState
 
 _LONGEST_LOOK_S = 0.02
-_MAX_POSITION = 2.0 * math.pi + 0.2
+_MAX_POSITION = 100.0           # some joints, as wrist 3 of a UR3, turn without end [rad]
 _MAX_SPEED = 2.0 * math.pi      # of a measured joint; twice what a UR5's does [rad/s]
 _SLACK = 0.05                   # rounding and jitter of the clock [rad]
 

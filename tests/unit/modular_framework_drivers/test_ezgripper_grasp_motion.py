@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How the grasp server moves an EZGripper, without servos."""
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
+from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
+from modular_framework_drivers.ezgripper.grip import Motion
+from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
+from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
+from modular_framework_drivers.ezgripper.ros_ezgripper_grasp_server import EzGripperManipulator
+
+
+class ObedientGripper(EzGripper):
+    """Is where it is commanded to be at once."""
+
+    def __init__(self) -> None:
+        super().__init__(GripperSettings("/nowhere"))
+        self._state = replace(self._state, fault="")
+
+    def state(self) -> GripperState:
+        reading = replace(self._state.reading, position=self._wanted.position)
+        return replace(self._state, goal=self._wanted, motion=Motion.REACHED, reading=reading)
+
+
+@pytest.mark.parametrize(("target", "expected"), [
+    (-1e-12, 0.0), (CLOSED_POSITION + 1e-12, CLOSED_POSITION), (1.0, 1.0)])
+def test_a_posture_that_rounding_put_just_outside_the_range_is_its_end(target: float, expected: float) -> None:
+    wanted = WantedMotion({"knuckle": target}, {"knuckle": 0.4}, 1.0, lambda: False)
+    outcome = EzGripperManipulator(ObedientGripper(), "knuckle").move(wanted)
+    assert outcome.positions == {"knuckle": expected}
