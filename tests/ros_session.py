@@ -9,8 +9,9 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import rosgraph
 
@@ -22,6 +23,19 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def until(condition: Callable[[], Any], what: str, timeout_s: float = 30.0) -> None:
+    """Waits until a condition holds: long enough for a busy computer, and not for ever.
+
+    Raises:
+        AssertionError: it did not hold within `timeout_s` [s]; names what was waited for.
+    """
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f"not within {timeout_s:g} s: {what}")
+        time.sleep(0.01)
 
 
 class Launch:
@@ -151,10 +165,8 @@ class RosSession:
     def _master_answers(self) -> bool:
         return rosgraph.is_master_online(self.env["ROS_MASTER_URI"])
 
-    def _wait_until(self, condition: object, timeout_s: float, what: str) -> None:
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end:
-            if condition():  # type: ignore[operator]
-                return
-            time.sleep(0.05)
-        raise AssertionError(f"waited {timeout_s} s for {what} in vain; log:\n{self.log()}")
+    def _wait_until(self, condition: Callable[[], Any], timeout_s: float, what: str) -> None:
+        try:
+            until(condition, what, timeout_s)
+        except AssertionError as error:
+            raise AssertionError(f"{error}; log:\n{self.log()}") from None

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Positive
 
 
 class MyState(FrameworkState):
@@ -17,14 +18,14 @@ class MyState(FrameworkState):
 
     Args:
         side: One of several words; the annotation is what a task file is checked against.
-        timeout: A number with its unit [s].
+        timeout: A number above 0, with its unit [s].
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
         output_keys: Userdata that is written; ``chosen_side`` receives the side when it is listed.
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, side: Literal["left", "right"], timeout: float = 5.0,
+    def __init__(self, side: Literal["left", "right"], timeout: Positive = 5.0,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import actionlib
@@ -13,6 +13,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from controller_manager_msgs.srv import LoadController, SwitchController
+from ros_session import until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -71,13 +72,6 @@ def move(client: actionlib.SimpleActionClient, position: float, duration_s: floa
     client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
 
 
-def wait_until(condition: Callable[[], Any]) -> None:
-    end = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < end, "it did not become true in time"
-        time.sleep(0.01)
-
-
 @pytest.mark.parametrize("step_s", [-HOUR_S, HOUR_S, -0.5])
 def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_clock_that_was_set(
         clock: SetClock, arm: actionlib.SimpleActionClient, step_s: float) -> None:
@@ -86,7 +80,7 @@ def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_c
     subscriber = rospy.Subscriber("joint_states", JointState, lambda message: told.append((message, clock())))
     begun_s = time.monotonic()
     move(arm, here + 1.0, 2.0)
-    wait_until(lambda: told and told[-1][0].position[0] > here + 0.1)
+    until(lambda: told and told[-1][0].position[0] > here + 0.1, "the motion under way")
     clock.set_by_s += step_s
     assert arm.wait_for_result(rospy.Duration(30.0))
     assert time.monotonic() - begun_s >= 1.9, "it must not be carried to its end at once"
@@ -94,7 +88,7 @@ def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_c
     fastest = max(abs(message.velocity[0]) for message, _ in list(told))
     assert fastest < 0.8, "the curve of this goal is never faster than 0.75 rad/s"
     told.clear()
-    wait_until(lambda: len(told) >= 5)
+    until(lambda: len(told) >= 5, "joint states at its end")
     subscriber.unregister()
     assert told[-1][0].position[0] == pytest.approx(here + 1.0, abs=1e-6)
     assert -0.01 < min(heard_s - message.header.stamp.to_sec() for message, heard_s in told) < 0.4

@@ -95,10 +95,10 @@ def client(gripper: FakeGripper) -> actionlib.SimpleActionClient:
     return made
 
 
-def grasp(closed: float = 1.94) -> StandardisedGrasp:
+def grasp(closed: float = 1.94, torques: tuple[float, ...] = (0.5,)) -> StandardisedGrasp:
     pose = generate_pose_stamped_message("world", (0, 0, 0), (0, 0, 0, 1))
     assert isinstance(pose, PoseStamped)
-    return get_standardised_grasp(["f"], [0.4], [closed], [closed], [0.5], pose, pose, pose, 0.5, "g")
+    return get_standardised_grasp(["f"], [0.4], [closed], [closed], torques, pose, pose, pose, 0.5, "g")
 
 
 def send(client, stage: int, message: StandardisedGrasp, max_torque: float = 400.0):
@@ -121,6 +121,15 @@ def test_a_pregrasp_is_reached_and_watched(gripper: FakeGripper, client) -> None
     assert feedback[0].name == ["f"]
 
 
+@pytest.mark.parametrize(("torques", "effort"), [((), 400 / 800 * 2.0), ((0.0,), 0.0)])
+def test_a_pregrasp_without_intensities_has_full_effort_and_with_none_the_controllers_own(
+        gripper: FakeGripper, client, torques: tuple[float, ...], effort: float) -> None:
+    gripper.position, gripper.obstacle = 1.5, float("inf")
+    state, flags, text, _ = send(client, GraspCommand.PRE_GRASP_STATE, grasp(torques=torques))
+    assert (state, flags) == (GoalStatus.SUCCEEDED, (True, False, False)), text
+    assert gripper.max_effort == pytest.approx(effort)
+
+
 def test_joint_states_that_are_heard_late_do_not_make_a_posture_missed(gripper: FakeGripper, client) -> None:
     gripper.position, gripper.obstacle, gripper.lag = 1.5, float("inf"), 5
     before = gripper.published
@@ -141,6 +150,16 @@ def test_fingers_stopped_by_an_object_have_grasped_it_and_hold_it_afterwards(gri
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, False, True)), text
 
 
+def test_fingers_that_stall_where_they_began_have_grasped_nothing(gripper: FakeGripper, client) -> None:
+    gripper.position, gripper.obstacle = 0.4, 0.4
+    before = gripper.published
+    while gripper.published < before + 10:  # until joint states tell of this position
+        time.sleep(0.02)
+    state, flags, text, _ = send(client, GraspCommand.GRASP_STATE, grasp())
+    assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
+    assert "the fingers have not moved" in text
+
+
 def test_fingers_that_close_on_nothing_have_grasped_nothing(gripper: FakeGripper, client) -> None:
     gripper.position, gripper.obstacle = 0.4, float("inf")
     state, flags, text, _ = send(client, GraspCommand.GRASP_STATE, grasp())
@@ -157,7 +176,10 @@ def test_a_pregrasp_that_is_blocked_is_a_failure(gripper: FakeGripper, client) -
 
 @pytest.mark.parametrize(("message", "stage", "torque", "hint"), [
     (grasp, 7, 400.0, "POST_GRASP_STATE"), (lambda: grasp(3.0), 1, 400.0, "limits"),
-    (StandardisedGrasp, 1, 400.0, "at least"), (grasp, 1, 0.0, "max_torque")])
+    (StandardisedGrasp, 1, 400.0, "at least"), (grasp, 1, 0.0, "max_torque"),
+    (grasp, 1, float("nan"), "max_torque is nan"),
+    (lambda: grasp(torques=(0.0,)), 1, 400.0, "to move with no torque"),
+    (lambda: grasp(torques=(1.0, 1.0)), 1, 400.0, "1 joint names and 2 values")])
 def test_a_command_without_sense_is_refused_with_the_reason(gripper, client, message, stage, torque, hint) -> None:
     state, flags, text, _ = send(client, stage, message(), torque)
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
-from collections.abc import Callable
 from pathlib import Path
 from xmlrpc.client import ServerProxy
 
@@ -21,6 +19,7 @@ from moveit_msgs.msg import (
     RobotTrajectory,
 )
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneResponse
+from ros_session import until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -73,13 +72,6 @@ def call(name: str, service_type, *args, **fields):
     proxy = rospy.ServiceProxy(name, service_type)
     proxy.wait_for_service(60)
     return proxy(*args, **fields)
-
-
-def wait_until(condition: Callable[[], bool], timeout_s: float = 60.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"did not happen within {timeout_s} s"
-        time.sleep(0.02)
 
 
 def test_joint_states_of_the_file_keep_full_precision_and_survive_a_bad_neighbour(managers):
@@ -245,7 +237,7 @@ def test_every_change_is_told_in_order(managers):
     heard: list[tuple[int, str, int, int]] = []
     subscriber = rospy.Subscriber("manager_changes", ManagerChange, lambda message: heard.append(
         (message.action, message.name, message.named, message.anonymous)) if message.kind == "plan" else None)
-    wait_until(lambda: call("clear_plans", Trigger).success and bool(heard))  # until the publisher knows the subscriber
+    until(lambda: call("clear_plans", Trigger).success and bool(heard), "a publisher that knows its subscriber", 60.0)
     for name in ("a", "a", ""):
         call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), name)
     call("get_plan", srv.GetMoveitPlan, "")
@@ -253,7 +245,8 @@ def test_every_change_is_told_in_order(managers):
     call("clear_plans", Trigger)
     expected = [(change.ADDED, "a", 1, 0), (change.REPLACED, "a", 1, 0), (change.ADDED, "", 1, 1),
                 (change.HANDED_OUT, "", 1, 0), (change.REMOVED, "a", 0, 0), (change.CLEARED, "", 0, 0)]
-    wait_until(lambda: heard[-1] == expected[-1] and len(heard) >= 7 and heard[-2][0] == change.REMOVED)
+    until(lambda: heard[-1] == expected[-1] and len(heard) >= 7 and heard[-2][0] == change.REMOVED,
+          "the last change", 60.0)
     subscriber.unregister()
     assert heard[-6:] == expected
     assert {action for action, *_ in heard[:-6]} == {change.CLEARED}

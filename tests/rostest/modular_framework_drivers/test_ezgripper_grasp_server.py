@@ -11,6 +11,7 @@ import actionlib
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
+from ros_session import free_port, until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -41,13 +42,6 @@ LAUNCH = """<launch>
 </launch>"""
 
 
-def until(condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end_s, f"waited {timeout_s} s in vain"
-        time.sleep(0.01)
-
-
 class Gripper:
     """The running launch, as a client sees it."""
 
@@ -57,7 +51,8 @@ class Gripper:
         rospy.Subscriber("joint_states", JointState, self._on_joint_state, queue_size=1)
         self.client = actionlib.SimpleActionClient("ezgripper_grasp", GraspAction)
         assert self.client.wait_for_server(rospy.Duration(60)), session.log()
-        until(lambda: self.joint_state is not None and self.joint_state.position[0] < 0.03, 60.0)
+        until(lambda: self.joint_state is not None and self.joint_state.position[0] < 0.03,
+              "open fingers in the joint states", 60.0)
 
     def _on_joint_state(self, message: JointState) -> None:
         self.joint_state = message
@@ -87,8 +82,6 @@ def grasp(pregrasp: float = 0.4, closed: float = 1.94, intensity: float = 0.5) -
 
 @pytest.fixture(scope="module")
 def running(ros_launch, tmp_path_factory: pytest.TempPathFactory) -> Gripper:
-    from ros_session import free_port
-
     command_port = free_port()
     port = Path(tmp_path_factory.mktemp("line")) / "gripper"
     return Gripper(ros_launch(LAUNCH, port=port, command_port=command_port), command_port)
@@ -100,14 +93,15 @@ def gripper(running: Gripper) -> Gripper:
     for order in ("plug", "clear", "no_object"):
         running.order(order)
     running.order("heat", celsius=30)
-    until(lambda: running.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED)
+    until(lambda: running.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
+          "a pregrasp without a fault")
     return running
 
 
 def test_a_pregrasp_is_reached_and_watched(gripper: Gripper) -> None:
     state, flags, text, feedback = gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.5))
     assert (state, flags) == (GoalStatus.SUCCEEDED, (True, False, False)), text
-    until(lambda: gripper.joint_state.position[0] == pytest.approx(1.5, abs=0.05))
+    until(lambda: gripper.joint_state.position[0] == pytest.approx(1.5, abs=0.05), "the fingers at their pregrasp")
     assert feedback
     assert feedback[-1].name == [JOINT]
     assert feedback[0].position[0] < feedback[-1].position[0]
@@ -117,8 +111,9 @@ def test_an_object_is_grasped_held_and_let_go(gripper: Gripper) -> None:
     gripper.order("object", position=1.2)
     state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
-    until(lambda: gripper.joint_state.position[0] == pytest.approx(1.2, abs=0.05))
-    until(lambda: gripper.joint_state.effort[0] == pytest.approx(0.5 * 400 / 1023, abs=0.02))
+    until(lambda: gripper.joint_state.position[0] == pytest.approx(1.2, abs=0.05), "the fingers at the object")
+    until(lambda: gripper.joint_state.effort[0] == pytest.approx(0.5 * 400 / 1023, abs=0.02),
+          "half of the allowed torque")
     state, flags, text, _ = gripper.run(GraspCommand.POST_GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, False, True)), text
     assert gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED
@@ -127,7 +122,7 @@ def test_an_object_is_grasped_held_and_let_go(gripper: Gripper) -> None:
 def test_max_torque_and_intensity_bound_the_torque(gripper: Gripper) -> None:
     gripper.order("object", position=1.2)
     gripper.run(GraspCommand.GRASP_STATE, grasp(intensity=1.0), max_torque=200.0)
-    until(lambda: gripper.joint_state.effort[0] == pytest.approx(200 / 1023, abs=0.01))
+    until(lambda: gripper.joint_state.effort[0] == pytest.approx(200 / 1023, abs=0.01), "the torque that was allowed")
 
 
 def test_closing_on_nothing_is_no_grasp(gripper: Gripper) -> None:
@@ -146,7 +141,23 @@ def test_a_blocked_pregrasp_is_a_failure(gripper: Gripper) -> None:
     assert float(pressed[1]) == pytest.approx(0.8, abs=0.05)
 
 
+@pytest.mark.parametrize("intensity", [0.02, 0.05])
+def test_fingers_that_their_torque_cannot_move_have_grasped_nothing(gripper: Gripper, intensity: float) -> None:
+    state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp(intensity=intensity))
+    assert (state, flags) == (GoalStatus.ABORTED, (False, False, False)), text
+    assert "the fingers have not moved" in text
+
+
+def test_fingers_that_touch_an_object_from_the_beginning_grasp_it(gripper: Gripper) -> None:
+    gripper.order("object", position=0.41)
+    state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp())
+    assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
+
+
 @pytest.mark.parametrize(("message", "stage", "torque", "hint"), [
+    (grasp, 1, float("nan"), "max_torque is nan, allowed are numbers of more than 0"),
+    (lambda: grasp(intensity=0.0), 1, 400.0, "is to move with no torque, allowed is more than 0"),
+    (lambda: grasp(intensity=float("nan")), 1, 400.0, "torque intensity .* is nan"),
     (lambda: grasp(closed=2.0), 1, 400.0, r"is to go to 2.0, its limits are \[0.0, 1.94\]"),
     (lambda: grasp(closed=float("nan")), 1, 400.0, "is to go to nan"),
     (grasp, 7, 400.0, "POST_GRASP_STATE"), (grasp, 1, 0.0, "max_torque"),
@@ -162,7 +173,7 @@ def test_a_goal_without_sense_is_refused_with_value_and_limits(gripper: Gripper,
 
 def test_a_cancel_stops_the_servo(gripper: Gripper) -> None:
     gripper.send(GraspCommand.GRASP_STATE, grasp(intensity=0.3))
-    until(lambda: gripper.joint_state.position[0] > 0.6)
+    until(lambda: gripper.joint_state.position[0] > 0.6, "closing fingers")
     gripper.client.cancel_goal()
     assert gripper.client.wait_for_result(rospy.Duration(30))
     assert gripper.client.get_state() == GoalStatus.PREEMPTED
@@ -186,30 +197,33 @@ def test_a_new_goal_takes_over(gripper: Gripper) -> None:
     other = actionlib.SimpleActionClient("ezgripper_grasp", GraspAction)
     assert other.wait_for_server(rospy.Duration(30))
     other.send_goal(goal, done_cb=lambda state, result: ended.append(state))
-    until(lambda: gripper.joint_state.position[0] > 0.6)
+    until(lambda: gripper.joint_state.position[0] > 0.6, "closing fingers")
     assert gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=0.5))[0] == GoalStatus.SUCCEEDED
-    until(lambda: ended == [GoalStatus.PREEMPTED])
+    until(lambda: ended == [GoalStatus.PREEMPTED], "the end of the goal before")
 
 
 @pytest.mark.parametrize(("fault", "text"), [("unplug", "port .* is gone"), ("overload", "overloaded")])
 def test_a_fault_under_way_ends_the_goal_with_the_reason_and_the_next_one_works(gripper: Gripper, fault: str,
                                                                                  text: str) -> None:
     gripper.send(GraspCommand.GRASP_STATE, grasp(intensity=0.2))
-    until(lambda: gripper.joint_state.position[0] > 0.5)
+    until(lambda: gripper.joint_state.position[0] > 0.5, "closing fingers")
     gripper.order(fault)
     assert gripper.client.wait_for_result(rospy.Duration(30))
     assert gripper.client.get_state() == GoalStatus.ABORTED
     assert re.search(text, gripper.client.get_goal_status_text()), gripper.client.get_goal_status_text()
     assert not gripper.client.get_result().grasped.data
     gripper.order("plug")
-    until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED)
+    until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
+          "a pregrasp after the fault")
 
 
 def test_a_hot_motor_refuses_goals_until_it_has_cooled(gripper: Gripper) -> None:
     gripper.order("heat", celsius=85)
-    until(lambda: "too hot (8" in gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[2])
+    until(lambda: "too hot (8" in gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[2],
+          "the refusal of a hot motor")
     gripper.order("heat", celsius=40)
-    until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[0] == GoalStatus.SUCCEEDED)
+    until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[0] == GoalStatus.SUCCEEDED,
+          "a pregrasp of the cooled motor")
 
 
 def test_orders_without_arguments_are_services_too(gripper: Gripper) -> None:
@@ -225,4 +239,4 @@ def test_joint_states_stop_while_the_gripper_is_out_of_reach(gripper: Gripper) -
     time.sleep(0.3)
     assert gripper.joint_state.header.stamp == last
     gripper.order("plug")
-    until(lambda: gripper.joint_state.header.stamp > last)
+    until(lambda: gripper.joint_state.header.stamp > last, "joint states again")

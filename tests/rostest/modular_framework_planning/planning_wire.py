@@ -33,6 +33,7 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetPositionFK
+from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header, String
@@ -117,14 +118,6 @@ class FakeArm:
         self.positions[GRIPPER] = goal.command.position
         self.grips.append(goal.command.position)
         self._gripper.set_succeeded(GripperCommandResult(position=goal.command.position, reached_goal=True))
-
-
-def until(condition: Callable[[], Any], what: str, timeout_s: float = 30.0) -> None:
-    """Waits: long enough for a busy computer, and not for ever."""
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"{what} did not come within {timeout_s} s"
-        time.sleep(0.01)
 
 
 def call(name: str, kind: Any, *args: Any) -> Any:

@@ -43,9 +43,9 @@ from planning_wire import (
     reports,
     request,
     tip_pose,
-    until,
     vector,
 )
+from ros_session import until
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 

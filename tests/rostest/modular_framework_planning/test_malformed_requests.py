@@ -40,7 +40,8 @@ from moveit_msgs.srv import (
     SetPlannerParams,
 )
 from nonsense import STYLES, nonsense
-from planning_wire import ARM, DOWN, GROUP, LAUNCH, OK, FakeArm, call, joint_goal, plan, report_of, request, until
+from planning_wire import ARM, DOWN, GROUP, LAUNCH, OK, FakeArm, call, joint_goal, plan, report_of, request
+from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle
 from std_msgs.msg import String

@@ -18,7 +18,8 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     RobotState,
 )
-from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_of, request, until
+from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_of, request
+from ros_session import until
 from std_msgs.msg import String
 
 PAN = "shoulder_pan_joint"

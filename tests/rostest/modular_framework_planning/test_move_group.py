@@ -51,8 +51,8 @@ from planning_wire import (
     report_of,
     request,
     table,
-    until,
 )
+from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from moveit_msgs.msg import Constraints, PlanningScene, PlanningSceneComponents, PlanningSceneWorld, RobotState
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetStateValidity, LoadMap, SaveMap
 from planning_wire import ARM, START, FakeArm, add, box, call
+from ros_session import until
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2, PointField
 from std_msgs.msg import Header
 from std_srvs.srv import Empty
@@ -72,7 +72,7 @@ class Camera:
         info = CameraInfo(height=480, width=640)
         info.K = [FOCUS, 0, CENTER[0], 0, FOCUS, CENTER[1], 0, 0, 1]
         self._info.publish(info)
-        wait_until("move_group listens to the camera", lambda: self._image.get_num_connections() > 0)
+        until(lambda: self._image.get_num_connections() > 0, "move_group listens to the camera")
 
     @staticmethod
     def depth(boxes: list[tuple[tuple[float, float, float], tuple[float, float, float]]]) -> np.ndarray:
@@ -96,13 +96,6 @@ class Camera:
         image = Image(height=480, width=640, encoding=encoding, step=640 * data.itemsize, data=data.tobytes())
         image.header.frame_id, image.header.stamp = "camera_optical", rospy.Time.now()
         self._image.publish(image)
-
-
-def wait_until(what: str, condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"{what}: not within {timeout_s} s"
-        time.sleep(0.05)
 
 
 def octomap() -> VoxelMap | None:
@@ -130,14 +123,14 @@ def test_a_box_in_a_depth_image_is_an_obstacle_and_goes_when_it_is_gone(camera: 
     depth = camera.depth([OBSTACLE])
     for encoding in ("16UC1", "32FC1"):
         camera.show(depth, encoding)
-        wait_until(f"the box's front is occupied ({encoding})", lambda: occupied((-0.7, 0.9, 1.2)))
+        until(lambda: occupied((-0.7, 0.9, 1.2)), f"the box's front is occupied ({encoding})")
         assert not occupied((-1.5, 0.5, 1.2)), "the ray to it is free"
         clear()
         assert octomap() is None
     camera.show(depth)
-    wait_until("the box's front is occupied", lambda: occupied((-0.7, 0.9, 1.2)))
-    wait_until("three empty looks clear it", lambda: (camera.show(camera.depth([])), time.sleep(0.3),
-                                                      not occupied((-0.7, 0.9, 1.2)))[-1])
+    until(lambda: occupied((-0.7, 0.9, 1.2)), "the box's front is occupied")
+    until(lambda: (camera.show(camera.depth([])), time.sleep(0.3), not occupied((-0.7, 0.9, 1.2)))[-1],
+          "three empty looks clear it")
     assert occupied((WALL_X, 1.0, 1.2)), "the wall behind is still there"
 
 
@@ -161,14 +154,14 @@ def test_the_robot_and_known_objects_are_no_obstacles_and_others_are(camera: Cam
     assert add(box("known", *known[0], known[1]))
     filtered: list[Image] = []
     listener = rospy.Subscriber("/move_group/camera/filtered_depth", Image, filtered.append, queue_size=1)
-    wait_until("the filtered image has its listener", lambda: listener.get_num_connections() > 0)
+    until(lambda: listener.get_num_connections() > 0, "the filtered image has its listener")
     depth = camera.depth([near_robot, known, OBSTACLE])
     camera.show(depth)
-    wait_until("the unknown box is occupied", lambda: occupied((-0.7, 0.9, 1.2)))
+    until(lambda: occupied((-0.7, 0.9, 1.2)), "the unknown box is occupied")
     assert not occupied((-0.7, -0.9, 1.3), 0.09), "a known object is not seen twice"
     assert not occupied((seen[0] - 0.04, seen[1], seen[2]), 0.09), "nor is the robot"
     assert validity().valid
-    wait_until("the filtered image came", lambda: bool(filtered))
+    until(lambda: bool(filtered), "the filtered image came")
     left = np.frombuffer(filtered[-1].data, "<u2").reshape(480, 640) / 1000.0
     masked = (left == 0) & (depth < WALL_X - CAMERA_AT[0] - 0.01)
     assert masked[4:-4, 6:-6].sum() > 1000 and np.allclose(left[left > 0], depth[left > 0], atol=2e-3)
@@ -177,9 +170,9 @@ def test_the_robot_and_known_objects_are_no_obstacles_and_others_are(camera: Cam
 def test_an_object_that_becomes_known_leaves_the_octomap(camera: Camera) -> None:
     clear()
     camera.show(camera.depth([OBSTACLE]))
-    wait_until("the box's front is occupied", lambda: occupied((-0.7, 0.9, 1.2)))
+    until(lambda: occupied((-0.7, 0.9, 1.2)), "the box's front is occupied")
     assert add(box("became_known", *OBSTACLE[0], OBSTACLE[1]))
-    wait_until("its voxels are free", lambda: not occupied((-0.7, 0.9, 1.2), 0.09))
+    until(lambda: not occupied((-0.7, 0.9, 1.2), 0.09), "its voxels are free")
 
 
 def cloud(points: np.ndarray, frame: str) -> PointCloud2:
@@ -203,12 +196,12 @@ def test_points_in_a_cloud_are_obstacles_that_can_be_allowed(camera: Camera) -> 
     publisher = rospy.Publisher("/scanner/points", PointCloud2, queue_size=1)
     filtered: list[PointCloud2] = []
     listener = rospy.Subscriber("/move_group/filtered_points", PointCloud2, filtered.append, queue_size=1)
-    wait_until("the filtered cloud has its listener", lambda: listener.get_num_connections() > 0)
-    wait_until("move_group listens to the scanner", lambda: publisher.get_num_connections() > 0)
+    until(lambda: listener.get_num_connections() > 0, "the filtered cloud has its listener")
+    until(lambda: publisher.get_num_connections() > 0, "move_group listens to the scanner")
     assert validity(elbow_joint=REACHED).valid
     publisher.publish(cloud(np.vstack([ball(), [[np.nan] * 3, [90.0, 0.0, 0.0]], wrist()[None]]), "world"))
-    wait_until("the ball is occupied", lambda: occupied(tuple(wrist(REACHED))))
-    wait_until("the rest is published", lambda: bool(filtered))
+    until(lambda: occupied(tuple(wrist(REACHED))), "the ball is occupied")
+    until(lambda: bool(filtered), "the rest is published")
     assert filtered[-1].width == 200, "without the point on the robot and those without a place or out of range"
     touching = validity(elbow_joint=REACHED)
     assert not touching.valid
@@ -226,7 +219,7 @@ def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_se
                                                                                    arm: FakeArm) -> None:
     clear()
     publisher = rospy.Publisher("/scanner/points", PointCloud2, queue_size=1)
-    wait_until("move_group listens to the scanner", lambda: publisher.get_num_connections() > 0)
+    until(lambda: publisher.get_num_connections() > 0, "move_group listens to the scanner")
     ahead = np.array([[0.0, 0.0, 0.4]])
     poses = {}
     for turn in (0.0, 0.7):
@@ -240,10 +233,10 @@ def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_se
     arm.positions["shoulder_pan_joint"] = START[0] + 0.7
     arm.settle()
     publisher.publish(message)
-    wait_until("the point is where the link was", lambda: occupied(tuple(poses[0.0])))
+    until(lambda: occupied(tuple(poses[0.0])), "the point is where the link was")
     assert not occupied(tuple(poses[0.7]))
     publisher.publish(cloud(ahead, "wrist_1_link"))
-    wait_until("and then where it is", lambda: occupied(tuple(poses[0.7])))
+    until(lambda: occupied(tuple(poses[0.7])), "and then where it is")
     arm.positions["shoulder_pan_joint"] = START[0]
 
 
@@ -253,18 +246,18 @@ def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> 
     rospy.Subscriber("/move_group/monitored_planning_scene", PlanningScene, told.append, queue_size=50)
     cubes: list[MarkerArray] = []
     rospy.Subscriber("/move_group/octomap_markers", MarkerArray, cubes.append, queue_size=5)
-    wait_until("the whole scene came first", lambda: bool(told))
+    until(lambda: bool(told), "the whole scene came first")
     camera.show(camera.depth([OBSTACLE]))
-    wait_until("the map is told", lambda: any(item.world.octomap.octomap.id == "OcTree" for item in told))
+    until(lambda: any(item.world.octomap.octomap.id == "OcTree" for item in told), "the map is told")
     path = tmp_path / "room.bt"
     assert call("/move_group/save_map", SaveMap, str(path)).success
     before = octomap()
     assert before is not None and np.array_equal(read_file(path).occupied_keys, before.occupied_keys)
-    wait_until("the cubes are shown", lambda: bool(cubes) and len(cubes[-1].markers[-1].points) == len(
-        before.occupied_keys))
+    until(lambda: bool(cubes) and len(cubes[-1].markers[-1].points) == len(before.occupied_keys),
+          "the cubes are shown")
     known = len(told)
     clear()
-    wait_until("the clearing is told", lambda: any(item.world.octomap.octomap.id == "cleared" for item in told[known:]))
+    until(lambda: any(item.world.octomap.octomap.id == "cleared" for item in told[known:]), "the clearing is told")
     assert call("/move_group/load_map", LoadMap, str(path)).success
     after = octomap()
     assert after is not None and np.array_equal(after.occupied_keys, before.occupied_keys)
@@ -276,16 +269,16 @@ def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> 
         PlanningSceneComponents.OCTOMAP)).scene.world
     clear()
     publisher = rospy.Publisher("/planning_scene_world", PlanningSceneWorld, queue_size=1)
-    wait_until("move_group listens to planning_scene_world", lambda: publisher.get_num_connections() > 0)
+    until(lambda: publisher.get_num_connections() > 0, "move_group listens to planning_scene_world")
     sent.octomap.origin = Pose(Point(0, 0, 0.5), Quaternion(0, 0, 0, 1))
     publisher.publish(sent)
-    wait_until("an octomap that was sent is in the scene", lambda: octomap() is not None)
+    until(lambda: octomap() is not None, "an octomap that was sent is in the scene")
 
 
 def test_looks_that_cannot_be_placed_are_left_out(camera: Camera) -> None:
     clear()
     publisher = rospy.Publisher("/scanner/points", PointCloud2, queue_size=5)
-    wait_until("move_group listens to the scanner", lambda: publisher.get_num_connections() > 0)
+    until(lambda: publisher.get_num_connections() > 0, "move_group listens to the scanner")
     good = np.array([[1.0, 1.0, 1.0]])
     broken = cloud(good, "world")
     broken.data = b"12"
@@ -296,4 +289,4 @@ def test_looks_that_cannot_be_placed_are_left_out(camera: Camera) -> None:
         time.sleep(1.5)
     assert octomap() is None
     publisher.publish(cloud(good, "world"))
-    wait_until("the node lives, the next look counts", lambda: occupied((1.0, 1.0, 1.0)))
+    until(lambda: occupied((1.0, 1.0, 1.0)), "the node lives, the next look counts")

@@ -38,8 +38,8 @@ from planning_wire import (
     joint_goal,
     report_of,
     table,
-    until,
 )
+from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 

@@ -12,7 +12,8 @@ import actionlib
 import rospy
 from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal
 from moveit_msgs.srv import GetMotionPlan, GetPositionIK, GetPositionIKRequest
-from planning_wire import ARM, LAUNCH, FakeArm, joint_goal, request, until
+from planning_wire import ARM, LAUNCH, FakeArm, joint_goal, request
+from ros_session import until
 
 LOADED_S = 1.5
 

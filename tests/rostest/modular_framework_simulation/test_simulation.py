@@ -2,6 +2,7 @@
 """The simulation as its users see it on the wire: clock, controllers, Gazebo's services and topics, planning scene."""
 from __future__ import annotations
 
+import functools
 import subprocess
 import threading
 import time
@@ -27,6 +28,7 @@ from gazebo_msgs.srv import (
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import CollisionObject
 from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneResponse
+from ros_session import until as wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -50,6 +52,8 @@ START = [1.57, -1.57, 1.57, -1.57, -1.57, 0.0]
 BALL = """<sdf version="1.6"><model name="ball"><link name="link"><inertial><mass>0.1</mass><inertia><ixx>4e-5</ixx>
   <iyy>4e-5</iyy><izz>4e-5</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.03</radius>
   </sphere></geometry></collision></link></model></sdf>"""
+
+until = functools.partial(wait_until, timeout_s=10.0)
 
 
 class FakePlanningScene:
@@ -81,13 +85,6 @@ def call(name: str, kind: Any, *values: Any, **fields: Any) -> Any:
     return rospy.ServiceProxy(name, kind)(*values, **fields)
 
 
-def eventually(what: str, true: Callable[[], bool], timeout_s: float = 10.0) -> None:
-    end = time.monotonic() + timeout_s
-    while not true():
-        assert time.monotonic() < end, f"{what}: not within {timeout_s} s"
-        time.sleep(0.02)
-
-
 def spawn(name: str, x: float, y: float, z: float, frame: str = "world", xml: str = BALL) -> Any:
     pose = Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))
     return call("/gazebo/spawn_sdf_model", SpawnModel, name, xml, "", pose, frame)
@@ -104,7 +101,7 @@ def test_the_clock_runs_at_a_hundred_hertz_of_simulated_time_and_in_real_time(si
     stamps: list[float] = []
     begin = time.monotonic()
     subscriber = rospy.Subscriber("/clock", Clock, lambda message: stamps.append(message.clock.to_sec()))
-    eventually("two seconds of clock", lambda: len(stamps) > 200, 15.0)
+    until(lambda: len(stamps) > 200, "two seconds of clock", timeout_s=15.0)
     subscriber.unregister()
     assert time.monotonic() - begin < 8.0
     steps = [b - a for a, b in zip(stamps[10:], stamps[11:], strict=False)]
@@ -158,12 +155,12 @@ def test_a_model_is_spawned_in_a_frame_read_put_elsewhere_and_deleted(simulation
 def test_a_model_can_be_put_elsewhere_by_topic(simulation: Any) -> None:
     assert spawn("ball", 1.0, -1.0, 0.1).success
     publisher = rospy.Publisher("/gazebo/set_model_state", ModelState, queue_size=1)
-    eventually("a subscriber of set_model_state", lambda: publisher.get_num_connections() > 0)
+    until(lambda: publisher.get_num_connections() > 0, "a subscriber of set_model_state")
     publisher.publish(ModelState("nothing", Pose(), None, ""))
     publisher.publish(ModelState(model_name="ball", pose=Pose(Point(2.0, -1.0, 0.1), Quaternion(0, 0, 0, 1))))
     try:
         read = lambda: call("/gazebo/get_model_state", GetModelState, "ball", "").pose.position.x  # noqa: E731
-        eventually("the ball at its new place", lambda: abs(read() - 2.0) < 0.05)
+        until(lambda: abs(read() - 2.0) < 0.05, "the ball at its new place")
     finally:
         call("/gazebo/delete_model", DeleteModel, "ball")
 
@@ -225,7 +222,7 @@ def test_time_stands_still_while_paused(simulation: Any) -> None:
     finally:
         call("/gazebo/unpause_physics", Empty)
     fallen = lambda: call("/gazebo/get_model_state", GetModelState, "ball", "").pose.position.z < 0.9  # noqa: E731
-    eventually("the ball to fall", fallen)
+    until(fallen, "the ball to fall")
     call("/gazebo/delete_model", DeleteModel, "ball")
 
 
@@ -258,27 +255,27 @@ def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -
     scene = FakePlanningScene()
     try:
         expected = {"table__link", "wood_block__link", "can__link", "l_bracket__link", "ground_plane__link"}
-        eventually("the objects of the world", lambda: expected <= scene.objects.keys())
+        until(lambda: expected <= scene.objects.keys(), "the objects of the world")
         block = scene.objects["wood_block__link"]
         assert block.header.frame_id == "world"
         assert list(block.primitives[0].dimensions) == pytest.approx([0.05, 0.05, 0.1])
         assert len(scene.objects["ground_plane__link"].planes) == 1
         assert spawn("ball", 0.25, 0.65, 0.88).success
-        eventually("the new ball", lambda: "ball__link" in scene.objects)
+        until(lambda: "ball__link" in scene.objects, "the new ball")
         away = ModelState(model_name="ball", pose=Pose(Point(-0.2, 0.7, 0.88), Quaternion(0, 0, 0, 1)))
         assert call("/gazebo/set_model_state", SetModelState, away).success
-        eventually("the moved ball", lambda: abs(scene.poses["ball__link"].x + 0.2) < 0.02)
+        until(lambda: abs(scene.poses["ball__link"].x + 0.2) < 0.02, "the moved ball")
         call("/gazebo/pause_physics", Empty)
         assert spawn("cube", 0.25, 0.75, 0.88).success
-        eventually("the cube spawned while time stands still", lambda: "cube__link" in scene.objects)
+        until(lambda: "cube__link" in scene.objects, "the cube spawned while time stands still")
         assert call("/gazebo/delete_model", DeleteModel, "cube").success
-        eventually("the cube to vanish while time stands still", lambda: "cube__link" not in scene.objects)
+        until(lambda: "cube__link" not in scene.objects, "the cube to vanish while time stands still")
         call("/gazebo/unpause_physics", Empty)
         scene.refuse = True
         assert call("/gazebo/delete_model", DeleteModel, "ball").success
         time.sleep(0.5)
         scene.refuse = False
-        eventually("the ball to vanish", lambda: "ball__link" not in scene.objects)
+        until(lambda: "ball__link" not in scene.objects, "the ball to vanish")
     finally:
         call("/gazebo/unpause_physics", Empty)
         scene.service.shutdown("test")

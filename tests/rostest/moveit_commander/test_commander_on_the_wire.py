@@ -20,6 +20,7 @@ from moveit_msgs.msg import (
     RobotTrajectory,
     TrajectoryConstraints,
 )
+from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -59,7 +60,8 @@ def session(ros_launch: Callable[..., Any]) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def robot(session: Any) -> RobotCommander:
     robot = RobotCommander()
-    until(lambda: len(rospy.wait_for_message("joint_states", JointState, 30.0).name) >= 7, 30.0)
+    until(lambda: len(rospy.wait_for_message("joint_states", JointState, 30.0).name) >= 7,
+          "joint states of the arm and the gripper")
     return robot
 
 
@@ -69,13 +71,6 @@ def arm(robot: RobotCommander) -> MoveGroupCommander:
     arm.set_max_velocity_scaling_factor(1.0)
     arm.set_max_acceleration_scaling_factor(1.0)
     return arm
-
-
-def until(condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"not so within {timeout_s} s"
-        time.sleep(0.02)
 
 
 def stamped(x: float, y: float, z: float, frame: str = "world") -> PoseStamped:
@@ -391,7 +386,7 @@ def test_go_takes_every_kind_of_target(arm: MoveGroupCommander) -> None:
     arm.set_joint_value_target(NEAR)
     assert arm.go() and is_at(arm, NEAR)
     assert arm.go(list(START.values()), wait=False) is True
-    until(lambda: is_at(arm, list(START.values())))
+    until(lambda: is_at(arm, list(START.values())), "the arm where it was sent")
     assert arm.plan("here")[0] and arm.plan(GOAL)[0]
 
 
@@ -400,7 +395,7 @@ def test_a_motion_can_be_stopped_and_not_waited_for(arm: MoveGroupCommander) -> 
     slow = arm.plan([0.5, *NEAR[1:]])[1]
     arm.set_max_velocity_scaling_factor(1.0)
     assert arm.execute(slow.joint_trajectory, wait=False) is True
-    until(lambda: arm.get_current_joint_values()[0] < 1.55)
+    until(lambda: arm.get_current_joint_values()[0] < 1.55, "the motion under way")
     arm.stop()
     places = [arm.get_current_joint_values()]
 
@@ -409,7 +404,7 @@ def test_a_motion_can_be_stopped_and_not_waited_for(arm: MoveGroupCommander) -> 
         places.append(arm.get_current_joint_values())
         return places[-1] == pytest.approx(places[-2], abs=1e-4)
 
-    until(stands_still)  # the controller's ramp to rest takes half a second
+    until(stands_still, "the arm at rest")  # the controller's ramp to rest takes half a second
     assert places[-1][0] > 0.6
     assert arm.go("here")
 

@@ -41,6 +41,7 @@ from moveit_msgs.msg import (
     TrajectoryConstraints,
 )
 from moveit_msgs.srv import GetPlannerParams, SetPlannerParams
+from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -377,17 +378,11 @@ def test_objects_of_the_scene(scene: PlanningSceneInterface, tmp_path: Path) -> 
 
 
 def test_a_group_holds_an_object(arm: MoveGroupCommander, scene: PlanningSceneInterface) -> None:
-    def until(held: bool) -> None:
-        deadline = time.monotonic() + 30.0
-        while ("tool" in scene.get_attached_objects()) != held:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-
     scene.add_box("tool", stamped(1.5, 0.0, 0.5), (0.05, 0.05, 0.05))
     assert arm.attach_object("tool", "panda_hand", FINGERS)
-    until(True)
+    until(lambda: "tool" in scene.get_attached_objects(), "the tool attached")
     assert arm.detach_object("tool")
-    until(False)
+    until(lambda: "tool" not in scene.get_attached_objects(), "the tool detached")
     scene.clear()
 
 

@@ -36,6 +36,7 @@ from moveit_msgs.msg import (
     RobotTrajectory,
 )
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
+from ros_session import until
 from std_msgs.msg import Header
 
 LAUNCH = """<launch>
@@ -66,13 +67,6 @@ def arm(scene: PlanningSceneInterface) -> MoveGroupCommander:
 def empty(scene: PlanningSceneInterface) -> None:
     scene.clear()
     assert scene.get_known_object_names() == [] and scene.get_attached_objects() == {}
-
-
-def until(condition: Callable[[], bool], timeout_s: float = 30.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"not so within {timeout_s} s"
-        time.sleep(0.02)
 
 
 def at(x: float, y: float, z: float, frame: str = "world") -> PoseStamped:
@@ -170,11 +164,12 @@ def test_scenes_are_read_and_applied_whole(scene: PlanningSceneInterface) -> Non
 
 def test_an_asynchronous_scene_publishes(scene: PlanningSceneInterface) -> None:
     quick = PlanningSceneInterface(synchronous=False)
-    until(lambda: quick._objects.get_num_connections() > 0 and quick._attachments.get_num_connections() > 0)
+    until(lambda: quick._objects.get_num_connections() > 0 and quick._attachments.get_num_connections() > 0,
+          "listeners to what it publishes")
     quick.add_box("block", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
-    until(lambda: scene.get_known_object_names() == ["block"])
+    until(lambda: scene.get_known_object_names() == ["block"], "the block in the scene")
     quick.attach_object("block", PALM)
-    until(lambda: set(scene.get_attached_objects()) == {"block"})
+    until(lambda: set(scene.get_attached_objects()) == {"block"}, "the block attached")
 
 
 def test_a_group_attaches_and_detaches(scene: PlanningSceneInterface, arm: MoveGroupCommander) -> None:
@@ -184,16 +179,16 @@ def test_a_group_attaches_and_detaches(scene: PlanningSceneInterface, arm: MoveG
     for name in ("first", "second"):
         scene.add_box(name, at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
     assert arm.attach_object("first") is True
-    until(lambda: attached() == {"first": "eg_manipulator"})
+    until(lambda: attached() == {"first": "eg_manipulator"}, "the first attached")
     assert arm.attach_object("second", PALM, [PALM, "tool0"])
-    until(lambda: attached() == {"first": "eg_manipulator", "second": PALM})
+    until(lambda: attached() == {"first": "eg_manipulator", "second": PALM}, "both attached")
     assert set(scene.get_attached_objects()["second"].touch_links) == {PALM, "tool0"}
     assert arm.detach_object("second") is True
-    until(lambda: attached() == {"first": "eg_manipulator"})
+    until(lambda: attached() == {"first": "eg_manipulator"}, "only the first attached")
     assert arm.detach_object("eg_manipulator")
-    until(lambda: attached() == {})
+    until(lambda: attached() == {}, "all detached that the hand holds")
     assert arm.attach_object("first") and arm.detach_object()
-    until(lambda: attached() == {})
+    until(lambda: attached() == {}, "everything detached")
     assert set(scene.get_known_object_names()) == {"first", "second"}
 
 

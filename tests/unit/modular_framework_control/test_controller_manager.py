@@ -289,6 +289,40 @@ def test_hardware_that_raises_in_a_switch_leaves_nothing_waiting(slow: Any) -> N
     assert slow.states()["left"] == "aborted"
 
 
+@pytest.mark.parametrize("asked", ["check_for_conflict", "prepare_switch"])
+def test_hardware_that_raises_before_a_switch_is_told_and_nothing_is_switched(slow: Any, asked: str) -> None:
+    def break_down(*arguments: Any) -> Any:
+        raise OSError("line is dead")
+
+    setattr(slow.robot_hw, asked, break_down)
+    raised = slow.switch(["left"], [])
+    assert isinstance(raised, ControllerError)
+    assert "of the hardware raised OSError: line is dead" in str(raised)
+    assert slow.states()["left"] == "initialized" and not slow.robot_hw.switches
+
+
+def test_a_controller_whose_topics_cannot_be_opened_is_closed_and_not_loaded(make_loop: Callable[..., Any]) -> None:
+    class Opened(Recorder):
+        """Opens something in `init`, as a user's controller may."""
+
+        def close(self) -> None:
+            closed.append(True)
+
+    def attach(name: str, controller: Controller) -> Callable[[], None]:
+        raise OSError("no such topic")
+
+    closed: list[bool] = []
+    known = types()
+    known.register("test/Recorder", Opened)
+    loop = make_loop(PARAMETERS, types=known)
+    attached, loop.manager._attach = loop.manager._attach, attach
+    with pytest.raises(ControllerError, match="cannot load controller 'left': .* raised OSError: no such topic"):
+        loop.manager.load_controller("left")
+    assert closed == [True] and loop.states() == {}
+    loop.manager._attach = attached
+    loop.spawn("left")
+
+
 def test_a_switch_under_way_when_the_loop_ends_fails_at_once_and_no_other_is_begun(slow: Any) -> None:
     slow.manager._update_wait_s = 30.0
     slow.robot_hw.asks.update(left=10**6)

@@ -158,3 +158,18 @@ def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_l
     before = handle(loop).command
     loop.run(0.1)
     assert handle(loop).command == before
+
+
+def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any) -> None:
+    def fail(told: GripperTicket) -> None:
+        if told.status is GoalStatus.CANCELED:
+            raise ArithmeticError("nobody listens")
+
+    active = GripperTicket(fail)
+    loop.controllers["gripper"].submit(0.4, 0.0, active)
+    loop.run(0.1)
+    taken_up, behind = send(loop, 0.1), send(loop, 0.2)
+    loop.step()
+    assert active.status is GoalStatus.CANCELED
+    assert taken_up.status is behind.status is GoalStatus.REJECTED
+    assert "nobody listens" in taken_up.text and "nobody listens" in behind.text

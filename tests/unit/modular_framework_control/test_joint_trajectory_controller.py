@@ -12,6 +12,7 @@ from scipy.interpolate import BPoly
 
 from modular_framework_control import joint_trajectory_controller
 from modular_framework_control.controller import ControllerError
+from modular_framework_control.controller_switch import ControllerState
 from modular_framework_control.goal_ticket import GoalStatus
 from modular_framework_control.hardware_interface import PositionJointInterface
 from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
@@ -370,3 +371,20 @@ def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_l
     before = commands(loop)
     loop.run(0.2)
     assert commands(loop) == before
+
+
+def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any,
+                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    active = send(loop, (0.5, (0.3, 0.1, 0.1)))
+    loop.run(0.1)
+
+    def splice(*args: Any) -> None:
+        raise ArithmeticError("no such spline")
+
+    monkeypatch.setattr(joint_trajectory_controller, "splice", splice)
+    taken_up, behind = (send(loop, (0.5, (0.3, 0.1, 0.1))) for _ in range(2))
+    loop.step()
+    assert active.status is GoalStatus.ABORTED
+    assert taken_up.status is behind.status is GoalStatus.REJECTED
+    assert "no such spline" in taken_up.text and "no such spline" in behind.text
+    assert [report.state for report in loop.manager.list_controllers()] == [ControllerState.STOPPED]

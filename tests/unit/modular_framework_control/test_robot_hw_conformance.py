@@ -2,6 +2,8 @@
 """One suite over every hardware: fake, simulated, a UR arm and an EZGripper against their emulators, and two as one."""
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -32,8 +34,11 @@ from modular_framework_simulation.sdf_resources import no_packages
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>
 <joint name="elbow" type="continuous"><limit velocity="3" effort="10"/></joint></robot>"""
+SLIDE = """<robot name="r">
+<joint name="finger" type="prismatic"><limit lower="0" upper="0.04" velocity="0.2" effort="10"/></joint></robot>"""
 LIMITED = {"has_position_limits": True, "min_position": -1.0, "max_position": 1.0, "has_velocity_limits": True,
            "max_velocity": 2.0}
+KNUCKLE = {"has_velocity_limits": True, "max_velocity": 2.0}
 ROBOT = """<robot name="lab"><link name="base"/>
 {links}
 </robot>"""
@@ -145,7 +150,7 @@ class TestEzGripper(RobotHWConformance):
     @classmethod
     def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
         """The hardware, with these parameters of the gripper."""
-        root = MappingNodeHandle({"hand": gripper})
+        root = MappingNodeHandle({"hand": gripper, "joint_limits": {JOINT: KNUCKLE}})
         robot_hw = EzGripperRobotHW()
         assert robot_hw.init(root, root.child("hand"))
         return robot_hw
@@ -154,7 +159,7 @@ class TestEzGripper(RobotHWConformance):
         return self.robot_hw
 
     def limits(self) -> Mapping[str, JointLimits]:
-        return {JOINT: JointLimits(0.0, 1.94)}
+        return {JOINT: JointLimits(0.0, 1.94, 2.0)}
 
 
 class TestCombination(TestEzGripper):
@@ -166,7 +171,7 @@ class TestCombination(TestEzGripper):
             "robot_hardware": ["arm", "hand"],
             "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
             "hand": {"type": "lab/Hand", **gripper},
-            "joint_limits": dict.fromkeys(("shoulder", "elbow"), LIMITED)})
+            "joint_limits": {**dict.fromkeys(("shoulder", "elbow"), LIMITED), JOINT: KNUCKLE}})
         kinds: dict[str, type[RobotHW]] = {"lab/Mock": MockRobotHW, "lab/Hand": EzGripperRobotHW}
         robot_hw = CombinedRobotHW(lambda name: kinds[name]())
         assert robot_hw.init(root, root)
@@ -174,3 +179,112 @@ class TestCombination(TestEzGripper):
 
     def limits(self) -> Mapping[str, JointLimits]:
         return {**super().limits(), **dict.fromkeys(("shoulder", "elbow"), JointLimits(-1.0, 1.0, 2.0))}
+
+
+class TestSlidingGripper(TestMock):
+    """Fingers that slide: their whole range is shorter than the jump and the step."""
+
+    tolerance = 0.001
+
+    def make_robot_hw(self) -> MockRobotHW:
+        robot_hw = MockRobotHW()
+        root = MappingNodeHandle({"robot_description": SLIDE, "hw": {"joints": ["finger"]}})
+        assert robot_hw.init(root, root.child("hw"))
+        return robot_hw
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return {"finger": JointLimits(0.0, 0.04, 0.2)}
+
+
+class SuiteThatStalls(TestMock):
+    """The machine does nothing for a while after the last cycle that sees the joint in its place."""
+
+    __test__ = False
+    period_s = 0.01
+    real_time = True
+    stall_s = 0.0
+
+    def advance(self, period_s: float) -> None:
+        time.sleep(self.stall_s)
+        self.stall_s = 0.0
+
+
+class LimitlessMock(TestMock):
+    """Hardware that does not know its limits."""
+
+    __test__ = False
+
+    def make_robot_hw(self) -> MockRobotHW:
+        robot_hw, root = MockRobotHW(), MappingNodeHandle({"hw": {"joints": ["shoulder", "elbow"]}})
+        assert robot_hw.init(root, root.child("hw"))
+        return robot_hw
+
+
+class MockOfOneThread(MockRobotHW):
+    """Has a connection that only the thread may use that used it first, as some libraries have."""
+
+    _owner: int | None = None
+
+    def write(self, time_s: float, period_s: float) -> None:
+        self._owner = self._owner or threading.get_ident()
+        if self._owner != threading.get_ident():
+            raise RuntimeError("a connection of another thread")
+        super().write(time_s, period_s)
+
+
+class SuiteOfOneThread(TestMock):
+    """Hardware that works in one thread only."""
+
+    __test__ = False
+
+    def make_robot_hw(self) -> MockRobotHW:
+        robot_hw = MockOfOneThread()
+        root = MappingNodeHandle({"robot_description": URDF, "hw": {"joints": ["shoulder", "elbow"]}})
+        assert robot_hw.init(root, root.child("hw"))
+        return robot_hw
+
+
+def failures(suite: RobotHWConformance) -> set[str]:
+    """Names of the tests of a suite that its hardware fails."""
+    failed = set()
+    for name in [name for name in dir(suite) if name.startswith("test_")]:
+        suite.setup_method()
+        try:
+            getattr(suite, name)()
+        except (AssertionError, RuntimeError):
+            failed.add(name)
+        finally:
+            suite.teardown_method()
+    return failed
+
+
+def test_hardware_without_limits_fails() -> None:
+    assert failures(LimitlessMock()) == {
+        "test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows",
+        "test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them"}
+
+
+def test_hardware_that_works_in_one_thread_only_fails() -> None:
+    assert "test_each_joint_follows_its_command_and_the_others_stay" in failures(SuiteOfOneThread())
+    assert not failures(TestMock())
+
+
+def test_a_stall_of_the_machine_does_not_make_a_joint_seem_faster() -> None:
+    suite = SuiteThatStalls()
+    suite.setup_method()
+    robot_hw, handles = suite._ready()
+    goals = {handle.name: handle.position for handle in handles}
+    goals["shoulder"] -= suite.jump
+    suite.stall_s = 0.2
+    assert suite._duration_of_jump(robot_hw, handles[0], goals) >= 0.2
+    suite.teardown_method()
+
+
+def test_targets_stay_within_a_range_that_is_shorter_than_the_jump() -> None:
+    suite = TestSlidingGripper()
+    suite.setup_method()
+    _, (finger,) = suite._ready()
+    for position, target in ((0.0, 0.04), (0.01, 0.04), (0.03, 0.0), (0.04, 0.0)):
+        finger.state.position = position
+        assert suite._target(finger, suite.jump) == pytest.approx(target, abs=1e-9)
+    suite.teardown_method()

@@ -12,6 +12,10 @@ from modular_framework_core.grasp_server import (
     effort_limits,
     judge,
     posture_targets,
+    proved,
+    refuse_no_effort,
+    torque_intensities,
+    torque_share,
 )
 from modular_framework_core.robot_groups import RobotModelError, read_group, read_joints
 
@@ -68,12 +72,76 @@ def test_a_posture_that_does_not_fit_the_hand_is_refused(names: list[str], posit
 
 
 def test_effort_is_the_share_of_what_the_joint_can_do() -> None:
-    assert effort_limits({"f": 1.0}, {"f": -0.5}, HAND, 0.5) == {"f": pytest.approx(0.5)}
-    assert effort_limits({"f": 1.0}, {}, HAND, 1.0) == {"f": 2.0}
-    with pytest.raises(GraspCommandError, match="intensity"):
-        effort_limits({"f": 1.0}, {"f": 1.5}, HAND, 1.0)
-    with pytest.raises(GraspCommandError, match="max_torque"):
-        effort_limits({"f": 1.0}, {}, HAND, 0.0)
+    assert effort_limits({"f": 1.0}, {"f": -0.5}, HAND, 0.5, Stage.PREGRASP) == {"f": pytest.approx(0.5)}
+    assert effort_limits({"f": 1.0}, {}, HAND, 1.0, Stage.GRASP) == {"f": 2.0}
+
+
+def test_no_torque_is_not_taken_for_the_torque_of_the_controller() -> None:
+    arm = read_group(URDF, SRDF, "arm")
+    assert effort_limits({"f": 1.0}, {"f": 0.0}, HAND, 1.0, Stage.GRASP) == {"f": 0.0}
+    assert effort_limits({"a": 1.0}, {}, arm, 0.5, Stage.GRASP) == {"a": 5.0}
+    assert effort_limits({"b": 1.0}, {}, arm, 0.5, Stage.GRASP) == {}
+    assert effort_limits({"b": 1.0}, {"b": 0.0}, arm, 0.5, Stage.GRASP) == {"b": 0.0}
+    with pytest.raises(GraspCommandError, match="joint 'f' is to move with no torque, allowed is more than 0"):
+        refuse_no_effort("f", 0.0)
+
+
+@pytest.mark.parametrize("stage", [Stage.PREGRASP, Stage.POSTGRASP])
+def test_no_torque_for_a_posture_is_the_torque_of_the_controller(stage: Stage) -> None:
+    assert effort_limits({"f": 1.0}, {"f": 0.0}, HAND, 1.0, stage) == {}
+
+
+def test_the_greatest_torque_is_a_share_of_the_full_one() -> None:
+    assert (torque_share(400.0, 800.0), torque_share(900.0, 800.0)) == (0.5, 1.0)
+
+
+@pytest.mark.parametrize("torque", [0.0, -1.0, float("nan"), float("inf"), float("-inf")])
+def test_a_greatest_torque_that_is_no_positive_number_is_refused(torque: float) -> None:
+    with pytest.raises(GraspCommandError, match=f"max_torque is {torque}, allowed are numbers of more than 0"):
+        torque_share(torque, 800.0)
+
+
+@pytest.mark.parametrize(("names", "values", "hint"), [
+    (["f"], [1.0, 1.0], "1 joint names and 2 values"), ([], [1.0], "0 joint names and 1 values"),
+    (["f", "f"], [1.0, 1.0], "twice"), (["x"], [1.0], "no active joint"), (["f"], [1.5], "is 1.5, allowed is -1 to 1"),
+    (["f"], [float("nan")], "is nan, allowed is -1 to 1"), (["f"], [float("inf")], "is inf")])
+def test_torque_intensities_that_do_not_fit_the_hand_are_refused(names: list[str], values: list[float],
+                                                                 hint: str) -> None:
+    with pytest.raises(GraspCommandError, match=hint):
+        torque_intensities(names, values, HAND)
+
+
+def test_torque_intensities_are_told_by_joint_and_none_are_none() -> None:
+    assert torque_intensities(["f"], [-0.5], HAND) == {"f": -0.5}
+    assert torque_intensities([], [], HAND) == {}
+    assert torque_intensities(["f"], [], HAND) == {}
+
+
+STALL = Outcome({"f": 0.4}, True, "so said the controller")
+
+
+@pytest.mark.parametrize(("outcome", "begun", "held"), [
+    (STALL, 0.38, None), (Outcome({"f": 0.4}, True, pressing=True), 0.4, None),
+    (STALL, 0.4, Outcome({"f": 0.41}, True))])
+def test_fingers_that_moved_or_press_or_go_on_holding_were_stopped_by_something(outcome: Outcome, begun: float,
+                                                                                 held: Outcome | None) -> None:
+    assert proved(outcome, {"f": begun}, {"f": 1.94}, 0.05, held) is outcome
+
+
+@pytest.mark.parametrize(("begun", "held"), [
+    ({"f": 0.4}, None), ({"f": 0.395}, None), ({"f": 0.8}, None), ({}, None), ({"f": 0.4}, Outcome({"f": 0.6}, True)),
+    ({}, Outcome({"f": 0.4}, True))])
+def test_fingers_that_never_moved_hold_nothing(begun: dict[str, float], held: Outcome | None) -> None:
+    outcome = proved(STALL, begun, {"f": 1.94}, 0.05, held)
+    verdict = judge(Stage.GRASP, {"f": 1.94}, outcome, CLOSED, 0.05)
+    assert not verdict.reached
+    assert "have not moved" in verdict.reason and "so said the controller" in verdict.reason
+
+
+def test_of_several_joints_one_that_is_short_of_its_target_must_have_moved() -> None:
+    outcome, targets = Outcome({"f": 0.4, "h": 1.0}, True), {"f": 1.9, "h": 1.0}
+    assert not proved(outcome, {"f": 0.4, "h": 0.0}, targets, 0.05, None).stalled
+    assert proved(outcome, {"f": 0.1, "h": 1.0}, targets, 0.05, None).stalled
 
 
 @pytest.mark.parametrize(("stage", "target", "position", "stalled", "reached", "why"), [

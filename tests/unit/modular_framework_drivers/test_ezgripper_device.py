@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
-from modular_framework_drivers.ezgripper.grip import Motion
+from modular_framework_drivers.ezgripper.grip import Goal, Grip, GripRules, Motion
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
 
 MakeLine = Callable[..., DynamixelLine]
@@ -276,26 +278,65 @@ def test_a_warm_motor_is_reported_before_it_gives_up(line: DynamixelLine, grippe
     assert gripper.state().fault == ""
 
 
-class LockWatch(logging.Handler):
-    """Notes whether the gripper's lock was free whenever something was logged."""
+class SlowGrip(Grip):
+    """Takes as long to take a goal as its thread is put aside."""
 
-    def __init__(self, gripper: EzGripper) -> None:
-        super().__init__()
-        self._lock = gripper._lock
-        self.free: list[tuple[str, bool]] = []
+    def __init__(self) -> None:
+        super().__init__(GripRules(), Goal(0, 0.0, 400))
+        self.begun, self.go_on = threading.Event(), threading.Event()
 
-    def emit(self, record: logging.LogRecord) -> None:
-        self.free.append((record.getMessage(), not self._lock.locked()))
+    def retarget(self, goal: Goal, position: float, time_s: float) -> None:
+        self.begun.set()
+        assert self.go_on.wait(10.0)
+        super().retarget(goal, position, time_s)
 
 
-def test_nothing_is_logged_while_the_control_loop_would_wait_for_it(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.fixture
+def idle() -> EzGripper:
+    """A gripper without a fault whose thread does not run."""
     gripper = EzGripper(GripperSettings("/nowhere"))
-    watch, logger = LockWatch(gripper), logging.getLogger("rosout.ezgripper")
-    caplog.set_level(logging.INFO, logger.name)
-    logger.addHandler(watch)
     gripper._publish(gripper.state().reading, time.monotonic(), "")
-    logger.removeHandler(watch)
-    assert watch.free == [(f"{gripper.settings.name}: in use", True)]
+    return gripper
+
+
+def test_a_control_loop_need_not_wait_for_the_thread_of_the_gripper(idle: EzGripper) -> None:
+    grip = idle._grip = SlowGrip()
+    idle.command(1.0, 300)
+    with ThreadPoolExecutor() as threads:
+        taking = threads.submit(idle._take_orders, 0.0, 0.0)
+        assert grip.begun.wait(10.0)
+        try:
+            number = threads.submit(idle.command, 1.1, 300).result(1.0)
+            threads.submit(idle.stop).result(1.0)
+            threads.submit(idle.command, 1.1, 300).result(1.0)
+        finally:
+            grip.go_on.set()
+        taking.result(10.0)
+    assert grip.goal.position == 1.0
+    idle._take_orders(0.0, 0.1)
+    assert grip.goal.position == 1.1 and grip.goal.number > number
+
+
+def test_the_same_goal_in_every_cycle_begins_nothing_anew(idle: EzGripper) -> None:
+    grip = idle._grip
+    for cycle in range(20):
+        number = idle.command(1.0, 300)
+        idle._take_orders(1.0, 0.1 * cycle)
+        grip.update(1.0, 0.1 * cycle)
+        assert grip.goal.number == number
+    assert grip.motion is Motion.REACHED
+
+
+def test_a_goal_from_before_a_fault_is_void(idle: EzGripper) -> None:
+    idle.command(1.0, 300)
+    idle._report("the cable is out")
+    idle.command(1.1, 300)
+    idle._publish(idle.state().reading, time.monotonic(), "")
+    idle._take_orders(0.0, 0.0)
+    assert idle._grip.goal.position == 0.0
+    idle.command(1.2, 300)
+    idle._take_orders(0.0, 0.0)
+    assert idle._grip.goal.position == 1.2
 
 
 def test_a_gripper_that_comes_late_is_used(make_gripper: MakeGripper) -> None:

@@ -2,10 +2,12 @@
 """How the grasp server moves an EZGripper, without servos."""
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import pytest
 
+from modular_framework_core.grasp_server import GraspCommandError
 from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.grip import Motion
@@ -21,9 +23,16 @@ class ObedientGripper(EzGripper):
         super().__init__(GripperSettings("/nowhere"))
         self._state = replace(self._state, fault="")
 
+    def torque(self) -> int:
+        """Of the latest goal."""
+        assert self._wish.goal is not None
+        return self._wish.goal.torque
+
     def state(self) -> GripperState:
-        reading = replace(self._state.reading, position=self._wanted.position)
-        return replace(self._state, goal=self._wanted, motion=Motion.REACHED, reading=reading)
+        goal = self._wish.goal
+        assert goal is not None
+        reading = replace(self._state.reading, position=goal.position)
+        return replace(self._state, stamp_s=time.monotonic(), goal=goal, motion=Motion.REACHED, reading=reading)
 
 
 @pytest.mark.parametrize(("target", "expected"), [
@@ -32,3 +41,17 @@ def test_a_posture_that_rounding_put_just_outside_the_range_is_its_end(target: f
     wanted = WantedMotion({"knuckle": target}, {"knuckle": 0.4}, 1.0, lambda: False)
     outcome = EzGripperManipulator(ObedientGripper(), "knuckle").move(wanted)
     assert outcome.positions == {"knuckle": expected}
+
+
+@pytest.mark.parametrize(("efforts", "torque"), [({}, 400), ({"knuckle": 0.25}, 200)])
+def test_a_motion_without_a_bound_has_the_torque_the_gripper_starts_with(efforts: dict[str, float],
+                                                                         torque: int) -> None:
+    gripper = ObedientGripper()
+    EzGripperManipulator(gripper, "knuckle").move(WantedMotion({"knuckle": 1.0}, efforts, 1.0, lambda: False))
+    assert gripper.torque() == torque
+
+
+def test_a_motion_with_no_torque_at_all_is_refused() -> None:
+    wanted = WantedMotion({"knuckle": 1.0}, {"knuckle": 0.0}, 1.0, lambda: False)
+    with pytest.raises(GraspCommandError, match="no torque"):
+        EzGripperManipulator(ObedientGripper(), "knuckle").move(wanted)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
 import math
 import os
-import resource
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -170,22 +170,31 @@ def test_the_wrench_at_the_tool_is_a_sensor(make_rig: Callable[..., Rig]) -> Non
     ("garbage", "link to the arm")])
 def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, order: str, reason: str) -> None:
     start = rig.positions
-    for step in range(40):
-        rig.cycle([position + 0.001 * step for position in start])
+    commands = ([position + 0.001 * step for position in start] for step in itertools.count())
+    for _ in range(40):
+        rig.cycle(next(commands))
     rig.arm.order(order)
-    rig.until(lambda: rig.hw.fault() != "")
+    deadline_s = time.monotonic() + PATIENCE_S
+    while rig.hw.fault() == "":
+        assert time.monotonic() < deadline_s
+        rig.cycle(next(commands))
     assert reason in rig.hw.fault()
+    told_at = rig.arm.positions()
     rig.run(0.2)
-    assert rig.hw.fault() != "" and [handle.command for handle in rig.handles] == rig.positions
+    standing = rig.arm.positions()
+    assert standing == pytest.approx(told_at, abs=0.02)     # its way to rest, from 0.125 rad/s
+    rig.run(0.2)
+    assert rig.hw.fault() != "" and rig.arm.positions() == pytest.approx(standing, abs=1e-4)
     for remedy in ("restore", "unlock", "release_emergency_stop", "power_on"):
         rig.arm.order(remedy)
     rig.until(lambda: "takes no commands" in rig.hw.fault() and "call resume" in rig.hw.fault())
     rig.run(0.2)
     assert "resume" in rig.hw.fault(), "it must not go on by itself"
-    standing = rig.positions
+    assert rig.arm.positions() == pytest.approx(standing, abs=1e-4)
+    assert [handle.command for handle in rig.handles] == pytest.approx(standing, abs=1e-4)
     assert rig.resume() == "" and rig.hw.fault() == ""
     rig.run(0.3)
-    assert rig.positions == pytest.approx(standing, abs=1e-4)
+    assert rig.arm.positions() == pytest.approx(standing, abs=1e-4)
     rig.cycle(start)
     rig.until(lambda: rig.positions == pytest.approx(start, abs=1e-3))
 
@@ -246,32 +255,41 @@ def test_a_pause_in_the_midst_of_commands_is_none_either(rig: Rig) -> None:
     assert rig.positions == pytest.approx([position + 0.09 for position in start], abs=1e-3)
 
 
-def scheduling(rig: Rig) -> dict[str, tuple[int, int]]:
-    """Policy and priority of the driver's processes, by their role."""
+def scheduling(rig: Rig) -> dict[str, list[tuple[int, int]]]:
+    """Policy and priority of all threads of the emulator and of the driver's two processes, the main thread first."""
+    modules = {"modular_framework_drivers.emulators.ur_emulator", "modular_framework_drivers.ur.rtde_process"}
     found = {}
     for entry in Path("/proc").iterdir():
         with contextlib.suppress(OSError):
             line = (entry / "cmdline").read_bytes().decode().split("\0") if entry.name.isdigit() else []
-            if "modular_framework_drivers.ur.rtde_process" in line and rig.arm.address in line:
-                number = int(entry.name)
-                found[line[3]] = os.sched_getscheduler(number), os.sched_getparam(number).sched_priority
+            if modules & set(line) and rig.arm.address in line:
+                threads = sorted((thread.name for thread in (entry / "task").iterdir()), key=entry.name.__ne__)
+                name = line[3] if line[3] in ("state", "control") else "emulator"
+                found[name] = [(os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority)
+                               for thread in map(int, threads)]
     return found
 
 
 def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitted_and_wanted(
-        make_rig: Callable[..., Rig]) -> None:
-    other, fifo = (os.SCHED_OTHER, 0), (os.SCHED_FIFO, 60)
-    permitted = os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] >= 80
+        make_rig: Callable[..., Rig], real_time_permitted: bool) -> None:
+    def check(**priorities: int) -> None:
+        found = scheduling(rig)
+        assert set(found) == set(priorities)
+        for role, (main, *others) in found.items():
+            wanted = priorities[role] if real_time_permitted else 0
+            assert main == (os.SCHED_FIFO if wanted else os.SCHED_OTHER, wanted)
+            assert others and max(others) <= main, role      # ur-rtde and the command port have threads
+
     rig = make_rig()
-    expected = dict.fromkeys(("state", "control"), fifo if permitted else other)
-    assert scheduling(rig) == expected
+    check(state=60, control=60, emulator=30)
     rig.arm.order("cut")
     rig.until(lambda: rig.hw.fault() != "")
     rig.arm.order("restore")
     rig.until(lambda: rig.resume() == "")
-    assert scheduling(rig) == expected
+    check(state=60, control=60, emulator=30)
     rig.hw.close()
-    assert scheduling(make_rig(real_time=False)) == dict.fromkeys(("state", "control"), other)
+    rig = make_rig(real_time=False)
+    check(state=0, control=0, emulator=30)
 
 
 @pytest.mark.parametrize("command", [math.nan, 7.0, 1.0])

@@ -5,6 +5,7 @@ The client runs in a process of its own: it stops the whole interpreter while it
 """
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -92,6 +93,21 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
     commanded = [float(line.split(",")[7]) for line in lines]
     assert commanded[0] == pytest.approx(0.0, abs=1e-2) and commanded[-1] == pytest.approx(0.4)
     assert commanded == sorted(commanded)
+
+
+def test_the_log_tells_of_every_cycle_when_asked_to_and_else_of_streamed_positions(arm: EmulatedArm,
+                                                                                   tmp_path: Path) -> None:
+    def lines(**arguments: object) -> list[str]:
+        arm.order("log", path=tmp_path / "log.csv", **arguments)
+        time.sleep(0.3)
+        arm.order("end_log")
+        return (tmp_path / "log.csv").read_text().splitlines()[1:]
+
+    assert lines() == []
+    clock_s = [float(line.split(",")[1]) for line in lines(always=True)]
+    assert len(clock_s) > 20
+    steps_s = [after - before for before, after in itertools.pairwise(clock_s)]
+    assert steps_s == pytest.approx([0.002] * len(steps_s))
 
 
 def test_a_second_program_replaces_the_first(arm: EmulatedArm) -> None:

@@ -13,7 +13,9 @@ import pytest
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.task_constructor.explanation import explain, option_meanings
-from modular_framework_core.task_constructor.option_types import Anything
+from modular_framework_core.task_constructor.loading import load_state_class
+from modular_framework_core.task_constructor.option_checks import declared_types
+from modular_framework_core.task_constructor.option_types import AnyOf, Anything, ListOf, MappingOf, OptionType, Plain
 from modular_framework_core.task_constructor.state_catalogue import STATE_KEYS, StateCatalogue
 
 ROOT = Path(__file__).parents[3]
@@ -54,6 +56,28 @@ def test_every_option_has_a_type_and_a_meaning(name: str) -> None:
         assert not isinstance(option.type, Anything), f"{name}: {option.name} has no type a task can be checked against"
     assert set(meanings) == set(source.options)
     assert all(f"  {name}: " in explain(source) for name in source.options if name not in STATE_KEYS)
+
+
+def parts(kind: OptionType) -> list[OptionType]:
+    """Return a type and all it consists of."""
+    inner = kind.types if isinstance(kind, AnyOf) else (kind.item,) if isinstance(kind, ListOf) else (
+        (kind.value,) if isinstance(kind, MappingOf) else ())
+    return [kind, *(part for item in inner for part in parts(item))]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_number_says_its_limits(name: str) -> None:
+    unlimited = [option.name for option in CATALOGUE.get(name).options.values() for part in parts(option.type)
+                 if isinstance(part, Plain) and part.kind in ("float", "int") and part.limits is None]
+    assert unlimited == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_state_itself_holds_to_what_a_task_is_checked_by(name: str) -> None:
+    source = CATALOGUE.get(name)
+    state = load_state_class(str(source.file), source.class_name)
+    declared = {option: kind for option, kind in declared_types(state.__init__).items() if option != "return"}
+    assert declared == {option.name: option.type for option in source.options.values()}
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))

@@ -87,10 +87,11 @@ def test_the_keys_of_a_nested_machine_are_handed_to_its_container(world: World, 
     inner = "A: {source: move}" if template.startswith("concurrent") else \
         "A: {source: move, transitions: {success: success, fail: fail}}"
     produced = "      outcome_map: {success: {A: success}}\n" if template.startswith("concurrent") else ""
-    keys = "      input_keys: [a, b]\n      output_keys: [c]\n"
-    header = f"{HEADER}  - M:\n      source: {template}\n{keys}{produced}"
-    text = world.generate(f"{header}      states:\n        - {inner}\n")
-    assert "input_keys=['a', 'b']," in text and "output_keys=['c']," in text
+    task = f"{HEADER}  - M:\n      source: {template}\n{produced}      states:\n        - {inner}\n"
+    text = world.generate(f"{task}      input_keys: [a, b]\n      output_keys: [c]\n")
+    arguments = "            input_keys=['a', 'b'],\n            output_keys=['c'],\n"
+    assert f"\n{arguments}        )\n" in text
+    assert world.generate(task) == text.replace(arguments, "")
 
 
 def test_a_state_that_cannot_be_made_is_told_with_its_place_in_the_task(world: World, tmp_path: Path) -> None:

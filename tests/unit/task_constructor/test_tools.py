@@ -85,10 +85,54 @@ def test_a_state_is_explained_from_its_signature_and_docstring(capsys: pytest.Ca
     assert "Outcomes: success, fail (by default)" in page and "Io keys: arm_commander (by default)" in page
 
 
-def test_an_unknown_state_is_explained_by_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--explain", "plann", "", str(STATES), str(TEMPLATES)]) == 1
-    assert "state 'plann' is unknown; allowed: " in (message := capsys.readouterr().err)
-    assert "did you mean 'plan'?" in message
+def explanation(capsys: pytest.CaptureFixture[str], name: str, templates: str = str(TEMPLATES)) -> str:
+    assert main(["--explain", name, "", str(STATES), templates]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("name", "meant"), [("plann", "plan"), ("state_machin", "state_machine")])
+def test_an_unknown_name_is_answered_by_all_names_and_the_nearest(
+        capsys: pytest.CaptureFixture[str], name: str, meant: str) -> None:
+    assert main(["--explain", name, "", str(STATES), str(TEMPLATES)]) == 1
+    message = capsys.readouterr().err
+    assert f"'{name}' is no state and no template; states: allow_manipulator_collisions, " in message
+    assert "templates: concurrent_state_machine, framework_state_machine, " in message
+    assert message.endswith(f"state_machine; did you mean '{meant}'?\n")
+
+
+def test_a_template_is_explained_by_its_keys_and_userdata(capsys: pytest.CaptureFixture[str]) -> None:
+    page = explanation(capsys, "framework_state_machine")
+    assert "Runs one state after the other; its userdata holds what the framework's states work with." in page
+    assert "  node_name: a name, optional, in a task only\n      Name of the ROS node" in page
+    assert "  outcomes: a list of names, required in a task, optional in a nested machine\n" in page
+    assert "  userdata: self.userdata, optional, in a nested machine only\n" in page
+    assert "  states: a list of '- Label: {source: ...}', required\n" in page
+    assert "Userdata it provides: arm_commander, " in page and "default_outcome" not in page
+    assert "Userdata it provides: none" in explanation(capsys, "state_machine")
+    page = explanation(capsys, "concurrent_state_machine")
+    assert "  outcome_map: a mapping {outcome: {label: outcome of that state}}, optional\n" in page
+
+
+def test_a_template_of_ones_own_is_explained_with_the_keys_it_reads(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "timed.template").write_text("class {{ state_machine.type }}(smach.StateMachine):\n"
+                                             '    """Ends\n    in time."""\n    limit = {{ options.time_limit }}\n')
+    (tmp_path / "bare.template").write_text("class {{ state_machine.type }}(smach.StateMachine): pass\n")
+    page = explanation(capsys, "timed", f"{tmp_path}:{TEMPLATES}")
+    assert f"timed: template, {tmp_path}/timed.template\n\nEnds\nin time.\n\n" in page
+    assert "  time_limit: any value, optional\n      Of this template, which reads it as options.time_limit." in page
+    assert "input_keys" not in page and "Userdata it provides: the template does not say" in page
+    assert "(its class has no docstring)" in explanation(capsys, "bare", str(tmp_path))
+
+
+def test_what_the_schema_allows_in_a_header_is_what_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    templates = TemplateCatalogue([TEMPLATES])
+    schema = task_schema(StateCatalogue([STATES]), templates)
+    for root, name in zip(schema["oneOf"], templates.names(), strict=True):
+        nested = schema["definitions"][f"machine_{name}"]
+        explained = [line.split(":")[0].strip() for line in explanation(capsys, name).splitlines()
+                     if line.startswith("  ") and line[2] != " " and ": " in line]
+        assert set(explained) == set(root["properties"]) | set(nested["properties"])
 
 
 @pytest.fixture(scope="module")

@@ -153,7 +153,8 @@ class ControllerManager:
         """Make and initialise the controller whose parameters are below `name`.
 
         Raises:
-            ControllerError: already loaded, no or unknown type, or its `init` failed; says which.
+            ControllerError: already loaded, no or unknown type, its `init` failed, or its topics and actions cannot be
+                opened; says which.
         """
         with self._services:
             if any(entry.name == name for entry in self._loaded):
@@ -166,7 +167,12 @@ class ControllerManager:
                                       f"expected one of: {', '.join(self.types.names)}. Is the controller file loaded?")
             controller = self.types.create(controller_type)
             info = ControllerInfo(name, controller_type, self._init_controller(name, controller, controller_nh))
-            detach = self._attach(name, controller)
+            try:
+                detach = self._attach(name, controller)
+            except Exception as error:  # somebody else's code may raise anything
+                _close(name, controller, lambda: None)
+                raise ControllerError(f"cannot load controller '{name}': opening its topics and actions raised "
+                                      f"{type(error).__name__}: {error}") from error
             self._detach[name] = lambda: _close(name, controller, detach)
             self._loaded = (*self._loaded, LoadedController(info, controller))
 
@@ -212,23 +218,32 @@ class ControllerManager:
             timeout_s: how long the hardware may take to get ready [s of the loop's time]; 0 for no bound.
 
         Raises:
-            ControllerError: refused, in conflict over a joint, refused by the hardware, not started, or not carried
-                out because the control loop did not run or has ended.
+            ControllerError: refused, in conflict over a joint, refused by the hardware, which may also raise, not
+                started, or not carried out because the control loop did not run or has ended.
         """
         with self._services:
             plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop,
                                Strictness.of(strictness))
             if not plan.start and not plan.stop:
                 return
-            conflict = self._robot_hw.check_for_conflict(plan.resulting)
-            if conflict:
-                raise ControllerError(f"cannot switch controllers: {conflict}; stop one of them in the same request")
             request = SwitchRequest(plan, start_asap, timeout_s)
-            if not self._robot_hw.prepare_switch(*request.hardware_lists):
-                raise ControllerError("cannot switch controllers: the hardware refused to prepare for it")
+            self._prepare(request)
             self._hand_over(request)
             if request.errors:
                 raise ControllerError("; ".join(request.errors))
+
+    def _prepare(self, request: SwitchRequest) -> None:
+        """Ask the hardware whether it can do the switch."""
+        try:
+            conflict = self._robot_hw.check_for_conflict(request.plan.resulting)
+            prepared = not conflict and self._robot_hw.prepare_switch(*request.hardware_lists)
+        except Exception as error:  # a user's hardware may raise anything
+            raise ControllerError("cannot switch controllers: check_for_conflict() or prepare_switch() of the hardware "
+                                  f"raised {type(error).__name__}: {error}") from error
+        if conflict:
+            raise ControllerError(f"cannot switch controllers: {conflict}; stop one of them in the same request")
+        if not prepared:
+            raise ControllerError("cannot switch controllers: the hardware refused to prepare for it")
 
     def _hand_over(self, request: SwitchRequest) -> None:
         """Put `request` into the slot of the loop and wait until it is done, as long as the loop runs."""

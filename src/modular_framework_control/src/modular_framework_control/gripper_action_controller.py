@@ -7,7 +7,6 @@ aborted with `stalled` set, and the command stays, so that the fingers go on squ
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -15,6 +14,7 @@ from typing import Any, ClassVar
 from modular_framework_control.controller import Controller
 from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
 from modular_framework_control.hardware_interface import HardwareInterface, JointHandle, PositionJointInterface
+from modular_framework_control.mailbox import Mailbox
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
 
@@ -71,7 +71,7 @@ class GripperActionController(Controller):
 
     def __init__(self) -> None:
         self.on_feedback: Callable[[GripperTicket, GripperState], None] | None = None
-        self._mailbox: deque[_Order | GripperTicket] = deque()
+        self._mailbox: Mailbox[_Order | GripperTicket] = Mailbox()
         self._active: _Order | None = None
         self._running = False
         self._command = 0.0
@@ -111,13 +111,13 @@ class GripperActionController(Controller):
         if not math.isfinite(position) or not math.isfinite(max_effort) or max_effort < 0.0:
             raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers and an "
                                    "effort of at least 0 (0 = default)")
-        self._mailbox.append(_Order(position, max_effort, ticket))
+        self._mailbox.put(_Order(position, max_effort, ticket))
         if not self._running:
             self._reject_waiting("the controller was stopped")
 
     def cancel(self, ticket: GripperTicket) -> None:
         """Ask the control loop to stop working on the goal of `ticket`."""
-        self._mailbox.append(ticket)
+        self._mailbox.put(ticket)
 
     # ---- control loop ----
 
@@ -147,31 +147,27 @@ class GripperActionController(Controller):
         self._finish(status, self._state(False, False), text)
         self._reject_waiting(text)
 
-    def _next_from_mailbox(self) -> _Order | GripperTicket | None:
-        try:
-            return self._mailbox.popleft()
-        except IndexError:  # asking first would not do: two threads may empty it
-            return None
-
     def _reject_waiting(self, text: str) -> None:
-        while (order := self._next_from_mailbox()) is not None:
+        for order in self._mailbox.taken():
             if isinstance(order, _Order):
                 order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), text)
 
     def update(self, time_s: float, period_s: float) -> None:
-        while (order := self._next_from_mailbox()) is not None:
-            if isinstance(order, _Order) and self._fault:
-                order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), self._fault)
-            elif isinstance(order, _Order):
-                self._take_up(order, time_s)
-            elif self._active is not None and self._active.ticket is order:
-                self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
-                self._hold()
+        self._mailbox.work_off(lambda order: self._carry_out(order, time_s))
         if self._fault:
             self._hold()
         self._apply(period_s)
         if self._active is not None:
             self._check(self._active, time_s)
+
+    def _carry_out(self, order: _Order | GripperTicket, time_s: float) -> None:
+        if isinstance(order, _Order) and self._fault:
+            order.ticket.finish(GoalStatus.REJECTED, self._state(False, False), self._fault)
+        elif isinstance(order, _Order):
+            self._take_up(order, time_s)
+        elif self._active is not None and self._active.ticket is order:
+            self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
+            self._hold()
 
     def _take_up(self, order: _Order, time_s: float) -> None:
         self._finish(GoalStatus.CANCELED, self._state(False, False), "preempted by a new goal")

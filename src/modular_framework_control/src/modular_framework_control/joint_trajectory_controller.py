@@ -8,7 +8,6 @@ stands still with the robot.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -19,6 +18,7 @@ from modular_framework_control.controller_switch import LOGGER
 from modular_framework_control.goal_ticket import GoalStatus
 from modular_framework_control.hardware_interface import HardwareInterface, PositionJointInterface
 from modular_framework_control.joint_limits import limits_from_urdf
+from modular_framework_control.mailbox import Mailbox
 from modular_framework_control.node_handle import NodeHandle, read_bool, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
 from modular_framework_control.robot_hw import speed_scaling_handles
@@ -64,7 +64,7 @@ class JointTrajectoryController(Controller):
         self.on_state: Callable[[TrajectorySnapshot], None] | None = None
         self.on_feedback: Callable[[TrajectoryTicket, TrajectorySnapshot], None] | None = None
         self._handles: list[Any] = []
-        self._mailbox: deque[TrajectoryOrder | TrajectoryTicket] = deque()
+        self._mailbox: Mailbox[TrajectoryOrder | TrajectoryTicket] = Mailbox()
         self._running = False
         self._active: TrajectoryOrder | None = None
         self._fault = ""
@@ -98,13 +98,13 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
-        self._mailbox.append(order_of(goal, ticket, self.joint_names, self._tolerances, self._allow_partial))
+        self._mailbox.put(order_of(goal, ticket, self.joint_names, self._tolerances, self._allow_partial))
         if not self._running:
             self._reject_waiting("the controller was stopped")
 
     def cancel(self, ticket: TrajectoryTicket) -> None:
         """Ask the control loop to stop following the goal of `ticket`."""
-        self._mailbox.append(ticket)
+        self._mailbox.put(ticket)
 
     def desired_at(self, time_s: float) -> Array:
         """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), if the robot lets itself be
@@ -155,21 +155,15 @@ class JointTrajectoryController(Controller):
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
         self._reject_waiting(text)
 
-    def _next_from_mailbox(self) -> TrajectoryOrder | TrajectoryTicket | None:
-        try:
-            return self._mailbox.popleft()
-        except IndexError:  # asking first would not do: two threads may empty it
-            return None
-
     def _reject_waiting(self, text: str) -> None:
-        while (order := self._next_from_mailbox()) is not None:
+        for order in self._mailbox.taken():
             if isinstance(order, TrajectoryOrder) and order.ticket is not None:
                 order.ticket.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
 
     def update(self, time_s: float, period_s: float) -> None:
         self._clock.advance(time_s)
         self._read_actual()
-        self._work_off_mailbox()
+        self._mailbox.work_off(self._carry_out)
         if self._fault:
             self._rest()
         now_s = self._clock.now_s
@@ -205,15 +199,14 @@ class JointTrajectoryController(Controller):
         self._plan.hold(self._actual[POSITION], self._clock.now_s)
         self._command_rest()
 
-    def _work_off_mailbox(self) -> None:
-        while (order := self._next_from_mailbox()) is not None:
-            if isinstance(order, TrajectoryOrder):
-                refusal = self._fault or self._take_up(order)
-                if refusal:
-                    self._refuse(order, refusal)
-            elif self._active is not None and self._active.ticket is order:
-                self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
-                self._stop()
+    def _carry_out(self, order: TrajectoryOrder | TrajectoryTicket) -> None:
+        if isinstance(order, TrajectoryOrder):
+            refusal = self._fault or self._take_up(order)
+            if refusal:
+                self._refuse(order, refusal)
+        elif self._active is not None and self._active.ticket is order:
+            self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
+            self._stop()
 
     def _take_up(self, order: TrajectoryOrder) -> str:
         """Begin to follow a goal: it replaces the goal before it, and its motion from the start of the new one on.

@@ -12,10 +12,13 @@ import gc
 import os
 import resource
 import sys
+import threading
 
 PRIORITY = 80
-HELPER_PRIORITY = 10
+OTHERS_BELOW = 10
+"""How much less urgent the other threads of a process are than the one that matters."""
 _SWITCH_INTERVAL_S = 2e-4
+_LATENCY_DEVICE = "/dev/cpu_dma_latency"
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
 
@@ -29,21 +32,23 @@ def prepare_interpreter() -> None:
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     """Run this process before ordinary ones, the calling thread before its others (SCHED_FIFO); keep its memory in RAM.
 
-    The other threads go first too, as the loop waits while one of them holds Python's interpreter: an ordinary process
-    that takes the processor from that one would hold up the loop.
+    The other threads go first too, as the loop waits while one of them holds Python's interpreter: a process that takes
+    the processor from that one would hold up the loop.
 
     Args:
-        priority: of the calling thread, 1 to 99; what the control loop needs is less urgent than the loop itself.
+        priority: of the calling thread, above OTHERS_BELOW and up to 99; a process that serves the control loop takes
+            less than the loop's other threads have.
 
     Returns:
         What was not permitted and why; nothing when all was.
     """
     refused = []
+    caller = threading.get_native_id()
     try:
-        for thread in os.listdir("/proc/self/task"):
+        os.sched_setscheduler(caller, os.SCHED_FIFO, os.sched_param(priority))
+        for thread in set(map(int, os.listdir("/proc/self/task"))) - {caller}:
             with contextlib.suppress(ProcessLookupError):   # it has ended meanwhile
-                os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(HELPER_PRIORITY))
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority - OTHERS_BELOW))
     except OSError as error:
         refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "
                        f"or docker run --cap-add SYS_NICE --ulimit rtprio={PRIORITY})")
@@ -52,6 +57,33 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
         refused.append(f"locking of memory ({reason}; allow it with memlock unlimited in limits.conf, "
                        "or docker run --ulimit memlock=-1)")
     return refused
+
+
+def processors_for_loop() -> tuple[int, int] | None:
+    """The processors for a control loop and its stand-in: the last two that this process may use, None if it has one.
+
+    The first ones serve most interrupts; `taskset` and `isolcpus` decide which may be used at all. A loop that does not
+    go before all others (SCHED_FIFO) is better off where the system puts it: None as well.
+    """
+    allowed = sorted(os.sched_getaffinity(0))
+    if len(allowed) < 2 or os.sched_getscheduler(0) != os.SCHED_FIFO:
+        return None
+    return allowed[-1], allowed[-2]
+
+
+def keep_processors_awake() -> list[str]:
+    """Keep idle processors from sleep they take time to wake from, as long as this process lives (it costs power).
+
+    Returns:
+        What was not permitted and why; nothing when all was.
+    """
+    try:
+        device = os.open(_LATENCY_DEVICE, os.O_WRONLY | os.O_CLOEXEC)   # the wish holds as long as it is open
+        os.write(device, (0).to_bytes(4, sys.byteorder))
+    except OSError as error:
+        return [f"idle processors kept awake ({_LATENCY_DEVICE}: {error.strerror}; allow to write it with a rule of "
+                f"udev, or docker run --device {_LATENCY_DEVICE})"]
+    return []
 
 
 def _lock_memory() -> str:

@@ -4,13 +4,17 @@
 Subclass `RobotHWConformance` in a test module under a name that begins with Test and say how the hardware is made;
 pytest finds the rest. Hardware that takes long to make may be handed out again by `make_robot_hw`, unless
 `close_after_test` is True.
+
+What belongs into the control loop is called from either of two threads in turn, one at a time, as the loop does.
 """
 from __future__ import annotations
 
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
 
 from modular_framework_control.hardware_interface import (
     ControllerInfo,
@@ -22,6 +26,10 @@ from modular_framework_control.hardware_interface import (
 from modular_framework_control.joint_limits import JointLimits
 from modular_framework_control.robot_hw import RobotHW, SwitchState
 
+ResultT = TypeVar("ResultT")
+TIMELY_SHARE = 0.7
+"""Of the time that a jump takes at the greatest velocity; who is there in less was faster."""
+
 
 class RobotHWConformance(ABC):
     """Tests of one hardware.
@@ -31,6 +39,8 @@ class RobotHWConformance(ABC):
         settle_s: how long a joint may take for a step of `step` [s].
         ready_s: how long the hardware may take until it has no fault [s].
         step: size of the steps [rad|m].
+        jump: size of the step whose speed is watched, less where a joint has no room for it; it takes many cycles at
+            the greatest velocity [rad|m].
         tolerance: how near a joint must come, and how far an idle one may stray [rad|m].
         real_time: whether the hardware moves by itself, so that each cycle must take its time.
         close_after_test: whether what `make_robot_hw` gave is closed after each test.
@@ -40,6 +50,7 @@ class RobotHWConformance(ABC):
     settle_s = 2.0
     ready_s = 20.0
     step = 0.05
+    jump = 0.4
     tolerance = 0.01
     real_time = False
     close_after_test = True
@@ -61,34 +72,50 @@ class RobotHWConformance(ABC):
         """Called by pytest before each test."""
         self._made: list[RobotHW] = []
         self._time_s = 0.0
+        self._read_s = math.nan
+        self._loops = [ThreadPoolExecutor(1, "loop"), ThreadPoolExecutor(1, "stand-in")]
 
     def teardown_method(self) -> None:
         """Called by pytest after each test."""
+        for loop in self._loops:
+            loop.shutdown()
         if self.close_after_test:
             for robot_hw in self._made:
                 robot_hw.close()
 
+    def _in_loop(self, call: Callable[..., ResultT], *arguments: Any) -> ResultT:
+        """Calls in the other one of the loop's threads than the last time; returns what it returns."""
+        self._loops.reverse()
+        return self._loops[0].submit(call, *arguments).result()
+
+    def _read(self, robot_hw: RobotHW) -> None:
+        self._in_loop(robot_hw.read, self._time_s, self.period_s)
+
     def _cycle(self, robot_hw: RobotHW, goals: Mapping[str, float] | None = None) -> None:
         """Read, command as controllers do (where they are, without `goals`), write; then time passes."""
+        self._in_loop(self._cycle_in_loop, robot_hw, goals)
+        self._time_s += self.period_s
+        self.advance(self.period_s)
+
+    def _cycle_in_loop(self, robot_hw: RobotHW, goals: Mapping[str, float] | None) -> None:
         robot_hw.read(self._time_s, self.period_s)
+        self._read_s = time.monotonic() if self.real_time else self._time_s
         for handle in robot_hw.get(PositionJointInterface).handles:
             handle.command = handle.position if goals is None else goals[handle.name]
         robot_hw.write(self._time_s, self.period_s)
-        self._time_s += self.period_s
-        self.advance(self.period_s)
 
     def _run(self, robot_hw: RobotHW, goals: Mapping[str, float], duration_s: float) -> None:
         for _ in range(round(duration_s / self.period_s)):
             self._cycle(robot_hw, goals)
-        robot_hw.read(self._time_s, self.period_s)
+        self._read(robot_hw)
 
     def _ready(self) -> tuple[RobotHW, list[JointHandle]]:
         """Hardware without a fault that has been told to stay where it is."""
         robot_hw = self.make_robot_hw()
         self._made.append(robot_hw)
-        robot_hw.read(self._time_s, self.period_s)
+        self._read(robot_hw)
         cycles = 0
-        while robot_hw.faults():
+        while self._in_loop(robot_hw.faults):
             assert cycles * self.period_s < self.ready_s, list(robot_hw.faults())
             self._cycle(robot_hw)
             cycles += 1
@@ -97,10 +124,13 @@ class RobotHWConformance(ABC):
             handle.command = handle.position
         return robot_hw, handles
 
-    def _target(self, handle: JointHandle) -> float:
+    def _target(self, handle: JointHandle, distance: float) -> float:
+        """A position that far away, upward where there is room; else the range's farther end."""
         limit = self.limits()[handle.name]
-        up = handle.position + self.step
-        return up if up <= limit.max_position else handle.position - self.step
+        up, down = limit.max_position - handle.position, handle.position - limit.min_position
+        if up >= distance or up >= down:
+            return handle.position + min(distance, up)
+        return handle.position - min(distance, down)
 
     def test_the_constructor_needs_no_arguments(self) -> None:
         assert isinstance(type(self._ready()[0])(), RobotHW)
@@ -123,7 +153,7 @@ class RobotHWConformance(ABC):
     def test_at_rest_it_has_no_fault(self) -> None:
         robot_hw, handles = self._ready()
         self._run(robot_hw, {handle.name: handle.position for handle in handles}, 0.1)
-        assert robot_hw.fault() == "" and not robot_hw.faults()
+        assert self._in_loop(robot_hw.fault) == "" and not self._in_loop(robot_hw.faults)
 
     def test_told_to_stay_it_stays(self) -> None:
         robot_hw, handles = self._ready()
@@ -136,7 +166,7 @@ class RobotHWConformance(ABC):
         goals = {handle.name: handle.position for handle in handles}
         self._run(robot_hw, goals, 0.1)
         for moved in handles:
-            goals[moved.name] = self._target(moved)
+            goals[moved.name] = self._target(moved, self.step)
             self._run(robot_hw, goals, self.settle_s)
             for handle in handles:
                 assert abs(handle.position - goals[handle.name]) <= self.tolerance, (moved.name, handle)
@@ -146,24 +176,39 @@ class RobotHWConformance(ABC):
         goals = {handle.name: handle.position for handle in handles}
         for handle in handles:
             start, seen = handle.position, 0.0
-            goals[handle.name] = self._target(handle)
+            goals[handle.name] = self._target(handle, self.step)
             for _ in range(round(self.settle_s / self.period_s)):
                 self._cycle(robot_hw, goals)
-                robot_hw.read(self._time_s, self.period_s)
+                self._read(robot_hw)
                 seen = max(seen, handle.velocity, key=abs)
             assert seen * (handle.position - start) > 0.0, handle
 
     def test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows(self) -> None:
         robot_hw, handles = self._ready()
-        goals = {handle.name: self._target(handle) for handle in handles}
-        windows = [[handle.position for handle in handles]]
-        for _ in range(round(self.settle_s / self.period_s)):
+        limits = self.limits()
+        limited = [handle for handle in handles if math.isfinite(limits[handle.name].max_velocity)]
+        assert limited, f"limits() tells no finite max_velocity of any of {[handle.name for handle in handles]}"
+        goals = {handle.name: handle.position for handle in handles}
+        for handle in limited:
+            goals[handle.name] = self._target(handle, self.jump)
+            jump = abs(goals[handle.name] - handle.position)
+            least_s = TIMELY_SHARE * (jump - 2.0 * self.tolerance) / limits[handle.name].max_velocity
+            assert least_s >= 5 * self.period_s, (
+                f"a jump of {jump} of {handle.name} takes too few cycles; give a greater one, more room at the start, "
+                "a smaller tolerance or a shorter period")
+            assert self._duration_of_jump(robot_hw, handle, goals) >= least_s, handle
+
+    def _duration_of_jump(self, robot_hw: RobotHW, handle: JointHandle, goals: Mapping[str, float]) -> float:
+        """How long the joint takes from where it leaves its place until it arrives [s]; fails when it does not."""
+        start, left_s = handle.position, math.nan
+        for _ in range(round((self.settle_s + self.jump / self.limits()[handle.name].max_velocity) / self.period_s)):
             self._cycle(robot_hw, goals)
-            windows.append([handle.position for handle in handles])
-        for before, after in zip(windows, windows[5:], strict=False):
-            for handle, one, other in zip(handles, before, after, strict=True):
-                fastest = self.limits()[handle.name].max_velocity
-                assert abs(other - one) <= 1.5 * fastest * 5 * self.period_s + self.tolerance, handle
+            if abs(handle.position - start) <= self.tolerance:
+                left_s = self._read_s
+            if abs(handle.position - goals[handle.name]) <= self.tolerance:
+                return self._read_s - left_s
+        raise AssertionError(f"{handle.name} has not come from {start} to {goals[handle.name]}, but to "
+                             f"{handle.position}")
 
     def test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them(self) -> None:
         robot_hw, handles = self._ready()
@@ -176,8 +221,8 @@ class RobotHWConformance(ABC):
 
     def test_a_cycle_without_time_is_survived(self) -> None:
         robot_hw, handles = self._ready()
-        robot_hw.write(self._time_s, 0.0)
-        robot_hw.read(self._time_s, 0.0)
+        self._in_loop(robot_hw.write, self._time_s, 0.0)
+        self._in_loop(robot_hw.read, self._time_s, 0.0)
         assert all(math.isfinite(handle.velocity) for handle in handles)
 
     def test_two_controllers_may_not_claim_one_joint(self) -> None:
@@ -196,8 +241,9 @@ class RobotHWConformance(ABC):
         info = ControllerInfo("one", "some/Type", claim)
         for start, stop in (([info], []), ([], [info])):
             assert robot_hw.prepare_switch(start, stop) is True
-            robot_hw.do_switch(start, stop)
-            assert robot_hw.switch_result() is robot_hw.switch_result(info) is SwitchState.DONE
+            self._in_loop(robot_hw.do_switch, start, stop)
+            assert self._in_loop(robot_hw.switch_result) is SwitchState.DONE
+            assert self._in_loop(robot_hw.switch_result, info) is SwitchState.DONE
             self._run(robot_hw, before, 0.2)
         assert all(abs(handle.position - before[handle.name]) <= self.tolerance for handle in handles)
 

@@ -35,6 +35,7 @@ from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.ros_controllers import attach_ros
+from modular_framework_control.ros_loop_log import LoopLog
 from modular_framework_control.ros_node_handle import RosNodeHandle
 from modular_framework_control.ros_outbox import Outbox
 
@@ -58,7 +59,7 @@ class RosControllerManager:
     def __init__(self, robot_hw: RobotHW, namespace: str = "/", types: ControllerTypes | None = None,
                  loop_time: LoopTime | None = None) -> None:
         self._namespace = namespace
-        self._outbox = Outbox()
+        self._outbox, self._log = Outbox(), LoopLog()
         self._loop_time = loop_time if loop_time is not None else LoopTime()
         self.manager = ControllerManager(robot_hw, RosNodeHandle(namespace), types, self._attach)
         self._services: list[rospy.Service] = []
@@ -77,6 +78,7 @@ class RosControllerManager:
     def connect(self) -> None:
         """Advertise the services."""
         self._outbox.start()
+        self._log.begin()
         self._statistics = rospy.Publisher(join_names(self._namespace, "controller_manager/statistics"),
                                            ControllersStatistics, queue_size=1)
         for name, kind, answer in (
@@ -112,6 +114,7 @@ class RosControllerManager:
         self.manager.stop_all()
         self._outbox.close()
         self.manager.close()
+        self._log.end()
         if self._statistics is not None:
             self._statistics.unregister()
             self._statistics = None

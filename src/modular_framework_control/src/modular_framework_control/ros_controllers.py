@@ -2,6 +2,7 @@
 """Topics, actions and services of each controller, under the names of ros_controllers."""
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
@@ -73,20 +74,23 @@ class JointTrajectoryEdge:
         self._controller = controller
         self._name = join_names(namespace, name)
         self._loop_time = loop_time
-        self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
-        self._action = ControllerActionServer(f"{self._name}/follow_joint_trajectory", FollowJointTrajectoryAction,
-                                              self._submit, controller.cancel, _trajectory_result, outbox)
-        self._command = rospy.Subscriber(f"{self._name}/command", JointTrajectoryMsg, self._on_command, queue_size=1)
-        self._query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
+        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+            self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
+            opened.callback(self._state.unregister)
+            self._action = ControllerActionServer(f"{self._name}/follow_joint_trajectory", FollowJointTrajectoryAction,
+                                                  self._submit, controller.cancel, _trajectory_result, outbox)
+            opened.callback(self._action.close)
+            query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
+            opened.callback(query.shutdown, "controller unloaded")
+            command = rospy.Subscriber(f"{self._name}/command", JointTrajectoryMsg, self._on_command, queue_size=1)
+            opened.callback(command.unregister)
+            self._opened = opened.pop_all()
         controller.on_state = lambda snapshot: outbox.put_droppable(self._publish_state, snapshot)
         controller.on_feedback = lambda ticket, snapshot: outbox.put_droppable(self._feedback, ticket, snapshot)
 
     def close(self) -> None:
         """Close topics, action and service."""
-        for endpoint in (self._command, self._state):
-            endpoint.unregister()
-        self._query.shutdown("controller unloaded")
-        self._action.close()
+        self._opened.close()
 
     def _submit(self, message: FollowJointTrajectoryGoal, ticket: TrajectoryTicket) -> None:
         try:

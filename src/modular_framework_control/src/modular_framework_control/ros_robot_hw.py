@@ -15,7 +15,12 @@ from modular_framework_control.cycle_pacer import CyclePacer, LoopStatistics
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import ParameterError, read_bool, read_number
 from modular_framework_control.plugins import PluginError
-from modular_framework_control.real_time import prepare_interpreter, run_in_real_time
+from modular_framework_control.real_time import (
+    keep_processors_awake,
+    prepare_interpreter,
+    processors_for_loop,
+    run_in_real_time,
+)
 from modular_framework_control.ros_controller_manager import RosControllerManager
 from modular_framework_control.ros_hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
 from modular_framework_control.ros_loop_report import LoopReport
@@ -98,9 +103,9 @@ class RobotHwNode:
             raise RuntimeError("connect() comes before run()")
         starter = threading.Thread(target=self._get_ready, args=(self._manager,), name="get_ready", daemon=True)
         starter.start()
-        self._prepare()
+        processors = self._prepare()
         try:
-            self._loop(self._manager)
+            self._loop(self._manager, processors)
         except Exception as error:  # a user's hardware may raise anything
             self._failure = f"hardware {type(self._robot_hw).__name__} raised {type(error).__name__}: {error}"
             rospy.logfatal("control loop ends: %s\n%s", self._failure, traceback.format_exc())
@@ -108,30 +113,45 @@ class RobotHwNode:
             self._end(self._manager, starter)
         return not self._failure
 
-    def _prepare(self) -> None:
+    def _prepare(self) -> tuple[int, int] | None:
+        """Ask the system for what the loop needs; answers the processors for it and its stand-in, if it has one."""
         prepare_interpreter()
-        refused = run_in_real_time() if self._real_time else []
+        if not self._real_time:
+            return None
+        refused = run_in_real_time() + keep_processors_awake()
         if refused:
             rospy.logwarn("control loop without: %s", "; ".join(refused))
+        return processors_for_loop()
 
-    def _loop(self, manager: RosControllerManager) -> None:
-        now, wait = ((self._loop_time.now, CyclePacer(self._period_s).wait) if rospy.rostime.is_wallclock()
-                     else (rospy.get_time, self._wait_for_simulated_clock))
-        self._last_s, late_s, missed = now(), 0.0, 0
-        while not self._ended.is_set() and not self._failure and not rospy.is_shutdown():
-            begun_s = time.perf_counter()
-            time_s = now()
-            period_s = max(0.0, time_s - self._last_s)
-            self._last_s = time_s
-            self._robot_hw.read(time_s, period_s)
-            if self._connected.is_set():
-                manager.update(time_s, period_s)
-            self._robot_hw.write(time_s, period_s)
-            self._statistics.add(late_s, missed, time.perf_counter() - begun_s)
-            late_s, missed = wait()
+    def _loop(self, manager: RosControllerManager, processors: tuple[int, int] | None) -> None:
+        if not self._goes_on():
+            return
+        if rospy.rostime.is_wallclock():
+            self._last_s = self._loop_time.now()
+            CyclePacer(self._period_s, processors).run(
+                lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed))
+            return
+        self._last_s = rospy.get_time()
+        while self._cycle(manager, rospy.get_time(), 0.0, 0):   # how late it is, is not known
+            self._wait_for_simulated_clock()
 
-    def _wait_for_simulated_clock(self) -> tuple[float, int]:
-        """Wait until the simulated clock has gone on by a period, or has jumped back; lateness is not known."""
+    def _cycle(self, manager: RosControllerManager, time_s: float, late_s: float, missed: int) -> bool:
+        """Read, update, write; answers whether the loop goes on."""
+        begun_s = time.perf_counter()
+        period_s = max(0.0, time_s - self._last_s)
+        self._last_s = time_s
+        self._robot_hw.read(time_s, period_s)
+        if self._connected.is_set():
+            manager.update(time_s, period_s)
+        self._robot_hw.write(time_s, period_s)
+        self._statistics.add(late_s, missed, time.perf_counter() - begun_s)
+        return self._goes_on()
+
+    def _goes_on(self) -> bool:
+        return not (self._ended.is_set() or self._failure or rospy.is_shutdown())
+
+    def _wait_for_simulated_clock(self) -> None:
+        """Wait until the simulated clock has gone on by a period, or has jumped back."""
         begun_s = rospy.get_time()
         tick = rospy.rostime.get_rostime_cond()
         while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
@@ -139,7 +159,6 @@ class RobotHwNode:
                 break
             with tick:
                 tick.wait(0.1)
-        return 0.0, 0
 
     def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
         """Stop the controllers, write what they leave as commands (velocities and efforts of 0), close everything.

@@ -26,6 +26,8 @@ from typing import Any
 
 import smach
 from modular_framework_core.stop_requests import stoppable
+from modular_framework_core.task_constructor.option_checks import checks_options
+from modular_framework_core.task_constructor.state_catalogue import STATE_KEYS
 
 DEFAULT_OUTCOMES = ("success", "fail")
 
@@ -40,8 +42,10 @@ class FrameworkState(smach.State):
     """
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Make what ``execute`` waits for end when the state is asked to stop."""
+        """Hold options to their annotations; make what ``execute`` waits for end when the state is asked to stop."""
         super().__init_subclass__(**options)
+        if "__init__" in vars(cls):
+            cls.__init__ = checks_options(cls.__init__, without=STATE_KEYS)  # type: ignore[method-assign]
         if "execute" in vars(cls):
             cls.execute = _stoppable(cls.execute)  # type: ignore[assignment, method-assign]
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 from modular_framework_core.robot_groups import Group, RobotModelError
 
 CLOSED_STATE = "closed"
+MOVED_SHARE = 0.2
+"""Fingers have moved when they came farther than this share of the tolerance."""
 
 
 class GraspCommandError(ValueError):
@@ -45,11 +47,13 @@ class Outcome:
         positions: {joint: position} after the motion [rad or m].
         stalled: True when something stopped the fingers before they got to their targets.
         text: What the controller said.
+        pressing: True when they press so hard that they would have moved with nothing in their way.
     """
 
     positions: Mapping[str, float]
     stalled: bool
     text: str = ""
+    pressing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,36 +97,123 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
     return targets
 
 
+def torque_share(max_torque: float, full_scale: float) -> float:
+    """Computes a command's greatest torque as a share of what the joints can do; more than they can do is 1.
+
+    Args:
+        max_torque: Of the command, in the unit of ``full_scale``.
+        full_scale: Value that stands for the joints' full effort, more than 0.
+
+    Raises:
+        GraspCommandError: The torque is no positive number.
+    """
+    if not 0.0 < max_torque < math.inf:
+        raise GraspCommandError(f"max_torque is {max_torque}, allowed are numbers of more than 0 ({full_scale:g} is "
+                                "the full torque); set how hard the fingers may press")
+    return min(1.0, max_torque / full_scale)
+
+
+def torque_intensities(names: Sequence[str], values: Sequence[float], group: Group) -> dict[str, float]:
+    """Checks the torque intensities of a grasp against the manipulator's planning group.
+
+    Args:
+        names: Joints.
+        values: Their intensities in [-1, 1]; negative means outward. None at all leaves every joint at full intensity.
+        group: Planning group of the manipulator.
+
+    Returns:
+        {joint: intensity}.
+
+    Raises:
+        GraspCommandError: Names and values do not pair, a joint is foreign or repeated, or an intensity is out of
+            range.
+    """
+    if not values:
+        return {}
+    if len(names) != len(values):
+        raise GraspCommandError(f"torque_intensity has {len(names)} joint names and {len(values)} values; it needs as "
+                                "many of each, or no value for full intensity")
+    if len(set(names)) != len(names):
+        raise GraspCommandError(f"torque_intensity names a joint twice: {list(names)}; name each once")
+    for name, value in zip(names, values, strict=True):
+        try:
+            group.joint(name)
+        except RobotModelError as error:
+            raise GraspCommandError(f"torque_intensity: {error}") from error
+        if not -1.0 <= value <= 1.0:
+            raise GraspCommandError(f"the torque intensity of joint '{name}' is {value}, allowed is -1 to 1")
+    return dict(zip(names, values, strict=True))
+
+
 def effort_limits(targets: Mapping[str, float], intensities: Mapping[str, float], group: Group,
-                  torque_share: float) -> dict[str, float]:
+                  share: float, stage: Stage) -> dict[str, float]:
     """Computes the effort each joint may use.
 
     The effort is |torque intensity| x share of the greatest torque x the joint's effort limit in the URDF. A joint
-    without an intensity counts as 1.
+    without an intensity counts as 1. An intensity of 0 is no effort where the fingers are to close on an object; where
+    they only take a posture, it leaves theirs to the controller.
 
     Args:
         targets: Joints to move.
-        intensities: {joint: intensity in [-1, 1]}; negative means outward.
+        intensities: {joint: intensity in [-1, 1]}.
         group: Planning group of the manipulator.
-        torque_share: Greatest torque as a share of what the joints can do, in (0, 1].
+        share: Greatest torque as a share of what the joints can do, in (0, 1].
+        stage: Stage that is commanded.
 
     Returns:
-        {joint: effort} [N m or N]; 0 for a joint without an effort limit, which means the controller's own limit.
-
-    Raises:
-        GraspCommandError: An intensity or the share is out of range.
+        {joint: effort} [N m or N]; without the joints whose effort is left to the controller: those with an intensity
+        of 0 outside the grasp, and those whose effort the URDF does not limit.
     """
-    if not 0.0 < torque_share <= 1.0:
-        raise GraspCommandError(f"max_torque is {torque_share:.3f} of the greatest torque, "
-                                "allowed is more than 0, up to 1")
     limits: dict[str, float] = {}
     for name in targets:
-        intensity = intensities.get(name, 1.0)
-        if not -1.0 <= intensity <= 1.0:
-            raise GraspCommandError(f"the torque intensity of joint '{name}' is {intensity}, allowed is -1 to 1")
-        effort = group.joint(name).effort
-        limits[name] = abs(intensity) * torque_share * effort if math.isfinite(effort) else 0.0
+        strength, effort = abs(intensities.get(name, 1.0)) * share, group.joint(name).effort
+        if strength == 0.0:
+            if stage is Stage.GRASP:
+                limits[name] = 0.0
+        elif 0.0 < effort < math.inf:
+            limits[name] = strength * effort
     return limits
+
+
+def refuse_no_effort(name: str, effort: float) -> None:
+    """Refuses to move a joint that may not use any effort, for those that bound it.
+
+    Raises:
+        GraspCommandError: The effort is 0.
+    """
+    if effort == 0.0:
+        raise GraspCommandError(f"joint '{name}' is to move with no torque, allowed is more than 0 (max_torque x its "
+                                "torque intensity, which is 0 or too small); give the grasp more of either")
+
+
+def proved(outcome: Outcome, begun: Mapping[str, float], targets: Mapping[str, float], tolerance: float,
+           held: Outcome | None) -> Outcome:
+    """Takes a stall for one only when it was no lack of torque that kept the fingers from moving.
+
+    Args:
+        outcome: What the controller says.
+        begun: {joint: position} before the motion.
+        targets: {joint: position} commanded.
+        tolerance: Greatest distance that counts as reached [rad or m]; it has to be a small share of the joints'
+            ranges, since neither how far they came nor whether they are shut can be told within it.
+        held: The stall before this motion, which fingers that still stand there need not prove anew.
+
+    Returns:
+        The outcome; not stalled, and with the reason, when no joint that is short of its target has moved toward it,
+        presses, or goes on holding.
+    """
+    if not outcome.stalled or outcome.pressing:
+        return outcome
+    if held is not None and all(abs(held.positions.get(name, math.inf) - begun.get(name, math.inf)) <= tolerance
+                                for name in targets):
+        return outcome
+    came = [math.copysign(1.0, target - outcome.positions[name]) * (outcome.positions[name] - begun[name])
+            for name, target in targets.items() if name in begun and name in outcome.positions
+            and abs(target - outcome.positions[name]) > tolerance]
+    if max(came, default=0.0) > MOVED_SHARE * tolerance:
+        return outcome
+    return replace(outcome, stalled=False, text="the fingers have not moved, so nothing shows that something stopped "
+                   f"them; give them more torque, or begin farther open{'; ' + outcome.text if outcome.text else ''}")
 
 
 def closed_positions(group: Group) -> dict[str, float]:

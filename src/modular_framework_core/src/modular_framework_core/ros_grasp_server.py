@@ -17,6 +17,9 @@ from modular_framework_core.grasp_server import (
     effort_limits,
     judge,
     posture_targets,
+    proved,
+    torque_intensities,
+    torque_share,
 )
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_core.robot_groups import Group, RobotModelError, read_group
@@ -36,7 +39,8 @@ class GraspServer:
 
     Parameters:
         ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.
-        ``~position_tolerance`` (0.05 rad): distance that counts as reached.
+        ``~position_tolerance`` (0.05 rad or m): distance that counts as reached; a gripper that slides needs a small
+        share of its stroke, since fingers this near to shut count as shut.
         ``~motion_timeout`` (25 s).
 
     Args:
@@ -52,6 +56,7 @@ class GraspServer:
         self._lock = threading.Lock()
         self._motion_lock = threading.Lock()
         self._stops: dict[str, threading.Event] = {}
+        self._held: Outcome | None = None
 
     def connect(self, action_name: str) -> None:
         """Connects the manipulator and offers the action."""
@@ -108,12 +113,16 @@ class GraspServer:
         posture = getattr(command.grasp, STAGE_FIELDS[stage][0]).posture
         targets = posture_targets(posture.name, posture.position, self._group)
         torque = command.grasp.torque_intensity
-        intensities = dict(zip(torque.joint_names, torque.torque_intensity, strict=False))
-        share = min(1.0, command.max_torque / self._full_scale)
+        intensities = torque_intensities(torque.joint_names, torque.torque_intensity, self._group)
+        share = torque_share(command.max_torque, self._full_scale)
         if stop.is_set():
             raise GraspCommandError("stopped on request, before anything moved")
-        motion = Motion(targets, effort_limits(targets, intensities, self._group, share), self._timeout_s, stop.is_set)
-        outcome = self._move(handle, motion)
+        efforts = effort_limits(targets, intensities, self._group, share, stage)
+        motion = Motion(targets, efforts, self._timeout_s, stop.is_set)
+        begun = self._manipulator.joint_state(targets)
+        outcome = proved(self._move(handle, motion), dict(zip(begun.name, begun.position, strict=True)), targets,
+                         self._tolerance, self._held)
+        self._held = outcome if outcome.stalled else None
         return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)
 
     def _move(self, handle: Any, motion: Motion) -> Outcome:

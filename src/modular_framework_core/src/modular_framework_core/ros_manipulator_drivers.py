@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_control.ros_action_client import SteadyActionClient
-from modular_framework_core.grasp_server import GraspCommandError, Outcome
+from modular_framework_core.grasp_server import GraspCommandError, Outcome, refuse_no_effort
 from modular_framework_core.ros_calls import wait_for_action, wait_for_result, wait_until
 
 REST_SPEED = 0.02  # [rad/s or m/s]
@@ -85,7 +85,7 @@ class Motion:
 
     Attributes:
         targets: {joint: position} [rad or m].
-        efforts: {joint: greatest effort} [N m or N]; 0 leaves the limit to the controller.
+        efforts: {joint: greatest effort} [N m or N]; one that is missing is the controller's own.
         timeout_s: Longest time the motion may take [s, wall time].
         stop_requested: Asked all the time; True stops the fingers.
     """
@@ -119,12 +119,15 @@ class GripperDriver:
 
         Raises:
             CallError: The controller is not there.
-            GraspCommandError: There is more than one joint, or the controller neither reached the target nor stalled.
+            GraspCommandError: There is more than one joint, it may use no effort, or the controller neither reached the
+                target nor stalled.
         """
         if len(motion.targets) != 1:
             raise GraspCommandError(f"controller action '{self._action}' moves one joint, the posture has "
                                     f"{sorted(motion.targets)}")
         (name, position), = motion.targets.items()
+        if name in motion.efforts:
+            refuse_no_effort(name, motion.efforts[name])
         wait_for_action(self._client, self._action, 10.0)
         goal = GripperCommandGoal()
         goal.command.position, goal.command.max_effort = position, motion.efforts.get(name, 0.0)

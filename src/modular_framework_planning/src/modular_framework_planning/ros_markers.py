@@ -75,7 +75,6 @@ class MarkerPublisher:
             marker.id = number
         tell(self._path, MarkerArray(markers))
 
-
     def show_contacts(self, contacts: Sequence[Contact]) -> None:
         """Publishes a ball where bodies touch, named by them: why the last plan failed; none takes old ones away."""
         markers = [Marker(action=Marker.DELETEALL)]

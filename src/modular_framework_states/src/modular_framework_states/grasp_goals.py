@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from modular_framework_core.msg import GraspCommand, GraspGoal
 from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result
 
 Stage = Literal["pregrasp", "grasp", "postgrasp"]
-STAGES = get_args(Stage)
 SERVER_TIMEOUT_S = 10.0
 SUCCEEDED = 3
 _NUMBERS = {"pregrasp": GraspCommand.PRE_GRASP_STATE, "grasp": GraspCommand.GRASP_STATE,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells what a state does and takes, out of its signature and docstring."""
+"""Tells what a state does and takes, out of its signature and docstring, and what a machine with a template takes."""
 from __future__ import annotations
 
 import inspect
@@ -7,7 +7,9 @@ import re
 import textwrap
 
 from modular_framework_core.task_constructor.generator import GenerationError, literal
+from modular_framework_core.task_constructor.machine_keys import MachineKey, machine_keys
 from modular_framework_core.task_constructor.state_catalogue import STATE_KEYS, StateOption, StateSource
+from modular_framework_core.task_constructor.template_catalogue import TemplateSource
 
 _WIDTH = 110
 _SECTION = re.compile(r"^(Args|Arguments|Raises|Returns|Attributes|Example|Examples):\s*$", re.MULTILINE)
@@ -31,6 +33,17 @@ def explain(source: StateSource) -> str:
     return "\n".join(lines)
 
 
+def explain_template(template: TemplateSource) -> str:
+    """Return a page about a template: what its machines do, the keys of their header, the userdata they provide."""
+    lines = [f"{template.name}: template, {template.file}", "", template.doc or "(its class has no docstring)", "",
+             "Keys of the task, or of a nested machine:"]
+    for key in machine_keys(template):
+        lines += [f"  {key.name}: {key.form}, {_use(key)}", *_indented(key.meaning)]
+    userdata = "the template does not say" if template.userdata is None else ", ".join(sorted(template.userdata))
+    lines += ["", *textwrap.wrap(f"Userdata it provides: {userdata or 'none'}", _WIDTH, subsequent_indent="  ")]
+    return "\n".join(lines)
+
+
 def option_meanings(doc: str) -> dict[str, str]:
     """Return what the section ``Args`` of a docstring says about each option, on one line each."""
     parts = _SECTION.split(inspect.cleandoc(doc))
@@ -48,7 +61,18 @@ def option_meanings(doc: str) -> dict[str, str]:
 
 def _option(option: StateOption, meaning: str) -> list[str]:
     text = f"  {option.name}: {option.type.describe()}, {_default(option)}"
-    return [text, *textwrap.wrap(meaning, _WIDTH, initial_indent="      ", subsequent_indent="      ")]
+    return [text, *_indented(meaning)]
+
+
+def _indented(meaning: str) -> list[str]:
+    return textwrap.wrap(meaning, _WIDTH, initial_indent="      ", subsequent_indent="      ")
+
+
+def _use(key: MachineKey) -> str:
+    if key.at_root and key.nested:
+        same = key.at_root == key.nested
+        return key.at_root if same else f"{key.at_root} in a task, {key.nested} in a nested machine"
+    return f"{key.at_root}, in a task only" if key.at_root else f"{key.nested}, in a nested machine only"
 
 
 def _default(option: StateOption) -> str:

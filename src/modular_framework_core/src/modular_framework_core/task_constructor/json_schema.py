@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from modular_framework_core.task_constructor.explanation import option_meanings
+from modular_framework_core.task_constructor.machine_keys import NAME_MAP, NAMES, OUTCOMES, machine_keys
 from modular_framework_core.task_constructor.option_types import or_reference
 from modular_framework_core.task_constructor.state_catalogue import (
     STATE_KEYS,
@@ -15,9 +16,6 @@ from modular_framework_core.task_constructor.state_catalogue import (
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
-_NAMES = {"type": "array", "items": {"type": "string"}, "minItems": 1, "uniqueItems": True}
-_KEYS = {"type": "array", "items": {"type": "string"}, "uniqueItems": True}
-_NAME_MAP = {"type": "object", "additionalProperties": {"type": "string"}}
 
 
 def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[str, Any]:
@@ -50,10 +48,10 @@ def _readable(states: StateCatalogue, name: str) -> StateSource | None:
 
 def _state(source: StateSource) -> dict[str, Any]:
     properties: dict[str, Any] = {"source": {"enum": [source.name, f"state_{source.name}"]},
-                                  "transitions": or_reference(_NAME_MAP), "params": {"type": "object"}}
+                                  "transitions": or_reference(NAME_MAP), "params": {"type": "object"}}
     meanings = option_meanings(source.doc)
     for option in source.options.values():
-        kind = _NAMES if option.name == "outcomes" else _KEYS if option.name in STATE_KEYS else option.type.schema()
+        kind = OUTCOMES if option.name == "outcomes" else NAMES if option.name in STATE_KEYS else option.type.schema()
         properties[option.name] = {**or_reference(kind), "description": meanings.get(option.name, "")}
         if option.default_known:
             properties[option.name]["default"] = option.default
@@ -62,21 +60,9 @@ def _state(source: StateSource) -> dict[str, Any]:
 
 
 def _machine(template: TemplateSource, *, is_root: bool) -> dict[str, Any]:
-    properties: dict[str, Any] = {
-        "name": {"type": "string"}, "source": {"const": template.name}, "outcomes": or_reference(_NAMES),
-        "params": {"type": "object"}, "states": {"$ref": "#/definitions/states"},
-        **{key: {} for key in sorted(template.options)},
-    }
-    if template.concurrent:
-        properties["default_outcome"] = {"type": "string"}
-        properties["outcome_map"] = or_reference({"type": "object", "additionalProperties": _NAME_MAP})
-    if is_root:
-        properties["node_name"] = {"type": "string"}
-        required = ["name", "source", "outcomes", "states"]
-    else:
-        properties["userdata"] = {"const": "self.userdata"}
-        properties["transitions"] = or_reference(_NAME_MAP)
-        if template.takes_keys:
-            properties["input_keys"] = properties["output_keys"] = or_reference(_KEYS)
-        required = ["source", "states"]
-    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+    uses = {key.name: key.at_root if is_root else key.nested for key in machine_keys(template)}
+    properties = {key.name: {**key.schema, "description": key.meaning} for key in machine_keys(template)
+                  if uses[key.name]}
+    properties["source"] = {"const": template.name}
+    return {"type": "object", "description": template.doc.split("\n\n")[0], "properties": properties,
+            "required": [name for name, use in uses.items() if use == "required"], "additionalProperties": False}

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What values an option of a state may have, read from the annotation in the state's source without running it."""
+"""What values an option of a state may have, and what is wrong with a value that does not fit."""
 from __future__ import annotations
 
-import ast
-from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 from typing import Any, Union
 
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence
-
-_LISTS = ("list", "List", "Sequence", "Iterable", "Collection", "tuple", "Tuple", "set", "frozenset")
-_MAPPINGS = ("dict", "Dict", "Mapping")
+from modular_framework_core.option_limits import Length, Limits
+from modular_framework_core.task_constructor.faults import nearest
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,28 +29,35 @@ class Anything:
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """Text, number, whole number, truth value or nothing."""
+    """Text, number, whole number, truth value or nothing; numbers may have limits."""
 
     kind: str
+    limits: Limits | None = None
 
     def describe(self) -> str:
         """Say what is allowed."""
-        return _PLAIN[self.kind][0]
+        what = PLAIN[self.kind][0]
+        return what if self.limits is None else self.limits.describe(what)
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
         """See ``Anything.mismatch``."""
         if not isinstance(node, Scalar):
             return node, self
         value = node.value
-        fits = self.kind == "bool" if isinstance(value, bool) else isinstance(value, _PLAIN[self.kind][1])
-        return None if fits else (node, self)
+        fits = self.kind == "bool" if isinstance(value, bool) else isinstance(value, PLAIN[self.kind][1])
+        return None if fits and not self.remedy(value) else (node, self)
+
+    def remedy(self, value: Any) -> str:
+        """Say what to do about a number beyond the limits; nothing about other values."""
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        return self.limits.remedy(value) if self.limits is not None and is_number else ""
 
     def schema(self) -> dict[str, Any]:
         """See ``Anything.schema``."""
-        return {"type": _PLAIN[self.kind][2]}
+        return {"type": PLAIN[self.kind][2]} | ({} if self.limits is None else self.limits.schema())
 
 
-_PLAIN: dict[str, tuple[str, Any, str]] = {
+PLAIN: dict[str, tuple[str, Any, str]] = {
     "str": ("a text", str, "string"),
     "float": ("a number", (int, float), "number"),
     "int": ("a whole number", int, "integer"),
@@ -85,23 +89,26 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class ListOf:
-    """A list whose items are of one type."""
+    """A list whose items are of one type; it may have to have a certain length."""
 
     item: OptionType
+    length: Length | None = None
 
     def describe(self) -> str:
         """Say what is allowed."""
-        return "a list" if isinstance(self.item, Anything) else f"a list, each item {self.item.describe()}"
+        what = "a list" if self.length is None else f"a list of {self.length.items} items"
+        return what if isinstance(self.item, Anything) else f"{what}, each item {self.item.describe()}"
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
         """See ``Anything.mismatch``."""
-        if not isinstance(node, Sequence):
+        if not isinstance(node, Sequence) or (self.length is not None and len(node.items) != self.length.items):
             return node, self
         return next((found for item in node.items if (found := self.item.mismatch(item)) is not None), None)
 
     def schema(self) -> dict[str, Any]:
         """See ``Anything.schema``."""
-        return {"type": "array", "items": or_reference(self.item.schema())}
+        length = {} if self.length is None else {"minItems": self.length.items, "maxItems": self.length.items}
+        return {"type": "array", "items": or_reference(self.item.schema()), **length}
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,81 +165,41 @@ def or_reference(schema: dict[str, Any]) -> dict[str, Any]:
     return {"anyOf": [schema, {"type": "string", "pattern": r"^params\."}]} if schema else {}
 
 
-def from_annotation(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> OptionType:
-    """Return the type an annotation stands for.
+def complaint(allowed: OptionType, node: Node) -> tuple[Node, str] | None:
+    """Say what is wrong with a value.
 
     Args:
-        annotation: the annotation of an argument, or None.
-        aliases: assignments of the module, name -> value, for types that have a name of their own.
+        allowed: what is allowed.
+        node: the value.
+
+    Returns:
+        The innermost value that does not fit, and ``must be ..., found ...`` with what to do where that is clear; None
+        when all fits.
     """
-    return _Reader(aliases).read(annotation)
+    mismatch = allowed.mismatch(node)
+    if mismatch is None:
+        return None
+    node, wanted = mismatch
+    parts = wanted.types if isinstance(wanted, AnyOf) else (wanted,)
+    found = kind_of(node)
+    if isinstance(node, Sequence) and any(isinstance(part, ListOf) and part.length for part in parts):
+        found = f"a list of {len(node.items)}"
+    hint = _remedy(node, parts) if isinstance(node, Scalar) else ""
+    return node, f"must be {wanted.describe()}, found {found}{hint}"
 
 
-class _Reader:
-    """Reads annotations; what it does not know it takes as any value."""
+def _remedy(node: Scalar, parts: tuple[OptionType, ...]) -> str:
+    value = node.value
+    for part in parts:
+        if isinstance(part, Plain) and (what := part.remedy(value)):
+            return f"; {what}"
+    if isinstance(value, str):
+        if len(parts) == 1 and isinstance(parts[0], Plain) and parts[0].kind in ("float", "int"):
+            return "; leave the quotes out to make it a number" if _is_quoted_number(value) else ""
+        names = [item for part in parts if isinstance(part, Choice) for item in part.values if isinstance(item, str)]
+        return nearest(value, names)
+    return "; put it in quotes to make it text" if parts == (Plain("str"),) and value is not None else ""
 
-    def __init__(self, aliases: MappingABC[str, ast.expr]) -> None:
-        self._aliases = aliases
-        self._open: set[str] = set()
 
-    def read(self, node: ast.expr | None) -> OptionType:
-        match node:
-            case ast.Constant(value=None):
-                return Plain("None")
-            case ast.Constant(value=str(text)):
-                return self._text(text)
-            case ast.Name(id=name) if name in _PLAIN:
-                return Plain(name)
-            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _LISTS:
-                return ListOf(Anything())
-            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _MAPPINGS:
-                return MappingOf(Anything())
-            case ast.Name(id=name) if name in self._aliases and name not in self._open:
-                return self._alias(name)
-            case ast.BinOp(left=left, op=ast.BitOr(), right=right):
-                return self._any_of([left, right])
-            case ast.Subscript(value=ast.Name(id=name) | ast.Attribute(attr=name), slice=inner):
-                return self._subscript(name, list(inner.elts) if isinstance(inner, ast.Tuple) else [inner])
-        return Anything()
-
-    def _alias(self, name: str) -> OptionType:
-        self._open.add(name)
-        try:
-            return self.read(self._aliases[name])
-        finally:
-            self._open.discard(name)
-
-    def _text(self, text: str) -> OptionType:
-        try:
-            return self.read(ast.parse(text, mode="eval").body)
-        except (SyntaxError, ValueError):
-            return Anything()
-
-    def _subscript(self, name: str, inner: list[ast.expr]) -> OptionType:
-        if name == "Literal":
-            values = [item.value for item in inner if isinstance(item, ast.Constant)]
-            return Choice(tuple(values)) if len(values) == len(inner) else Anything()
-        if name == "Optional":
-            return self._any_of([*inner, ast.Constant(value=None)])
-        if name == "Union":
-            return self._any_of(inner)
-        if name in _LISTS:
-            items = [item for item in inner if not (isinstance(item, ast.Constant) and item.value is ...)]
-            read = {self.read(item) for item in items}
-            return ListOf(read.pop() if len(read) == 1 else AnyOf(tuple(sorted(read, key=repr))))
-        if name in _MAPPINGS:
-            return MappingOf(self.read(inner[-1]))
-        return Anything()
-
-    def _any_of(self, nodes: list[ast.expr]) -> OptionType:
-        found: list[OptionType] = []
-        for node in nodes:
-            item = self.read(node)
-            found += [inner for inner in (item.types if isinstance(item, AnyOf) else (item,)) if inner not in found]
-        if any(isinstance(item, Anything) for item in found):
-            return Anything()
-        choices = tuple(value for item in found if isinstance(item, Choice) for value in item.values)
-        if choices:
-            others = [item for item in found if not isinstance(item, Choice)]
-            found = [Choice(tuple(dict.fromkeys(choices))), *others]
-        return found[0] if len(found) == 1 else AnyOf(tuple(found))
+def _is_quoted_number(value: str) -> bool:
+    return value.removeprefix("-").replace(".", "", 1).isdecimal()

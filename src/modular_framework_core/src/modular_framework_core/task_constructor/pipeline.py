@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from modular_framework_core.task_constructor import default_folders, generator, task_graph
-from modular_framework_core.task_constructor.explanation import explain
-from modular_framework_core.task_constructor.faults import TaskFault, listing, nearest
+from modular_framework_core.task_constructor.explanation import explain, explain_template
+from modular_framework_core.task_constructor.faults import TaskFault, nearest
 from modular_framework_core.task_constructor.generator import GenerationError
 from modular_framework_core.task_constructor.json_schema import task_schema
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSourceError
@@ -74,14 +74,14 @@ def main(arguments: Sequence[str]) -> int:
         else:
             output = given.output or generator.default_output_directory()
             print(construct_task(given.script, states, templates, output)[1])
-    except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownStateError, OSError) as error:
+    except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownNameError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     return 0
 
 
-class UnknownStateError(Exception):
-    """There is no state of that name; says which there are."""
+class UnknownNameError(Exception):
+    """There is no state or template of that name; says which there are."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -97,7 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--check", action="store_true", help="only check; write nothing")
     formats = ", ".join(f".{name}" for name in FORMATS)
     parser.add_argument("--graph", type=Path, metavar="FILE", help=f"check, and draw the task into a file ({formats})")
-    parser.add_argument("--explain", metavar="STATE", help="say what a state does, takes and ends with")
+    parser.add_argument("--explain", metavar="NAME", help="say what a state or template does and takes")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of tasks, for editors")
     return parser
 
@@ -113,8 +113,10 @@ def _checked(given: argparse.Namespace, task: TaskSpec) -> str:
 def _about_language(given: argparse.Namespace, states: StateCatalogue, templates: TemplateCatalogue) -> str:
     if given.schema:
         return json.dumps(task_schema(states, templates), indent=2)
-    name = states.resolve(given.explain)
-    if name is None:
-        raise UnknownStateError(f"state '{given.explain}' is unknown; {listing(states.names())}"
-                                f"{nearest(given.explain, states.names())}")
-    return explain(states.get(name))
+    state, template = states.resolve(given.explain), templates.get(given.explain)
+    if state is None and template is None:
+        raise UnknownNameError(
+            f"'{given.explain}' is no state and no template; states: {', '.join(states.names())}; templates: "
+            f"{', '.join(templates.names())}{nearest(given.explain, [*states.names(), *templates.names()])}")
+    pages = [] if state is None else [explain(states.get(state))]
+    return "\n\n".join([*pages, *([] if template is None else [explain_template(template)])])

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from modular_framework_core.task_constructor import header_fields
-from modular_framework_core.task_constructor.faults import FaultList, Place, nearest
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
-from modular_framework_core.task_constructor.option_types import AnyOf, Choice, OptionType, Plain
+from modular_framework_core.task_constructor.faults import FaultList, Place
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node
+from modular_framework_core.task_constructor.option_types import complaint
 from modular_framework_core.task_constructor.params_scope import ParamsScope
 from modular_framework_core.task_constructor.state_catalogue import (
     STATE_KEYS,
@@ -31,7 +31,8 @@ class StateBuilder:
         self._templates = templates
         self._faults = faults
         self.value_faults = 0
-        """How many faults it noted in values of options, which leave the state's userdata known."""
+        """How many faults it noted in values of options and in imports, which leave the state's userdata known."""
+        self._with_imports_told: set[str] = set()
 
     def build(
         self, label: str, place: Place, body: Mapping, scope: ParamsScope
@@ -57,11 +58,14 @@ class StateBuilder:
             if key not in source.options and not (source.takes_any_option and key.isidentifier()):
                 self._faults.add_unknown(body.keys[key], what, key, source.options)
         before = len(self._faults)
+        self._check_imports(label, body, source)
         for option in source.options.values():
             if option.required and option.name not in options:
                 self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
             elif option.name in options and option.name not in STATE_KEYS:
-                self._check_type(f"{what} '{option.name}'", option.type, options[option.name])
+                wrong = complaint(option.type, options[option.name])
+                if wrong is not None:
+                    self._faults.add(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
         self.value_faults += len(self._faults) - before
         for key in STATE_KEYS:
             if key in options:
@@ -77,21 +81,12 @@ class StateBuilder:
             outcomes,
         )
 
-    def _check_type(self, what: str, allowed: OptionType, value: Node) -> None:
-        found = allowed.mismatch(value)
-        if found is None:
-            return
-        node, wanted = found
-        hint = ""
-        if isinstance(node, Scalar):
-            names = [item for part in (wanted.types if isinstance(wanted, AnyOf) else (wanted,))
-                     if isinstance(part, Choice) for item in part.values if isinstance(item, str)]
-            hint = nearest(str(node.value), names) if isinstance(node.value, str) else ""
-            if wanted == Plain("str") and not isinstance(node.value, str) and node.value is not None:
-                hint = "; put it in quotes to make it text"
-            elif wanted in (Plain("float"), Plain("int")) and _is_quoted_number(node.value):
-                hint = "; leave the quotes out to make it a number"
-        self._faults.add(node.place, f"{what} must be {wanted.describe()}, found {kind_of(node)}{hint}")
+    def _check_imports(self, label: str, body: Mapping, source: StateSource) -> None:
+        """Note what the file of a state imports in vain, at the first state that is made of it."""
+        if source.name not in self._with_imports_told:
+            self._with_imports_told.add(source.name)
+            for missing in source.missing_imports:
+                self._faults.add(body.entries["source"].place, f"state '{label}': {missing}")
 
     def _state_source(self, body: Mapping, label: str) -> StateSource | None:
         node = body.entries.get("source")
@@ -131,10 +126,6 @@ class StateBuilder:
         if "outcomes" in options:
             return header_fields.names(options["outcomes"], "outcomes", FaultList())
         return source.default_names("outcomes") or None
-
-
-def _is_quoted_number(value: object) -> bool:
-    return isinstance(value, str) and value.removeprefix("-").replace(".", "", 1).isdecimal()
 
 
 def plain_transitions(body: Mapping) -> dict[str, str]:

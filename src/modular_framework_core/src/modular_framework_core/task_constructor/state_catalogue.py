@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from modular_framework_core.task_constructor.option_types import Anything, OptionType, from_annotation
+from modular_framework_core.task_constructor.option_annotations import from_annotation
+from modular_framework_core.task_constructor.option_types import Anything, OptionType
+from modular_framework_core.task_constructor.state_imports import missing_imports
+
+_FRAMEWORK = Path(__file__).resolve().parents[2]
 
 STATE_KEYS = ("outcomes", "input_keys", "output_keys", "io_keys")
 """Options every state has."""
@@ -55,6 +60,7 @@ class StateSource:
         takes_any_option: whether its constructor takes further keyword arguments (or is not known).
         is_framework_state: whether it is derived from ``FrameworkState``, which needs two outcomes at least.
         doc: docstring of the class.
+        missing_imports: what the file imports that Python does not find, a message each.
     """
 
     name: str
@@ -64,6 +70,7 @@ class StateSource:
     takes_any_option: bool
     is_framework_state: bool
     doc: str
+    missing_imports: tuple[str, ...] = ()
 
     def default_names(self, key: str) -> tuple[str, ...] | None:
         """Return the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
@@ -135,10 +142,7 @@ class StateCatalogue:
 
 
 def _read_state(name: str, file: Path) -> StateSource:
-    try:
-        tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
-    except (OSError, SyntaxError, ValueError) as error:
-        raise StateSourceError(f"{file} cannot be read as Python: {error}") from error
+    tree = _parsed(file)
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
     wanted = class_name_of(name)
     if wanted not in classes:
@@ -148,7 +152,15 @@ def _read_state(name: str, file: Path) -> StateSource:
         )
     options, takes_any = _constructor_options(classes[wanted], classes, {**_imported(tree, file), **_aliases(tree)})
     is_ours = _is_framework_state(classes[wanted], classes)
-    return StateSource(name, file, wanted, options, takes_any, is_ours, ast.get_docstring(classes[wanted]) or "")
+    doc = ast.get_docstring(classes[wanted]) or ""
+    return StateSource(name, file, wanted, options, takes_any, is_ours, doc, missing_imports(tree, file))
+
+
+def _parsed(file: Path) -> ast.Module:
+    try:
+        return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise StateSourceError(f"{file} cannot be read as Python: {error}") from error
 
 
 def _is_framework_state(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> bool:
@@ -168,17 +180,22 @@ def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
             if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)}
 
 
+@functools.lru_cache(maxsize=1000)
+def _aliases_of(file: Path, changed_ns: int) -> dict[str, ast.expr]:
+    return _aliases(_parsed(file))
+
+
 def _imported(tree: ast.Module, file: Path) -> dict[str, ast.expr]:
-    """Return the plain assignments of modules beside a file, as far as it imports them by name from its own package."""
-    root = file.parent
-    while (root / "__init__.py").is_file():
-        root = root.parent
+    """Return the plain assignments that a file imports by name from modules of its own package and of the framework."""
+    own = next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
     found: dict[str, ast.expr] = {}
     for node in tree.body:
-        source = root.joinpath(*(node.module or "").split(".")) if isinstance(node, ast.ImportFrom) else root
-        if isinstance(node, ast.ImportFrom) and not node.level and (source := source.with_suffix(".py")).is_file():
-            aliases = _aliases(ast.parse(source.read_text(encoding="utf-8")))
-            found |= {item.asname or item.name: aliases[item.name] for item in node.names if item.name in aliases}
+        if not isinstance(node, ast.ImportFrom) or node.level or not node.module:
+            continue
+        sources = [root.joinpath(*node.module.split(".")).with_suffix(".py") for root in (own, _FRAMEWORK)]
+        source = next((source for source in sources if source.is_file()), None)
+        aliases = {} if source is None else _aliases_of(source, source.stat().st_mtime_ns)
+        found |= {item.asname or item.name: aliases[item.name] for item in node.names if item.name in aliases}
     return found
 
 

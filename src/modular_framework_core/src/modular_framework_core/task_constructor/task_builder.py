@@ -10,6 +10,12 @@ from modular_framework_core.task_constructor import header_fields, located_yaml,
 from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
+from modular_framework_core.task_constructor.machine_keys import (
+    SHARED_USERDATA,
+    machine_keys,
+    required_keys,
+    root_keys,
+)
 from modular_framework_core.task_constructor.params_scope import ParamsScope, params_of
 from modular_framework_core.task_constructor.state_builder import StateBuilder, plain_transitions
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, class_name_of
@@ -17,10 +23,6 @@ from modular_framework_core.task_constructor.task_spec import ChildSpec, Machine
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
 
 DEFAULT_OUTCOMES = ("success", "fail")
-SHARED_USERDATA = "self.userdata"
-_MACHINE_KEYS = ("source", "outcomes", "params", "states", "default_outcome", "outcome_map")
-_ROOT_KEYS = ("name", "node_name", *_MACHINE_KEYS)
-_NESTED_KEYS = ("name", "userdata", "transitions", "input_keys", "output_keys", *_MACHINE_KEYS)
 
 
 def load_task(script: Path, states: StateCatalogue, templates: TemplateCatalogue) -> TaskSpec:
@@ -53,12 +55,12 @@ class TaskBuilder:
         """Return the task; raise ``TaskFault`` with everything that is wrong."""
         if not isinstance(document, Mapping):
             self._faults.add(document.place, f"a task must be a mapping, found {kind_of(document)}; its keys: "
-                                             f"{', '.join(_ROOT_KEYS)}")
+                                             f"{', '.join(root_keys())}")
             self._faults.raise_if_any()
         assert isinstance(document, Mapping)
         scope = ParamsScope().inner(params_of(document.entries.get("params"), self._faults), self._faults)
         header = self._resolved_header(document, scope)
-        self._require(header, ("name", "source", "outcomes", "states"), "the task")
+        self._require(header, required_keys(is_root=True), "the task")
         name = "task"
         if "name" in header.entries:
             name = header_fields.identifier(header.entries["name"], "name", self._faults) or name
@@ -166,10 +168,7 @@ class TaskBuilder:
         return candidate
 
     def _check_header_keys(self, header: Mapping, template: TemplateSource, *, is_root: bool, label: str) -> None:
-        known = [*(_ROOT_KEYS if is_root else _NESTED_KEYS), *sorted(template.options)]
-        without = [] if template.concurrent else ["default_outcome", "outcome_map"]
-        without += [] if template.takes_keys else ["input_keys", "output_keys"]
-        known = [key for key in known if key not in without]
+        known = [key.name for key in machine_keys(template) if (key.at_root if is_root else key.nested)]
         for key in header.entries:
             if key not in known:
                 what = f"'{label}' (template {template.name}): key"

@@ -2,6 +2,7 @@
 """Finds the templates state machines are written with, and what each of them expects of a machine."""
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from pathlib import Path
 SUFFIX = ".template"
 _OPTION = re.compile(r"\boptions\.(\w+)|\boptions\[['\"](\w+)['\"]\]")
 _TAKES_KEYS = re.compile(r"\bchildren\.keys\b|\binput_keys\b")
+_DOC = re.compile(r'^class\b.*:\s*\n\s*"""(.*?)"""', re.MULTILINE | re.DOTALL)
 _PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
 
 
@@ -25,6 +27,7 @@ class TemplateSource:
         takes_keys: whether its machines can have ``input_keys`` and ``output_keys``.
         userdata: keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
             None when it does not say.
+        doc: docstring of its class.
     """
 
     name: str
@@ -33,6 +36,7 @@ class TemplateSource:
     options: frozenset[str]
     takes_keys: bool
     userdata: frozenset[str] | None
+    doc: str
 
 
 class TemplateCatalogue:
@@ -69,4 +73,6 @@ def _read_template(name: str, file: Path) -> TemplateSource:
     declared = _PROVIDES.search(text)
     provided = None if declared is None else frozenset(re.findall(r"\w+", declared.group(1)))
     concurrent, takes_keys = re.search(r"\bConcurrence\b", text), _TAKES_KEYS.search(text)
-    return TemplateSource(name, file, concurrent is not None, options, takes_keys is not None, provided)
+    doc = _DOC.search(text)
+    return TemplateSource(name, file, concurrent is not None, options, takes_keys is not None, provided,
+                          "" if doc is None else inspect.cleandoc(doc.group(1)))

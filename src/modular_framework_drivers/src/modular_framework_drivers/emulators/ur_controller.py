@@ -103,7 +103,7 @@ class UrController:
         self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.time_s = 0.0
         self.program: Program | None = None
-        self.on_command: Callable[[float, Sequence[float], Sequence[float]], None] | None = None
+        self.on_cycle: Callable[[], None] | None = None
         self._unlock_delay_s = unlock_delay_s
         self._stopped_at_s = 0.0
 
@@ -117,6 +117,11 @@ class UrController:
         """Where the joints are told to be [rad]."""
         order = self.motion.order
         return order.target if order.drive in (Drive.SERVO, Drive.MOVE) else self.motion.positions
+
+    @property
+    def streamed(self) -> bool:
+        """Whether the joints follow positions that a client streams."""
+        return self.motion.order.drive is Drive.SERVO
 
     @property
     def speed_scaling(self) -> float:
@@ -144,15 +149,16 @@ class UrController:
             LOGGER.warning("the arm is %.3f rad behind its servo target, %.1f rad are allowed: protective stop",
                            self.motion.servo_error, MAX_SERVO_ERROR)
             self.protective_stop()
-        if self.on_command is not None and self.motion.order.drive is Drive.SERVO:
-            self.on_command(self.time_s, self.motion.order.target, self.motion.positions)
+        if self.on_cycle is not None:
+            self.on_cycle()
 
     def start_program(self, program: Program) -> bool:
-        """Run a program in place of what runs; False when the arm is not ready for one."""
+        """Run a program in place of what runs, whose motion ends; False when the arm is not ready for one."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety_mode is not SafetyMode.NORMAL:
             LOGGER.warning("program %s not started: robot mode %s, safety mode %s", program.name,
                            self.robot_mode.name, self.safety_mode.name)
             return False
+        self.stop_program()
         self.program = program
         self.runtime_state = RuntimeState.PLAYING
         return True

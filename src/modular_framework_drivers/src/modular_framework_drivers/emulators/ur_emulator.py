@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import IO
 
 from modular_framework_control.real_time import run_in_real_time
@@ -209,25 +210,26 @@ class UrEmulator:
                 f"connections={self._links.connections} payload_kg={controller.payload_kg:g} "
                 f"q={','.join(f'{position:.6f}' for position in controller.motion.positions)}")
 
-    def order_log(self, path: str) -> None:
-        """Write every commanded position to this file: wall time [s], controller time [s], commanded q, actual q."""
+    def order_log(self, path: str, always: bool = False) -> None:
+        """Write streamed positions, `always` every cycle, to a file: wall, controller time [s], commanded, actual q."""
         self._end_log()
         self._log = open(path, "w", encoding="utf-8")  # noqa: SIM115  closed by _end_log
         self._log.write("wall_s,controller_s," + ",".join(f"{kind}_{joint}" for kind in ("command", "actual")
                                                            for joint in range(JOINTS)) + "\n")
-        self.controller.on_command = self._write_log
+        self.controller.on_cycle = partial(self._write_log, self._log, always)
 
     def order_end_log(self) -> None:
         """Finish the file of `log`."""
         self._end_log()
 
-    def _write_log(self, time_s: float, command: Sequence[float], actual: Sequence[float]) -> None:
-        if self._log is not None:
-            numbers = ",".join(f"{value:.9f}" for value in (*command, *actual))
-            self._log.write(f"{time.time():.6f},{time_s:.6f},{numbers}\n")
+    def _write_log(self, log: IO[str], always: bool) -> None:
+        controller = self.controller
+        if always or controller.streamed:
+            numbers = ",".join(f"{value:.9f}" for value in (*controller.target_positions, *controller.motion.positions))
+            log.write(f"{time.time():.6f},{controller.time_s:.6f},{numbers}\n")
 
     def _end_log(self) -> None:
-        self.controller.on_command = None
+        self.controller.on_cycle = None
         log, self._log = self._log, None
         if log is not None:
             log.close()

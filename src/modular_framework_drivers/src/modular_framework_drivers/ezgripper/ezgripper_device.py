@@ -2,10 +2,12 @@
 """An EZGripper that can be used from any thread and never makes one wait.
 
 A thread of its own talks to the servos: it connects, calibrates, follows goals, and, whatever goes wrong, says so and
-comes back by itself. Everybody else reads its last state and leaves goals.
+comes back by itself. Everybody else reads its last state and leaves a wish, each of them one attribute: there is no
+lock that a control loop could have to wait for.
 """
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import threading
@@ -54,6 +56,19 @@ class GripperState:
     fault: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """What was asked for last: a goal, or with None to stop.
+
+    Attributes:
+        goal: where to go.
+        faults: how many faults had been told before; a wish from before one is void.
+    """
+
+    goal: Goal | None
+    faults: int
+
+
 class _Ended(Exception):
     """The device is to be closed."""
 
@@ -69,9 +84,10 @@ class EzGripper:
         self.settings = settings
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        self._lock = threading.Lock()
         first = Goal(0, settings.start_position, settings.start_torque)
-        self._wanted, self._stop_wanted = first, False
+        self._numbers = itertools.count(1)
+        self._faults = 0
+        self._wish = self._taken = _Wish(first, 0)
         self._grip = Grip(settings.rules, first)
         self._bus = DynamixelBus(settings.port_name, settings.baudrate, settings.link_timeout_s)
         self._servos = GripperServos(self._bus, settings.servo_ids, self._wait)
@@ -120,18 +136,14 @@ class EzGripper:
             raise ValueError(f"{self.settings.name}: position {position} rad is outside [0, {CLOSED_POSITION}]")
         if not 0 <= torque <= TORQUE_MAX:
             raise ValueError(f"{self.settings.name}: torque {torque} is outside [0, {TORQUE_MAX}]")
-        with self._lock:
-            if self._state.fault:
-                return self._wanted.number + 1
-            if (position, torque) != (self._wanted.position, self._wanted.torque) or self._stop_wanted:
-                self._wanted = Goal(self._wanted.number + 1, position, torque)
-                self._stop_wanted = False
-            return self._wanted.number
+        faults, goal = self._faults, Goal(next(self._numbers), position, torque)
+        if not self._state.fault:
+            self._wish = _Wish(goal, faults)
+        return goal.number
 
     def stop(self) -> None:
         """Stop the fingers where they are; what they hold they go on holding."""
-        with self._lock:
-            self._stop_wanted = True
+        self._wish = _Wish(None, self._faults)
 
     # ---- the gripper's thread ----
 
@@ -176,25 +188,25 @@ class EzGripper:
         """Open the line, and bring the servos into a known state."""
         self._bus.open()
         self._servos.set_up()
+        faithful = False
         if not self._servos.calibrated:
             self._report("calibrating", logging.INFO)
             self._servos.calibrate()
             self._follow_anew(self.settings.start_position)
-        elif self._servos.find_again():
-            self.stop()
         else:
-            self._follow_anew(self._servos.read().position)
+            faithful = self._servos.find_again()
+            if not faithful:
+                self._follow_anew(self._servos.read().position)
         self._off_since_s = None
         reading, now_s = self._servos.read(), time.monotonic()
-        self._take_orders(reading.position, now_s)
+        if faithful:
+            self._grip.stop(reading.position)
         self._servos.drive(self._grip.update(reading.position, now_s))
 
     def _follow_anew(self, position: float) -> None:
-        """Forget all goals; the new one is `position` [rad]."""
-        with self._lock:
-            goal = Goal(self._wanted.number + 1, min(max(position, 0.0), CLOSED_POSITION), self.settings.start_torque)
-            self._wanted, self._stop_wanted = goal, False
-            self._grip = Grip(self.settings.rules, goal)
+        """Forget the goal; the new one is `position` [rad]."""
+        position = min(max(position, 0.0), CLOSED_POSITION)
+        self._grip = Grip(self.settings.rules, Goal(next(self._numbers), position, self.settings.start_torque))
 
     def _cycle(self) -> None:
         reading, now_s = self._servos.read(), time.monotonic()
@@ -212,12 +224,16 @@ class EzGripper:
         self._publish(reading, now_s, "")
 
     def _take_orders(self, position: float, time_s: float) -> None:
-        with self._lock:
-            if self._stop_wanted:
-                self._grip.stop(position)
-                self._wanted, self._stop_wanted = self._grip.goal, False
-            elif self._wanted.number != self._grip.goal.number:
-                self._grip.retarget(self._wanted, position, time_s)
+        wish = self._wish
+        if wish is self._taken or wish.faults != self._faults:
+            return
+        self._taken, before = wish, self._grip.goal
+        if wish.goal is None:
+            self._grip.stop(position)
+        elif (wish.goal.position, wish.goal.torque) == (before.position, before.torque):
+            self._grip.goal = wish.goal
+        else:
+            self._grip.retarget(wish.goal, position, time_s)
 
     def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
         """Say it; after a pause give the torque again, where the fingers are."""
@@ -238,10 +254,11 @@ class EzGripper:
         self._warm = temperature >= WARM
 
     def _publish(self, reading: GripperReading, now_s: float, fault: str) -> None:
-        with self._lock:
-            recovered = self._state.fault and not fault
-            self._state = GripperState(now_s, reading, self._grip.motion, self._grip.goal, self._ready, fault)
-        if recovered:    # not while the control loop may wait for the lock
+        recovered = self._state.fault and not fault
+        self._state = GripperState(now_s, reading, self._grip.motion, self._grip.goal, self._ready, fault)
+        if fault:
+            self._faults += 1
+        if recovered:
             LOGGER.info("%s: in use", self.settings.name)
 
     def _report(self, problem: str, level: int = logging.ERROR) -> None:
@@ -249,5 +266,5 @@ class EzGripper:
         text = f"{self.settings.name}: {problem}"
         if text != self._state.fault:
             LOGGER.log(level, "%s", text)
-        with self._lock:
-            self._state = replace(self._state, fault=text)
+        self._state = replace(self._state, fault=text)
+        self._faults += 1

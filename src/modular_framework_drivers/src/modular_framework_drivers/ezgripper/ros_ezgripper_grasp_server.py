@@ -12,20 +12,23 @@ from sensor_msgs.msg import JointState
 from modular_framework_control.node_handle import ParameterError
 from modular_framework_control.ros_node_handle import RosNodeHandle
 from modular_framework_control.ros_telling import tell
-from modular_framework_core.grasp_server import GraspCommandError, Outcome
+from modular_framework_core.grasp_server import GraspCommandError, Outcome, refuse_no_effort
 from modular_framework_core.robot_groups import Group, Joint
 from modular_framework_core.ros_grasp_server import GraspServer
 from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT
 from modular_framework_drivers.ezgripper.grip import Motion, Standing
-from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
+from modular_framework_drivers.ezgripper.gripper_servos import CALIBRATION_TORQUE, CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
+from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
 
 ACTION_NAME = "moveit_grasp_action_server"
 POLL_S = 0.01
 STOP_TIMEOUT_S = 1.0
 STANDING_SPEED, STANDING_S = 0.05, 0.1
+PRESSING_SHARE = 0.5
+"""Of the torque allowed; motors that give less do not press."""
 
 
 class EzGripperManipulator:
@@ -54,22 +57,28 @@ class EzGripperManipulator:
         return self._message(self._gripper.state())
 
     def move(self, motion: WantedMotion) -> Outcome:
-        """Move the fingers until they are at their goal or hold something.
+        """Move the fingers until they stand at their goal or hold something.
 
         Raises:
-            GraspCommandError: the gripper has a fault, time is up, or the motion was stopped.
+            GraspCommandError: the gripper has a fault or may use no torque, time is up, or the motion was stopped.
         """
+        torque = self._gripper.settings.start_torque
+        if self._joint in motion.efforts:
+            torque = round(motion.efforts[self._joint] * FULL_TORQUE)
+            refuse_no_effort(self._joint, torque)
         self._refuse_fault(self._gripper.state())
         position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # what was rounded is forgiven
-        number = self._gripper.command(position, round(motion.efforts[self._joint] * FULL_TORQUE))
+        number = self._gripper.command(position, torque)
         end_s = time.monotonic() + motion.timeout_s
+        standing = Standing(STANDING_SPEED, STANDING_S)    # what they held may give way to the new torque
         while True:
             state = self._gripper.state()
             self._refuse_fault(state)
             if motion.stop_requested():
                 self._stop()
                 raise GraspCommandError("stopped on request")
-            if state.goal.number == number and state.motion is not Motion.MOVING:
+            stands = state.goal.number == number and standing.update(state.reading.velocity, state.stamp_s)
+            if stands and state.motion is not Motion.MOVING:
                 return self._outcome(state)
             if time.monotonic() > end_s:
                 self._stop()
@@ -80,8 +89,11 @@ class EzGripperManipulator:
     def _outcome(self, state: GripperState) -> Outcome:
         reading, held = state.reading, state.motion is Motion.HOLDING
         does = "press" if held else "stand"
+        allowed = min(state.goal.torque, self._gripper.settings.rules.hold_torque)
+        pressing = held and allowed >= CALIBRATION_TORQUE and (
+            abs(reading.load) * TORQUE_MAX >= PRESSING_SHARE * allowed)
         return Outcome({self._joint: reading.position}, held,
-                       f"the fingers {does} at {reading.position:.4f} rad with {reading.load:.0%} torque")
+                       f"the fingers {does} at {reading.position:.4f} rad with {reading.load:.0%} torque", pressing)
 
     def _refuse_fault(self, state: GripperState) -> None:
         if state.fault:

@@ -9,9 +9,14 @@ from collections.abc import Iterator, Sequence
 
 from modular_framework_drivers.ur.arm_messages import MESSAGE_SIZE
 
+_ORDINARY = ("chrt", "--other", "0")
+"""Makes itself ordinary and becomes the command that follows: the starter may run in real time, and to start an
+interpreter takes long. A child that is ordinary before its exec would hold its starter up, and all other threads
+of that with it, for as long as others use the processors."""
+
 
 class ChildProcess:
-    """A Python module run as a process of its own.
+    """A Python module run as a process of its own, with ordinary scheduling whatever its starter has.
 
     Args:
         module: what to run; gets the first argument, the file descriptor of its socket, then the others.
@@ -27,8 +32,9 @@ class ChildProcess:
         with other:
             role, *rest = arguments
             try:
-                self._process = subprocess.Popen([sys.executable, "-m", module, role, str(other.fileno()), *rest],
-                                                 pass_fds=[other.fileno()], stdin=subprocess.DEVNULL)
+                self._process = subprocess.Popen(
+                    [*_ORDINARY, sys.executable, "-m", module, role, str(other.fileno()), *rest],
+                    pass_fds=[other.fileno()], stdin=subprocess.DEVNULL)
             except OSError:
                 self._socket.close()
                 raise

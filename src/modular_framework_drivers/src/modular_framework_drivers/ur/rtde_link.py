@@ -35,6 +35,7 @@ _CONNECT_TIMEOUT_S = 5.0        # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0       # from then until the program is uploaded and runs
 _MUTE_S = 0.5                   # a process that says nothing for so long does nothing either
 _STOP_PATIENCE_S = 1.5          # for the arm to come to rest when the link is closed
+_LAST_WORD_S = 0.1              # for a given up process to send its stop, behind all commands still on their way
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,7 +260,7 @@ class RtdeLink:
                 self._control = self._start("control", self._control_arguments(), now_s)
         elif not wanted or control.failed:
             self._control, control.failed = None, True
-            control.process.end()
+            control.process.end(_LAST_WORD_S)
         elif late := control.too_late(now_s):
             self.drop_program(f"the program was not accepted {late}")
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import os
 import signal
 import socket
 import sys
@@ -173,7 +172,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one of the two processes; returns the exit code."""
     options = command_line().parse_args(arguments)
     signal.signal(signal.SIGINT, signal.SIG_IGN)    # ctrl-c in the terminal is for the control loop, which ends us
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))     # not what the starter happened to have
     with socket.socket(fileno=options.channel) as channel:
         channel.setblocking(True)     # one made where sockets have a default timeout, as rospy sets it, does not block
         try:

@@ -42,9 +42,6 @@ class AllowManipulatorCollisions(FrameworkState):
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if collision_type not in MODIFICATIONS:
-            raise ValueError(f"AllowManipulatorCollisions: collision_type is '{collision_type}', allowed are "
-                             f"{list(MODIFICATIONS)}")
         if links and not collision_type:
             raise ValueError("AllowManipulatorCollisions: links are of use with a collision_type only; give one")
         self._type, self._allow, self._links = collision_type, bool(allow), list(links)

@@ -12,6 +12,7 @@ import rostopic
 from actionlib_msgs.msg import GoalStatus
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import NotNegative
 from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result, wait_until
 from modular_framework_states.message_filling import FillingError, difference, filled
 
@@ -35,7 +36,8 @@ class CallAction(FrameworkState):
     """
 
     def __init__(self, action_name: str, goal: Mapping[str, Any] | None = None,
-                 expect: Mapping[str, Any] | None = None, timeout: float = 60.0, server_timeout: float = 10.0,
+                 expect: Mapping[str, Any] | None = None, timeout: NotNegative = 60.0,
+                 server_timeout: NotNegative = 10.0,
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -9,6 +9,7 @@ import rospy
 import rosservice
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import NotNegative
 from modular_framework_core.ros_calls import CallError, call_service, wait_until
 from modular_framework_states.message_filling import FillingError, difference, filled
 
@@ -32,7 +33,7 @@ class CallService(FrameworkState):
     """
 
     def __init__(self, service_name: str, request: Mapping[str, Any] | None = None,
-                 expect: Mapping[str, Any] | None = None, timeout: float = 10.0,
+                 expect: Mapping[str, Any] | None = None, timeout: NotNegative = 10.0,
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

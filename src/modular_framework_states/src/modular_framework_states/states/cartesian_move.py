@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import rospy
@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.moveit_requests import error_name, robot_state
+from modular_framework_core.option_limits import Limits, Share, Vector
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_states.manager_clients import ManagerError, fetch
 
@@ -27,7 +28,7 @@ class CartesianMove(FrameworkState):
         offset: x, y, z to move by [m], instead of a pose; the orientation stays.
         offset_in_tip: True gives the offset in the frame of the tip link, False in the planning frame.
         max_step: Longest step along the line [m].
-        min_fraction: Share of the line that must be free, in (0, 1]; anything less is not moved at all.
+        min_fraction: Share of the line that must be free; anything less is not moved at all.
         speed: Bound on the speed of the tip [m/s]; 0 for none.
         avoid_collisions: False moves through contacts on purpose.
         outcomes: First positive, last negative.
@@ -36,18 +37,14 @@ class CartesianMove(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, pose_name: str = "", offset: Sequence[float] | None = None, offset_in_tip: bool = False,
-                 max_step: float = 0.01, min_fraction: float = 1.0, speed: float = 0.0, avoid_collisions: bool = True,
+    def __init__(self, pose_name: str = "", offset: Vector | None = None, offset_in_tip: bool = False,
+                 max_step: Annotated[float, Limits(above=0.0, at_most=1000.0)] = 0.01, min_fraction: Share = 1.0,
+                 speed: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 0.0, avoid_collisions: bool = True,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if bool(pose_name) == (offset is not None):
             raise ValueError("CartesianMove: give either pose_name or offset")
-        if offset is not None and len(offset) != 3:
-            raise ValueError(f"CartesianMove: offset has {len(offset)} numbers, it needs x, y and z")
-        if not float(max_step) > 0.0 or not 0.0 < float(min_fraction) <= 1.0 or not float(speed) >= 0.0:
-            raise ValueError(f"CartesianMove: max_step {max_step} must be above 0, min_fraction {min_fraction} in "
-                             f"(0, 1] and speed {speed} 0 or more")
         self._pose_name, self._offset, self._in_tip = pose_name, offset, offset_in_tip
         self._request = GetCartesianPathRequest(max_step=float(max_step), avoid_collisions=bool(avoid_collisions),
                                                 max_cartesian_speed=float(speed))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Limits
 
 
 class Counter(FrameworkState):
@@ -23,11 +24,9 @@ class Counter(FrameworkState):
             ``counter`` receives how often it was passed, from 1, when it is listed.
     """
 
-    def __init__(self, count: int, outcomes: Sequence[str] = ("success", "fail"),
+    def __init__(self, count: Annotated[int, Limits(at_least=1)], outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if int(count) < 1:
-            raise ValueError(f"Counter: count is {count}, allowed is 1 or more")
         self._count, self._passed = int(count), 0
 
     def execute(self, userdata: Any) -> str:

@@ -14,6 +14,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.moveit_requests import robot_state
+from modular_framework_core.option_limits import NotNegative, Positive
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_states.arm_positions import run_to_end
 from modular_framework_states.manager_clients import ManagerError, fetch
@@ -38,13 +39,10 @@ class ExecuteTrajectory(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, trajectory_name: str = "", step: float = 0.05, goal_tolerance: float = 0.03,
+    def __init__(self, trajectory_name: str = "", step: NotNegative = 0.05, goal_tolerance: Positive = 0.03,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if not float(step) >= 0.0 or not float(goal_tolerance) > 0.0:
-            raise ValueError(f"ExecuteTrajectory: step {step} must be 0 or more and goal_tolerance {goal_tolerance} "
-                             "above 0")
         self._name, self._step, self._goal_tolerance = trajectory_name, float(step), float(goal_tolerance)
 
     def execute(self, userdata: Any) -> str:

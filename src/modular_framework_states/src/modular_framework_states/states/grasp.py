@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_states.grasp_goals import STAGES, GraspGoalError, Stage, send
+from modular_framework_core.option_limits import Positive
+from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
 from modular_framework_states.manager_clients import ManagerError, fetch
 
 
@@ -24,15 +25,12 @@ class Grasp(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, grasp_type: Literal["pregrasp", "grasp", "postgrasp"], grasp_name: str = "",
-                 timeout: float = 60.0, outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+    def __init__(self, grasp_type: Stage, grasp_name: str = "", timeout: Positive = 60.0,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if grasp_type not in STAGES:
-            raise ValueError(f"Grasp: grasp_type is '{grasp_type}', allowed are {list(STAGES)}")
-        self._type: Stage = grasp_type
-        self._name, self._timeout_s = grasp_name, float(timeout)
+        self._type, self._name, self._timeout_s = grasp_type, grasp_name, float(timeout)
 
     def execute(self, userdata: Any) -> str:
         """Sends the goal and waits for its end."""

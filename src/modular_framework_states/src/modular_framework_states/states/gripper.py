@@ -9,6 +9,7 @@ import rospy
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.option_limits import Finite, Positive, Share
 from modular_framework_core.robot_groups import RobotModelError, read_group
 from modular_framework_states.grasp_goals import GraspGoalError, send
 
@@ -20,7 +21,7 @@ class Gripper(FrameworkState):
         posture: Name of a state of the manipulator's planning group: open, closed.
         positions: Joint to position [rad or m], instead of a posture.
         grip: True closes on an object: it is positive when something stops the fingers before they are shut.
-        torque: Share of the greatest torque, in (0, 1].
+        torque: Share of the greatest torque.
         timeout: Longest wait for the end of the motion [s].
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
@@ -28,15 +29,13 @@ class Gripper(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, posture: str = "", positions: Mapping[str, float] | None = None, grip: bool = False,
-                 torque: float = 1.0, timeout: float = 30.0, outcomes: Sequence[str] = ("success", "fail"),
+    def __init__(self, posture: str = "", positions: Mapping[str, Finite] | None = None, grip: bool = False,
+                 torque: Share = 1.0, timeout: Positive = 30.0, outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if bool(posture) == bool(positions):
             raise ValueError("Gripper: give either posture or positions")
-        if not 0.0 < float(torque) <= 1.0:
-            raise ValueError(f"Gripper: torque is {torque}, allowed is more than 0, up to 1")
         self._posture, self._positions = posture, dict(positions or {})
         self._stage = "grasp" if grip else "pregrasp"
         self._torque, self._timeout_s = float(torque), float(timeout)

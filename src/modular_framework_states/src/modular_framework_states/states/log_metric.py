@@ -11,6 +11,7 @@ import rospy
 from std_msgs.msg import String
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Finite
 
 TOPIC = "task_metrics"
 
@@ -29,7 +30,7 @@ class LogMetric(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, name_of_metric: str, value: float | None = None, from_key: str = "", unit: str = "",
+    def __init__(self, name_of_metric: str, value: Finite | None = None, from_key: str = "", unit: str = "",
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import NotNegative
 from modular_framework_states.arm_positions import run_to_end, worst_joint
 from modular_framework_states.manager_clients import ManagerError, fetch
 
@@ -24,7 +25,7 @@ class Move(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, plan_name: str = "", start_tolerance: float = 0.02, goal_tolerance: float = 0.03,
+    def __init__(self, plan_name: str = "", start_tolerance: NotNegative = 0.02, goal_tolerance: NotNegative = 0.03,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_states.grasp_stages import (
@@ -15,7 +15,6 @@ from modular_framework_states.grasp_stages import (
 from modular_framework_states.manager_clients import ManagerError, fetch, kind_of, store_plan
 
 StateType = Literal["pose", "joint_state", "pregrasp", "grasp", "postgrasp"]
-STATE_TYPES = get_args(StateType)
 FROM_USERDATA = "userdata"
 
 
@@ -43,11 +42,6 @@ class Plan(FrameworkState):
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if target_state_type not in STATE_TYPES:
-            raise ValueError(f"Plan: target_state_type is '{target_state_type}', allowed are {list(STATE_TYPES)}")
-        if starting_state_type and starting_state_type not in STATE_TYPES:
-            raise ValueError(f"Plan: starting_state_type is '{starting_state_type}', allowed are {list(STATE_TYPES)} "
-                             "or nothing for the current state")
         self._target_type, self._target_name = target_state_type, target_state_name
         self._start_type, self._start_name = starting_state_type, starting_state_name
         self._plan_name = plan_name

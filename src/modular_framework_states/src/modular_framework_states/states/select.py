@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_states.manager_clients import ManagerError, fetch, kind_of
 
 MessageType = Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"]
-MESSAGE_TYPES = get_args(MessageType)
 
 
 class Select(FrameworkState):
@@ -32,8 +31,6 @@ class Select(FrameworkState):
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if message_type not in MESSAGE_TYPES:
-            raise ValueError(f"Select: message_type is '{message_type}', allowed are {list(MESSAGE_TYPES)}")
         self._kind = kind_of(message_type)
         self._key = f"selected_{self._kind}"
         self._names = [message_names] if isinstance(message_names, str) else list(message_names or [""])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Limits, Share
 
 
 class SetPlanner(FrameworkState):
@@ -15,15 +16,17 @@ class SetPlanner(FrameworkState):
         planner_id: Name of the planner, or ``pipeline/planner``; empty leaves it.
         planning_time: Time a plan may take [s].
         attempts: How often a plan is tried for.
-        speed_factor: Share of the joints' velocity and acceleration limits, in (0, 1].
+        speed_factor: Share of the joints' velocity and acceleration limits.
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
         output_keys: Userdata that is written.
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, planner_id: str = "", planning_time: float | None = None, attempts: int | None = None,
-                 speed_factor: float | None = None, outcomes: Sequence[str] = ("success", "fail"),
+    def __init__(self, planner_id: str = "",
+                 planning_time: Annotated[float, Limits(above=0.0, at_most=86400.0)] | None = None,
+                 attempts: Annotated[int, Limits(at_least=1)] | None = None, speed_factor: Share | None = None,
+                 outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -9,6 +9,7 @@ import rospy
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.manage_object import ObjectRequestError, request_to_spawn
+from modular_framework_core.option_limits import Vector
 from modular_framework_core.ros_manage_object import RefusedError, spawn
 
 
@@ -27,8 +28,8 @@ class SpawnObject(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, object_type: str, object_name: str = "", position: Sequence[float] = (0.0, 0.0, 0.0),
-                 orientation: Sequence[float] = (0.0, 0.0, 0.0), reference_frame: str = "world",
+    def __init__(self, object_type: str, object_name: str = "", position: Vector = (0.0, 0.0, 0.0),
+                 orientation: Vector = (0.0, 0.0, 0.0), reference_frame: str = "world",
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

@@ -8,6 +8,7 @@ from typing import Any
 import rospy
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import NotNegative, Positive
 
 
 class Wait(FrameworkState):
@@ -23,12 +24,11 @@ class Wait(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, duration: float, timeout: float | None = None, outcomes: Sequence[str] = ("success", "fail"),
+    def __init__(self, duration: NotNegative, timeout: Positive | None = None,
+                 outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._duration_s = float(duration)
-        if not 0.0 <= self._duration_s < float("inf"):
-            raise ValueError(f"Wait: duration is {duration} s, allowed is 0 or more")
         self._timeout_s = 3.0 * self._duration_s + 10.0 if timeout is None else float(timeout)
 
     def execute(self, userdata: Any) -> str:

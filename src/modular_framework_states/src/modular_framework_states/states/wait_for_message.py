@@ -10,6 +10,7 @@ import roslib.message
 import rospy
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Positive
 from modular_framework_states.message_filling import difference
 
 FOUND = "message"
@@ -29,12 +30,10 @@ class WaitForMessage(FrameworkState):
             ``message`` receives the message when it is listed.
     """
 
-    def __init__(self, topic_name: str, timeout: float | None = None, expect: Mapping[str, Any] | None = None,
+    def __init__(self, topic_name: str, timeout: Positive | None = None, expect: Mapping[str, Any] | None = None,
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if timeout is not None and not float(timeout) > 0.0:
-            raise ValueError(f"WaitForMessage: timeout is {timeout} s, allowed is more than 0, or none for no limit")
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._expected = dict(expect or {})

@@ -10,6 +10,7 @@ import rospy
 from std_msgs.msg import Bool, String
 
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Positive
 
 REASON_WAIT_S = 0.5
 
@@ -29,12 +30,10 @@ class WaitForSignal(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, topic_name: str, timeout: float | None = None,
+    def __init__(self, topic_name: str, timeout: Positive | None = None,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        if timeout is not None and not float(timeout) > 0.0:
-            raise ValueError(f"WaitForSignal: timeout is {timeout} s, allowed is more than 0, or none for no limit")
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._lock = threading.Lock()

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The keys of a machine's header, said once: for the check of a task, for ``--explain`` and for the JSON Schema."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_core.task_constructor.option_types import or_reference
+from modular_framework_core.task_constructor.template_catalogue import TemplateSource
+
+SHARED_USERDATA = "self.userdata"
+NAMES = {"type": "array", "items": {"type": "string"}, "uniqueItems": True}
+OUTCOMES = {**NAMES, "minItems": 1}
+NAME_MAP = {"type": "object", "additionalProperties": {"type": "string"}}
+
+
+@dataclass(frozen=True, slots=True)
+class MachineKey:
+    """A key of the header of a machine.
+
+    Attributes:
+        name: spelling.
+        form: what its value looks like, in words.
+        meaning: what it is for.
+        schema: JSON Schema of its value.
+        at_root: whether the task itself has it; ``nested`` whether a nested machine has it: "required", "optional" or
+            "" for not at all.
+        nested: see ``at_root``.
+    """
+
+    name: str
+    form: str
+    meaning: str
+    schema: dict[str, Any]
+    at_root: str = "optional"
+    nested: str = "optional"
+
+
+_KEYS = (
+    MachineKey("name", "a name", "Name of the task and its file; of a nested machine, the name of its class, which is "
+               "made of the label if left out.", {"type": "string"}, at_root="required"),
+    MachineKey("node_name", "a name", "Name of the ROS node that runs the task; the task's if left out.",
+               {"type": "string"}, nested=""),
+    MachineKey("source", "a name", "The template the machine is written with: this one.",
+               {"type": "string"}, "required", "required"),
+    MachineKey("outcomes", "a list of names", "What the machine may end with, first = success; success and fail if "
+               "left out.", or_reference(OUTCOMES), at_root="required"),
+    MachineKey("transitions", "a mapping {outcome: label, or outcome of the machine around}", "Where to go on after "
+               "each outcome; none is needed for an outcome that the machine around has too.",
+               or_reference(NAME_MAP), at_root=""),
+    MachineKey("default_outcome", "a name", "Outcome when no entry of the outcome map is met; the last one if left "
+               "out.", {"type": "string"}),
+    MachineKey("outcome_map", "a mapping {outcome: {label: outcome of that state}}", "Which outcomes of the states, "
+               "together, give which outcome of the machine.",
+               or_reference({"type": "object", "additionalProperties": NAME_MAP})),
+    MachineKey("userdata", SHARED_USERDATA, "Shares the userdata of the machine around; it has its own if left out.",
+               {"const": SHARED_USERDATA}, at_root=""),
+    MachineKey("input_keys", "a list of names", "Userdata copied from the machine around when this one begins.",
+               or_reference(NAMES), at_root=""),
+    MachineKey("output_keys", "a list of names", "Userdata copied to the machine around when this one ends.",
+               or_reference(NAMES), at_root=""),
+    MachineKey("params", "a mapping {key: any value}", "Values that everything below may use as params.<key>.",
+               {"type": "object"}),
+    MachineKey("states", "a list of '- Label: {source: ...}'", "The states and nested machines; the first one begins, "
+               "in a concurrent machine all at once.", {"$ref": "#/definitions/states"}, "required", "required"),
+)
+
+
+def machine_keys(template: TemplateSource) -> list[MachineKey]:
+    """Return the keys of machines with a template, in the order they are usually written."""
+    absent = set() if template.concurrent else {"default_outcome", "outcome_map"}
+    absent |= set() if template.takes_keys else {"input_keys", "output_keys"}
+    own = [MachineKey(name, "any value", f"Of this template, which reads it as options.{name}.", {})
+           for name in sorted(template.options)]
+    return [*(key for key in _KEYS if key.name not in absent), *own]
+
+
+def required_keys(*, is_root: bool) -> list[str]:
+    """Return the names of the keys that no machine can do without."""
+    return [key.name for key in _KEYS if (key.at_root if is_root else key.nested) == "required"]
+
+
+def root_keys() -> list[str]:
+    """Return the names of the keys a task may have, whatever its template."""
+    return [key.name for key in _KEYS if key.at_root]

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads what values an option may have from its annotation: as source that is not run, or as the type itself."""
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+from collections.abc import Mapping as MappingABC
+from dataclasses import replace
+from typing import Any
+
+from modular_framework_core.option_limits import Length, Limits
+from modular_framework_core.task_constructor.option_types import (
+    PLAIN,
+    AnyOf,
+    Anything,
+    Choice,
+    ListOf,
+    MappingOf,
+    OptionType,
+    Plain,
+)
+
+_LISTS = ("list", "List", "Sequence", "Iterable", "Collection", "tuple", "Tuple", "set", "frozenset")
+_MAPPINGS = ("dict", "Dict", "Mapping")
+
+
+def from_annotation(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> OptionType:
+    """Return the type an annotation stands for.
+
+    Args:
+        annotation: the annotation of an argument, or None.
+        aliases: assignments of the module, name -> value, for types that have a name of their own.
+    """
+    return _Reader(aliases).read(annotation)
+
+
+def from_hint(hint: Any) -> OptionType:
+    """Return the type an annotation stands for that Python has evaluated: read from how Python writes it."""
+    text = hint.__name__ if inspect.isclass(hint) and not hasattr(hint, "__origin__") else repr(hint)
+    return _Reader({}).read(ast.Constant(text))
+
+
+class _Reader:
+    """Reads annotations; what it does not know it takes as any value."""
+
+    def __init__(self, aliases: MappingABC[str, ast.expr]) -> None:
+        self._aliases = aliases
+        self._open: set[str] = set()
+
+    def read(self, node: ast.expr | None) -> OptionType:
+        match node:
+            case ast.Constant(value=None) | ast.Name(id="NoneType"):
+                return Plain("None")
+            case ast.Constant(value=str(text)):
+                return self._text(text)
+            case ast.Name(id=name) if name in PLAIN:
+                return Plain(name)
+            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _LISTS:
+                return ListOf(Anything())
+            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _MAPPINGS:
+                return MappingOf(Anything())
+            case ast.Name(id=name) if name in self._aliases and name not in self._open:
+                return self._alias(name)
+            case ast.BinOp(left=left, op=ast.BitOr(), right=right):
+                return self._any_of([left, right])
+            case ast.Subscript(value=ast.Name(id=name) | ast.Attribute(attr=name), slice=inner):
+                return self._subscript(name, list(inner.elts) if isinstance(inner, ast.Tuple) else [inner])
+        return Anything()
+
+    def _alias(self, name: str) -> OptionType:
+        self._open.add(name)
+        try:
+            return self.read(self._aliases[name])
+        finally:
+            self._open.discard(name)
+
+    def _text(self, text: str) -> OptionType:
+        try:
+            return self.read(ast.parse(text, mode="eval").body)
+        except (SyntaxError, ValueError):
+            return Anything()
+
+    def _subscript(self, name: str, inner: list[ast.expr]) -> OptionType:
+        if name == "Literal":
+            values = [item.value for item in inner if isinstance(item, ast.Constant)]
+            return Choice(tuple(values)) if len(values) == len(inner) else Anything()
+        if name == "Annotated":
+            return functools.reduce(_limited, map(self._said, inner[1:]), self.read(inner[0]))
+        if name == "Optional":
+            return self._any_of([*inner, ast.Constant(value=None)])
+        if name == "Union":
+            return self._any_of(inner)
+        if name in _LISTS:
+            items = [item for item in inner if not (isinstance(item, ast.Constant) and item.value is ...)]
+            read = {self.read(item) for item in items}
+            return ListOf(read.pop() if len(read) == 1 else AnyOf(tuple(sorted(read, key=repr))))
+        if name in _MAPPINGS:
+            return MappingOf(self.read(inner[-1]))
+        return Anything()
+
+    def _any_of(self, nodes: list[ast.expr]) -> OptionType:
+        found: list[OptionType] = []
+        for node in nodes:
+            item = self.read(node)
+            found += [inner for inner in (item.types if isinstance(item, AnyOf) else (item,)) if inner not in found]
+        if any(isinstance(item, Anything) for item in found):
+            return Anything()
+        choices = tuple(value for item in found if isinstance(item, Choice) for value in item.values)
+        if choices:
+            others = [item for item in found if not isinstance(item, Choice)]
+            found = [Choice(tuple(dict.fromkeys(choices))), *others]
+        return found[0] if len(found) == 1 else AnyOf(tuple(found))
+
+    def _said(self, node: ast.expr) -> Limits | Length | None:
+        """Return what ``Limits(...)`` or ``Length(...)`` says; None where it is something else, or no plain numbers."""
+        match node:
+            case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=arguments, keywords=keywords):
+                kinds: dict[str, type[Limits | Length]] = {"Limits": Limits, "Length": Length}
+                try:
+                    return kinds[name](*[self._number(item) for item in arguments],
+                                       **{str(item.arg): self._number(item.value) for item in keywords})
+                except (KeyError, TypeError, ValueError):
+                    return None
+        return None
+
+    def _number(self, node: ast.expr) -> Any:
+        return ast.literal_eval(self._aliases.get(node.id, node) if isinstance(node, ast.Name) else node)
+
+
+def _limited(kind: OptionType, said: Limits | Length | None) -> OptionType:
+    match kind, said:
+        case AnyOf(types=types), _:
+            return AnyOf(tuple(_limited(item, said) for item in types))
+        case Plain(kind="float" | "int", limits=limits), Limits():
+            return replace(kind, limits=Limits(**({} if limits is None else limits.bounds()) | said.bounds()))
+        case ListOf(), Length():
+            return replace(kind, length=said)
+    return kind

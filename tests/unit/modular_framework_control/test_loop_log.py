@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The control loop logs without waiting for whoever writes the log."""
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from modular_framework_control.ros_loop_log import LoopLog
+
+LOGGER = logging.getLogger("rosout.test_of_the_loop_log")
+
+
+class StuckTerminal(logging.Handler):
+    """Writes nothing until it is let."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.go_on = threading.Event()
+        self.written: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        assert self.go_on.wait(10.0)
+        self.written.append(self.format(record))
+
+
+@pytest.fixture
+def terminal() -> Iterator[StuckTerminal]:
+    stuck, rosout = StuckTerminal(), logging.getLogger("rosout")
+    rosout.addHandler(stuck)
+    yield stuck
+    stuck.go_on.set()
+    rosout.removeHandler(stuck)
+
+
+def test_a_log_that_cannot_be_written_keeps_nobody_waiting_and_loses_nothing(terminal: StuckTerminal) -> None:
+    log = LoopLog()
+    log.begin()
+    fault = ["lost"]
+    with ThreadPoolExecutor() as threads:
+        try:
+            threads.submit(LOGGER.warning, "the link is %s", fault).result(5.0)
+            fault.append("and found")
+            threads.submit(LOGGER.error, "again").result(5.0)
+            threads.submit(logging.getLogger("rosout").error, "by rospy").result(5.0)
+            threads.submit(logging.getLogger("rosout.first_used_now").error, "by a plugin").result(5.0)
+        finally:
+            terminal.go_on.set()
+    log.end()
+    assert terminal.written == ["the link is ['lost']", "again", "by rospy", "by a plugin"]
+
+
+def test_afterwards_the_log_is_as_before(terminal: StuckTerminal) -> None:
+    terminal.go_on.set()
+    first, second = LoopLog(), LoopLog()
+    first.begin()
+    second.begin()
+    LOGGER.warning("once")
+    for log in (first, second):
+        log.end()
+        log.end()
+    assert terminal.written == ["once"]
+    LOGGER.warning("at once")
+    assert terminal.written == ["once", "at once"]
