@@ -20,7 +20,10 @@ LAUNCH = """
 <launch>
   <param name="use_sim_time" value="true"/>
   <rosparam>
-    arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}
+    arm:
+      type: position_controllers/JointTrajectoryController
+      joints: [shoulder]
+      constraints: {goal_time: 0.5}   # a cycle after its last point a joint seems to move still
   </rosparam>
   <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
     <rosparam>{joints: [shoulder], rate: 100}</rosparam>

@@ -336,6 +336,11 @@ def test_half_a_turn_goes_the_way_of_the_numbers(robot: SteppedRobot, arm: Arm, 
         assert arm.state().actual.positions[2] == pytest.approx(target)
 
 
+def shortest_gap_s(messages: list[Any]) -> float:
+    """Between the stamps of two messages [s]; those of a busy computer's full queues are missing."""
+    return float(np.diff([message.header.stamp.to_sec() for message in messages]).min())
+
+
 def test_states_and_feedback_come_at_their_rates_and_tell_how_far_the_trajectory_is(
         robot: SteppedRobot, arm: Arm, clients: dict[str, Arm]) -> None:
     feedback: list[Any] = []
@@ -345,8 +350,8 @@ def test_states_and_feedback_come_at_their_rates_and_tell_how_far_the_trajectory
     slow = clients["crane"].states
     robot.wait_until(lambda: slow and slow[-1].header.stamp.to_sec() > robot.time_s - 0.05)
     robot.wait_until(lambda: feedback and feedback[-1].header.stamp.to_sec() > robot.time_s - 0.11)
-    assert len(trace) == 95 and len(slow) == pytest.approx(24, abs=1)
-    assert len(feedback) == pytest.approx(10, abs=1)
+    assert len(trace) == 95
+    assert shortest_gap_s(slow) == pytest.approx(0.04) and shortest_gap_s(feedback) == pytest.approx(0.1)
     for number, state in enumerate(trace):
         assert state.desired.time_from_start.to_sec() == pytest.approx((number + 1) * PERIOD_S)
         assert list(state.joint_names) == ARM

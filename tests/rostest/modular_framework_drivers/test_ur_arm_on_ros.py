@@ -8,7 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+import rospy
 from actionlib_msgs.msg import GoalStatus
+from std_msgs.msg import Float64
 from ur_arm_on_ros import START, Arm, launched_arm, until
 
 
@@ -34,8 +36,12 @@ def test_a_trajectory_is_followed_to_its_end(arm: Arm) -> None:
 
 def test_a_slider_at_a_third_makes_it_three_times_as_long(arm: Arm) -> None:
     target = [position - 0.2 for position in arm.positions]
+    paces: list[float] = []
+    pace = rospy.Subscriber("speed_scaling_factor", Float64, lambda message: paces.append(message.data))
+    until(lambda: paces and paces[-1] == 1.0, "the arm at full pace")
     arm.order("slider", value=1.0 / 3.0)
-    time.sleep(0.1)
+    until(lambda: paces[-1] == pytest.approx(1.0 / 3.0), "the arm at a third of its pace")
+    pace.unregister()
     begun_s = time.monotonic()
     assert arm.send(target, 1.0).wait(20.0)
     assert arm.client.get_result().error_code == 0, arm.client.get_goal_status_text()
@@ -87,6 +93,7 @@ def test_a_dashboard_that_does_not_answer_is_told(arm: Arm) -> None:
     arm.order("cut")
     success, text = arm.call("dashboard/power_on")
     assert not success and f"{arm.address}:29999" in text
+    until(lambda: arm.ready is False, "a driver that knows of the cut, before the next test makes the arm well")
 
 
 def test_the_node_stops_the_arm_and_its_program_at_its_end(arm: Arm) -> None:

@@ -39,11 +39,12 @@ LAUNCH = """<launch>
       type: position_controllers/JointTrajectoryController
       joints: [shoulder_pan_joint, shoulder_lift_joint, elbow_joint, wrist_1_joint, wrist_2_joint, wrist_3_joint]
       constraints: {goal_time: 0.6, stopped_velocity_tolerance: 0.05}
+    speed_scaling_state_controller: {type: scaled_controllers/SpeedScalingStateController, publish_rate: 100}
   </rosparam>
   <param name="ur_robot_hw/link_timeout" value="$(arg link_timeout)" if="$(eval link_timeout != '')"/>
   <node name="robot_hw" pkg="modular_framework_control" type="robot_hw" output="screen"/>
   <node name="spawner" pkg="controller_manager" type="spawner" output="screen"
-        args="joint_state_controller arm_controller"/>
+        args="joint_state_controller arm_controller speed_scaling_state_controller"/>
 </launch>"""
 
 until = functools.partial(wait_until, timeout_s=20.0)

@@ -19,6 +19,7 @@ BUILT_IN_TYPES: dict[str, str] = {
     "force_torque_sensor_controller/ForceTorqueSensorController":
         f"{_PACKAGE}.sensor_controllers:ForceTorqueSensorController",
     "imu_sensor_controller/ImuSensorController": f"{_PACKAGE}.sensor_controllers:ImuSensorController",
+    "scaled_controllers/SpeedScalingStateController": f"{_PACKAGE}.sensor_controllers:SpeedScalingStateController",
     "position_controllers/JointTrajectoryController":
         f"{_PACKAGE}.joint_trajectory_controller:JointTrajectoryController",
     "position_controllers/ScaledJointTrajectoryController":

@@ -95,17 +95,16 @@ class RosControllerManager:
         """One control cycle; see ControllerManager.update."""
         self.manager.update(time_s, period_s, reset_controllers)
         now_s = time.monotonic()
-        if now_s >= self._statistics_due_s:
+        if self._statistics is not None and now_s >= self._statistics_due_s:
             self._statistics_due_s = now_s + STATISTICS_PERIOD_S
-            self._outbox.put_droppable(self._publish_statistics)
+            self._outbox.publish(self._statistics, self._statistics_message)
 
-    def _publish_statistics(self) -> None:
-        if self._statistics is not None and self._statistics.get_num_connections() > 0:
-            message = ControllersStatistics()
-            message.header.stamp = rospy.Time.now()
-            message.controller = [conversions.controller_statistics_to_msg(report, self._loop_time.ahead_s)
-                                  for report in self.manager.list_controllers()]
-            self._statistics.publish(message)
+    def _statistics_message(self) -> ControllersStatistics:
+        message = ControllersStatistics()
+        message.header.stamp = rospy.Time.now()
+        message.controller = [conversions.controller_statistics_to_msg(report, self._loop_time.ahead_s)
+                              for report in self.manager.list_controllers()]
+        return message
 
     def close(self) -> None:
         """End all goals, close all topics and services; the control loop must have ended. May be called twice."""

@@ -29,7 +29,7 @@ from modular_framework_control.gripper_action_controller import (
     GripperTicket,
 )
 from modular_framework_control.joint_command_controllers import JointCommandController
-from modular_framework_control.joint_state_controller import JointStateController, JointStateSnapshot
+from modular_framework_control.joint_state_controller import JointStateController
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
@@ -53,12 +53,9 @@ class JointStateEdge:
     def __init__(self, controller: JointStateController, namespace: str, name: str, outbox: Outbox,
                  loop_time: LoopTime) -> None:
         del name
-        self._loop_time = loop_time
         self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=10)
-        controller.on_state = lambda snapshot: outbox.put_droppable(self._publish, snapshot)
-
-    def _publish(self, snapshot: JointStateSnapshot) -> None:
-        self._publisher.publish(conversions.joint_state_to_msg(snapshot, self._loop_time.ahead_s))
+        controller.on_state = lambda snapshot: outbox.publish(
+            self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s))
 
     def close(self) -> None:
         """Close the topic."""
@@ -85,7 +82,8 @@ class JointTrajectoryEdge:
             command = rospy.Subscriber(f"{self._name}/command", JointTrajectoryMsg, self._on_command, queue_size=1)
             opened.callback(command.unregister)
             self._opened = opened.pop_all()
-        controller.on_state = lambda snapshot: outbox.put_droppable(self._publish_state, snapshot)
+        controller.on_state = lambda snapshot: outbox.publish(
+            self._state, lambda: conversions.snapshot_to_msg(snapshot, controller.joint_names, loop_time.ahead_s))
         controller.on_feedback = lambda ticket, snapshot: outbox.put_droppable(self._feedback, ticket, snapshot)
 
     def close(self) -> None:
@@ -111,11 +109,6 @@ class JointTrajectoryEdge:
         except ControllerError as error:
             raise rospy.ServiceException(f"{self._name}/query_state: {error}") from error
         return QueryTrajectoryStateResponse(self._controller.joint_names, *(row.tolist() for row in state))
-
-    def _publish_state(self, snapshot: TrajectorySnapshot) -> None:
-        if self._state.get_num_connections() > 0:
-            self._state.publish(conversions.snapshot_to_msg(snapshot, self._controller.joint_names,
-                                                            self._loop_time.ahead_s))
 
     def _feedback(self, ticket: TrajectoryTicket, snapshot: TrajectorySnapshot) -> None:
         message = conversions.fill_snapshot(FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names,

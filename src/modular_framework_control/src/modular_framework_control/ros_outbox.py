@@ -37,6 +37,11 @@ class Outbox:
         if self._jobs.qsize() < self._backlog:
             self._jobs.put((job, arguments))
 
+    def publish(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
+        """Queue a message, which is made when its turn comes, unless nobody listens or too many jobs wait."""
+        if publisher.impl.has_connections():    # publisher.get_num_connections() would wait for a lock
+            self.put_droppable(lambda: publisher.publish(make()))
+
     def flush(self, timeout_s: float = 2.0) -> None:
         """Wait until everything queued so far has been worked off, at most `timeout_s` [s]."""
         if self._thread.is_alive() and threading.current_thread() is not self._thread:

@@ -2,32 +2,43 @@
 """The topics of controllers that report sensors: one a sensor, under its name in the namespace of the robot."""
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import Quaternion, Vector3, WrenchStamped
 from sensor_msgs.msg import Imu
+from std_msgs.msg import Float64
 
-from modular_framework_control.handles import ForceTorqueSensorHandle, ImuSensorHandle
+from modular_framework_control.handles import ForceTorqueSensorHandle, ImuSensorHandle, SpeedScalingHandle
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_outbox import Outbox
-from modular_framework_control.sensor_controllers import ForceTorqueSensorController, SensorController
+from modular_framework_control.sensor_controllers import (
+    ForceTorqueSensorController,
+    ImuSensorController,
+    SensorController,
+    SpeedScalingStateController,
+)
 
 
 class SensorEdge:
-    """Publishes geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units."""
+    """Publishes geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units,
+    std_msgs/Float64 for the pace of a robot."""
 
     def __init__(self, controller: SensorController, namespace: str, name: str, outbox: Outbox,
                  loop_time: LoopTime) -> None:
         del name
-        wrenches = isinstance(controller, ForceTorqueSensorController)
-        self._publishers = {
-            sensor: rospy.Publisher(join_names(namespace, sensor), WrenchStamped if wrenches else Imu, queue_size=4)
-            for sensor in controller.sensor_names}
-        to_msg = wrench_to_msg if wrenches else imu_to_msg
-        controller.on_reading = lambda time_s, handle: outbox.put_droppable(
-            self._publishers[handle.name].publish, to_msg(time_s + loop_time.ahead_s, handle))
+        kind, to_msg = next(entry for of, entry in _MESSAGES.items() if isinstance(controller, of))
+        self._publishers = {sensor: rospy.Publisher(join_names(namespace, sensor), kind, queue_size=4)
+                            for sensor in controller.sensor_names}
+
+        def report(time_s: float, handle: Any) -> None:
+            reading = copy.copy(handle)     # the loop goes on to change it
+            outbox.publish(self._publishers[handle.name], lambda: to_msg(time_s + loop_time.ahead_s, reading))
+
+        controller.on_reading = report
 
     def close(self) -> None:
         """Close the topics."""
@@ -55,7 +66,20 @@ def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
     return message
 
 
+def pace_to_msg(time_s: float, handle: SpeedScalingHandle) -> Float64:
+    """How fast a robot lets itself be moved, 0 to 1; the message has no time."""
+    del time_s
+    return Float64(handle.factor)
+
+
 def _stamped(message: Any, time_s: float, frame_id: str) -> Any:
     message.header.stamp = rospy.Time.from_sec(time_s)
     message.header.frame_id = frame_id
     return message
+
+
+_MESSAGES: dict[type[SensorController], tuple[type[Any], Callable[[float, Any], Any]]] = {
+    ForceTorqueSensorController: (WrenchStamped, wrench_to_msg),
+    ImuSensorController: (Imu, imu_to_msg),
+    SpeedScalingStateController: (Float64, pace_to_msg),
+}

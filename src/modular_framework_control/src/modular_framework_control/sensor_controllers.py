@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that command nothing: they report what force-torque sensors and inertial units measure."""
+"""Controllers that command nothing: they report what force-torque sensors and inertial units measure, and how fast a
+robot lets itself be moved."""
 from __future__ import annotations
 
 import math
@@ -7,7 +8,11 @@ from collections.abc import Callable
 from typing import Any
 
 from modular_framework_control.controller import Controller
-from modular_framework_control.hardware_interface import ForceTorqueSensorInterface, ImuSensorInterface
+from modular_framework_control.hardware_interface import (
+    ForceTorqueSensorInterface,
+    ImuSensorInterface,
+    SpeedScalingInterface,
+)
 from modular_framework_control.node_handle import NodeHandle, read_number
 from modular_framework_control.rates import next_due, period_of
 
@@ -56,3 +61,9 @@ class ImuSensorController(SensorController):
     """imu_sensor_controller/ImuSensorController."""
 
     interface_class = ImuSensorInterface
+
+
+class SpeedScalingStateController(SensorController):
+    """scaled_controllers/SpeedScalingStateController."""
+
+    interface_class = SpeedScalingInterface

@@ -79,22 +79,30 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
         GraspCommandError: Names and positions do not pair, a joint is foreign or repeated, or a position is out of
             limits.
     """
-    if not names or len(names) != len(positions):
-        raise GraspCommandError(f"the posture has {len(names)} joint names and {len(positions)} positions; "
-                                "it needs as many of each, at least one")
-    if len(set(names)) != len(names):
-        raise GraspCommandError(f"the posture names a joint twice: {list(names)}")
-    targets: dict[str, float] = {}
-    for name, position in zip(names, positions, strict=True):
-        try:
-            joint = group.joint(name)
-        except RobotModelError as error:
-            raise GraspCommandError(str(error)) from error
+    if not names:
+        raise GraspCommandError("the posture has no joint names; it needs at least one, with its position")
+    targets = _paired("the posture", names, "positions", positions, group)
+    for name, position in targets.items():
+        joint = group.joint(name)
         if not math.isfinite(position) or not joint.lower - 1e-6 <= position <= joint.upper + 1e-6:
             raise GraspCommandError(f"joint '{name}' is to go to {position}, its limits are "
                                     f"[{joint.lower}, {joint.upper}]")
-        targets[name] = float(position)
     return targets
+
+
+def _paired(what: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group) -> dict[str, float]:
+    """Pairs joints of the group with their values; ``what`` and ``kind`` say in errors of what."""
+    if len(names) != len(values):
+        raise GraspCommandError(f"{what} has {len(names)} joint names and {len(values)} {kind}; it needs as many of "
+                                "each")
+    if len(set(names)) != len(names):
+        raise GraspCommandError(f"{what} names a joint twice: {list(names)}; name each once")
+    for name in names:
+        try:
+            group.joint(name)
+        except RobotModelError as error:
+            raise GraspCommandError(f"{what}: {error}") from error
+    return {name: float(value) for name, value in zip(names, values, strict=True)}
 
 
 def torque_share(max_torque: float, full_scale: float) -> float:
@@ -130,19 +138,11 @@ def torque_intensities(names: Sequence[str], values: Sequence[float], group: Gro
     """
     if not values:
         return {}
-    if len(names) != len(values):
-        raise GraspCommandError(f"torque_intensity has {len(names)} joint names and {len(values)} values; it needs as "
-                                "many of each, or no value for full intensity")
-    if len(set(names)) != len(names):
-        raise GraspCommandError(f"torque_intensity names a joint twice: {list(names)}; name each once")
-    for name, value in zip(names, values, strict=True):
-        try:
-            group.joint(name)
-        except RobotModelError as error:
-            raise GraspCommandError(f"torque_intensity: {error}") from error
+    intensities = _paired("torque_intensity", names, "values", values, group)
+    for name, value in intensities.items():
         if not -1.0 <= value <= 1.0:
             raise GraspCommandError(f"the torque intensity of joint '{name}' is {value}, allowed is -1 to 1")
-    return dict(zip(names, values, strict=True))
+    return intensities
 
 
 def effort_limits(targets: Mapping[str, float], intensities: Mapping[str, float], group: Group,

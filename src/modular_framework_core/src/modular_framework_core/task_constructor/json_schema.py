@@ -60,9 +60,9 @@ def _state(source: StateSource) -> dict[str, Any]:
 
 
 def _machine(template: TemplateSource, *, is_root: bool) -> dict[str, Any]:
-    uses = {key.name: key.at_root if is_root else key.nested for key in machine_keys(template)}
-    properties = {key.name: {**key.schema, "description": key.meaning} for key in machine_keys(template)
-                  if uses[key.name]}
+    keys = machine_keys(template)
+    uses = {key.name: key.at_root if is_root else key.nested for key in keys}
+    properties = {key.name: {**key.schema, "description": key.meaning} for key in keys if uses[key.name]}
     properties["source"] = {"const": template.name}
     return {"type": "object", "description": template.doc.split("\n\n")[0], "properties": properties,
             "required": [name for name, use in uses.items() if use == "required"], "additionalProperties": False}

@@ -41,12 +41,12 @@ def missing_imports(tree: ast.Module, file: Path) -> tuple[str, ...]:
 
 def _top_imports(tree: ast.Module, file: Path) -> Iterator[tuple[int, str]]:
     """Yield line and module of each import; a relative one by its whole name, or as it is written outside packages."""
+    package = _package_of(file)
     for node in tree.body:
         if isinstance(node, ast.Import):
             yield from ((node.lineno, item.name) for item in node.names)
         elif isinstance(node, ast.ImportFrom):
             relative = "." * node.level + (node.module or "")
-            package = _package_of(file)
             yield node.lineno, importlib.util.resolve_name(relative, package) if node.level and package and (
                 node.level <= package.count(".") + 1) else relative
 
