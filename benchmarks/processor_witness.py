@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Notes when processors are taken away: by the host of a virtual machine, or by work of the kernel that nothing may
+interrupt.
+
+On each processor that may be used a process sleeps a millisecond at a time, as the most urgent of all. What wakes it
+late was no other process.
+"""
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+
+NAP_S = 0.001
+LATE_S = 0.001
+URGENT = 99
+
+Spans = list[tuple[float, float]]
+
+
+class Witnesses:
+    """One witness a processor, from now until `taken` is asked for. It costs a percent or two of each."""
+
+    def __init__(self) -> None:
+        self._processes = [subprocess.Popen([sys.executable, __file__, str(processor)], stdout=subprocess.PIPE)
+                           for processor in sorted(os.sched_getaffinity(0))]
+        for process in self._processes:
+            assert process.stdout is not None
+            process.stdout.readline()   # it watches
+
+    def taken(self) -> list[Spans] | None:
+        """When each processor was away [s of the monotonic clock]; None where the system lets nobody be that urgent."""
+        told = []
+        for process in self._processes:
+            process.terminate()
+            told.append(json.loads(process.communicate()[0]))
+        return None if None in told else [[(begin_s, end_s) for begin_s, end_s in spans] for spans in told]
+
+
+def cycles_without_processor(taken: Sequence[Spans], period_s: float) -> int:
+    """How many cycles of a loop nobody could run, because all processors were away as long as they lasted.
+
+    Args:
+        taken: when each processor was away [s].
+        period_s: of the loop [s].
+    """
+    away = joined(taken[0])
+    for spans in taken[1:]:
+        away = common(away, joined(spans))
+    return sum(math.floor((end_s - begin_s) / period_s) for begin_s, end_s in away)
+
+
+def joined(spans: Spans) -> Spans:
+    """Spans in the order of time; those that touch are one."""
+    together: Spans = []
+    for begin_s, end_s in spans:
+        if together and begin_s <= together[-1][1]:
+            together[-1] = (together[-1][0], max(end_s, together[-1][1]))
+        else:
+            together.append((begin_s, end_s))
+    return together
+
+
+def common(one: Spans, other: Spans) -> Spans:
+    """Where spans of both overlap."""
+    overlaps = ((max(a[0], b[0]), min(a[1], b[1])) for a in one for b in other)
+    return [(begin_s, end_s) for begin_s, end_s in overlaps if begin_s < end_s]
+
+
+def longest_s(spans: Spans) -> float:
+    """Length of the longest span [s]; those that touch are one."""
+    return max((end_s - begin_s for begin_s, end_s in joined(spans)), default=0.0)
+
+
+def watch(processor: int) -> Spans | None:
+    """Watch one processor until SIGTERM; None where that is not permitted."""
+    ended = False
+
+    def end(number: int, frame: object) -> None:
+        nonlocal ended
+        del number, frame
+        ended = True
+
+    signal.signal(signal.SIGTERM, end)
+    try:
+        os.sched_setaffinity(0, {processor})
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))
+        permitted = True
+    except OSError:
+        permitted = False
+    print("watching", flush=True)
+    spans, last_s = [], time.monotonic()
+    while not ended:
+        time.sleep(NAP_S if permitted else 1.0)
+        now_s = time.monotonic()
+        if now_s - last_s > NAP_S + LATE_S:
+            spans.append((last_s, now_s))
+        last_s = now_s
+    return spans if permitted else None
+
+
+if __name__ == "__main__":
+    print(json.dumps(watch(int(sys.argv[1]))))
