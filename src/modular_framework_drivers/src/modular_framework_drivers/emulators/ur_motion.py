@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from scipy.spatial.transform import Rotation
+
 JOINTS = 6
 MAX_VELOCITY = math.pi         # of every joint of a UR5 [rad/s]
 MAX_ACCELERATION = 40.0        # what URScript allows of a joint [rad/s^2]
@@ -128,18 +130,4 @@ def flange_pose(positions: Sequence[float]) -> tuple[float, ...]:
         origin = [origin[row] + sum(rotation[row][k] * offset[k] for k in range(3)) for row in range(3)]
         rotation = [[sum(rotation[row][k] * link[k][column] for k in range(3)) for column in range(3)]
                     for row in range(3)]
-    return (*origin, *_rotation_vector(rotation))
-
-
-def _rotation_vector(rotation: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    cosine = min(max((rotation[0][0] + rotation[1][1] + rotation[2][2] - 1.0) / 2.0, -1.0), 1.0)
-    angle = math.acos(cosine)
-    axis = (rotation[2][1] - rotation[1][2], rotation[0][2] - rotation[2][0], rotation[1][0] - rotation[0][1])
-    if angle < 1e-9:
-        return (0.0, 0.0, 0.0)
-    if math.pi - angle < 1e-6:   # half a turn: the axis is in the symmetric part
-        column = max(range(3), key=lambda index: rotation[index][index])
-        vector = [rotation[row][column] + (1.0 if row == column else 0.0) for row in range(3)]
-        length = math.sqrt(sum(value * value for value in vector))
-        return tuple(angle * value / length for value in vector)
-    return tuple(angle * value / (2.0 * math.sin(angle)) for value in axis)
+    return (*origin, *Rotation.from_matrix(rotation).as_rotvec().tolist())

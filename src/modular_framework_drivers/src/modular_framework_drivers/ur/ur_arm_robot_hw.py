@@ -58,6 +58,7 @@ class UrArmHardware(RobotHW):
         self._check: CommandCheck | None = None
         self._servo_time_s = 0.008
         self._refused = ""
+        self._trouble = "no state of the arm yet"
         self._fault = "not initialised"
         self._following = False
 
@@ -107,7 +108,7 @@ class UrArmHardware(RobotHW):
         if state is not None:
             self._take(state)
         self._stop_with_the_program(state)
-        following = self._link.commanding and not self._robot_fault() and self._program_runs(state)
+        following = self._link.commanding and not self._trouble and self._program_runs(state)
         if not following or not self._following:
             for handle in self._handles:
                 handle.command = handle.position
@@ -116,6 +117,7 @@ class UrArmHardware(RobotHW):
         self._fault = self._current_fault()
 
     def _take(self, state: ArmState) -> None:
+        self._trouble = robot_fault(state, self.address)
         known = self._link is not None and not self._link.lost
         for handle, position, velocity, current in zip(self._handles, state.positions, state.velocities,
                                                        state.currents, strict=True):
@@ -130,7 +132,7 @@ class UrArmHardware(RobotHW):
         """A program that was ended, by whomever, is not started again until somebody says so."""
         if self._link is None or not self._link.commanding or not self._following:
             return
-        fault = self._robot_fault().partition(";")[0]
+        fault = self._trouble.partition(";")[0]
         if fault or not self._program_runs(state):
             self._link.drop_program(fault or "the program on the arm was stopped")
 
@@ -181,7 +183,7 @@ class UrArmHardware(RobotHW):
             return "the arm is not initialised"
         if self._following:
             return ""
-        trouble = self._link_fault() or self._robot_fault()
+        trouble = self._link_fault() or self._trouble
         if trouble:
             return trouble
         self._link.request_program()
@@ -195,7 +197,7 @@ class UrArmHardware(RobotHW):
         return self.fault() or f"the program on the arm did not start within {timeout_s:g} s"
 
     def _current_fault(self) -> str:
-        return self._link_fault() or self._robot_fault() or self._program_fault()
+        return self._link_fault() or self._trouble or self._program_fault()
 
     def _link_fault(self) -> str:
         link = self._link
@@ -204,10 +206,6 @@ class UrArmHardware(RobotHW):
         if link.state is None:
             return f"no link to the arm at {self.address} yet: {link.lost}; it is tried again and again"
         return f"link to the arm at {self.address} lost: {link.lost}; it is being made again"
-
-    def _robot_fault(self) -> str:
-        state = self._link.state if self._link is not None else None
-        return robot_fault(state, self.address) if state is not None else "no state of the arm yet"
 
     def _program_fault(self) -> str:
         link = self._link
