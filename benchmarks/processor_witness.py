@@ -3,7 +3,7 @@
 interrupt.
 
 On each processor that may be used a process sleeps a millisecond at a time, as the most urgent of all. What wakes it
-late was no other process.
+late was no other process: from when it was to wake until it did, its processor was away.
 """
 from __future__ import annotations
 
@@ -43,27 +43,18 @@ class Witnesses:
 
 
 def cycles_without_processor(taken: Sequence[Spans], period_s: float) -> int:
-    """How many cycles of a loop nobody could run, because all processors were away as long as they lasted.
+    """How many cycles of a loop all processors were away for, at most.
+
+    That is how many a loop loses when one is due as they go; due later, it may lose one less.
 
     Args:
         taken: when each processor was away [s].
         period_s: of the loop [s].
     """
-    away = joined(taken[0])
+    away = taken[0]
     for spans in taken[1:]:
-        away = common(away, joined(spans))
+        away = common(away, spans)
     return sum(math.floor((end_s - begin_s) / period_s) for begin_s, end_s in away)
-
-
-def joined(spans: Spans) -> Spans:
-    """Spans in the order of time; those that touch are one."""
-    together: Spans = []
-    for begin_s, end_s in spans:
-        if together and begin_s <= together[-1][1]:
-            together[-1] = (together[-1][0], max(end_s, together[-1][1]))
-        else:
-            together.append((begin_s, end_s))
-    return together
 
 
 def common(one: Spans, other: Spans) -> Spans:
@@ -73,13 +64,13 @@ def common(one: Spans, other: Spans) -> Spans:
 
 
 def longest_s(spans: Spans) -> float:
-    """Length of the longest span [s]; those that touch are one."""
-    return max((end_s - begin_s for begin_s, end_s in joined(spans)), default=0.0)
+    """Length of the longest span [s]."""
+    return max((end_s - begin_s for begin_s, end_s in spans), default=0.0)
 
 
 def watch(processor: int) -> Spans | None:
-    """Watch one processor until SIGTERM; None where that is not permitted."""
-    ended = False
+    """Watch one processor until SIGTERM, or until nobody is there to ask; None where that is not permitted."""
+    ended, parent = False, os.getppid()
 
     def end(number: int, frame: object) -> None:
         nonlocal ended
@@ -94,13 +85,13 @@ def watch(processor: int) -> Spans | None:
     except OSError:
         permitted = False
     print("watching", flush=True)
-    spans, last_s = [], time.monotonic()
-    while not ended:
-        time.sleep(NAP_S if permitted else 1.0)
+    spans, wake_s = [], time.monotonic()
+    while not ended and os.getppid() == parent:
+        time.sleep(NAP_S if permitted else 0.1)
         now_s = time.monotonic()
-        if now_s - last_s > NAP_S + LATE_S:
-            spans.append((last_s, now_s))
-        last_s = now_s
+        if now_s - wake_s > LATE_S:
+            spans.append((wake_s, now_s))
+        wake_s = now_s + NAP_S
     return spans if permitted else None
 
 

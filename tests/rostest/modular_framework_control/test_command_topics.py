@@ -6,9 +6,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 import rospy
+from control_msgs.msg import JointControllerState
 from controller_manager_msgs.srv import ListControllers, ListControllerTypes, LoadController, SwitchController
+from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
@@ -31,20 +34,22 @@ LAUNCH = """
   <rosparam>
     robot_hardware: [by_position, by_velocity]
     by_position: {{type: modular_framework_control/MockRobotHW, joints: [shoulder, elbow, neck]}}
-    by_velocity: {{type: modular_framework_control/MockRobotHW, joints: [wheel, rail],
+    by_velocity: {{type: modular_framework_control/MockRobotHW, joints: [wheel, rail, slide],
                   command_interface: VelocityJointInterface}}
     states: {{type: joint_state_controller/JointStateController, publish_rate: 1000}}
     arm: {{type: position_controllers/JointGroupPositionController, joints: [shoulder, elbow]}}
     drive: {{type: velocity_controllers/JointVelocityController, joint: wheel}}
     lift: {{type: velocity_controllers/JointTrajectoryController, joints: [rail], gains: {{rail: {{p: 5.0}}}}}}
     nod: {{type: lab_nodder/Nodder, joint: neck}}
+    push: {{type: velocity_controllers/JointPositionController, joint: slide, pid: {{p: 5.0, d: 0.0, i: 1.0,
+           i_clamp: 0.5}}}}
   </rosparam>
   <env name="ROS_PACKAGE_PATH" value="{folder}:$(env ROS_PACKAGE_PATH)"/>
   <env name="PYTHONPATH" value="{folder}:$(env PYTHONPATH)"/>
   <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true"/>
 </launch>
 """
-CONTROLLERS = ["states", "arm", "drive", "lift", "nod"]
+CONTROLLERS = ["states", "arm", "drive", "lift", "nod", "push"]
 
 
 def call(name: str, kind: Any, *arguments: Any) -> Any:
@@ -108,6 +113,20 @@ def test_a_group_goes_where_its_topic_says_and_ignores_what_does_not_fit() -> No
 def test_a_joint_turns_as_fast_as_its_topic_says() -> None:
     publisher("drive/command", Float64).publish(0.5)
     wait_until(lambda velocities: abs(velocities["wheel"] - 0.5) < 1e-6, "velocity")
+
+
+def test_a_controller_with_gains_tells_what_it_sees_and_does() -> None:
+    told: list[JointControllerState] = []
+    subscriber = rospy.Subscriber("push/state", JointControllerState, told.append)
+    publisher("push/command", Float64).publish(0.3)
+    until(lambda: told and abs(told[-1].process_value - 0.3) < 1e-3, "the slide at its goal")
+    subscriber.unregister()
+    for state in told:
+        assert (state.p, state.i, state.d, state.i_clamp, state.antiwindup) == (5.0, 1.0, 0.0, 0.5, False)
+        assert state.error == pytest.approx(state.set_point - state.process_value)
+        assert abs(state.command - 5.0 * state.error) <= 0.5 + 1e-9
+    gaps = np.diff([state.header.stamp.to_sec() for state in told])
+    assert gaps.min() > 0.04, "every tenth cycle of 8 ms, of which some are late"
 
 
 def test_the_controller_of_a_user_is_listed_and_moves_its_joint() -> None:

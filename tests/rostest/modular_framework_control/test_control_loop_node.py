@@ -196,9 +196,9 @@ def test_what_every_controller_claims_is_listed_on_the_wire(robot: Any) -> None:
               rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller}
     claims = {name: [(claim.hardware_interface, claim.resources) for claim in entry.claimed_resources]
               for name, entry in listed.items()}
-    assert claims == {"arm": [("hardware_interface/PositionJointInterface", ["elbow", "shoulder"])],
-                      "wheel": [("hardware_interface/VelocityJointInterface", ["wheel"])],
-                      "wrench": [("hardware_interface/ForceTorqueSensorInterface", [])]}
+    assert claims == {"arm": [("hardware_interface::PositionJointInterface", ["elbow", "shoulder"])],
+                      "wheel": [("hardware_interface::VelocityJointInterface", ["wheel"])],
+                      "wrench": [("hardware_interface::ForceTorqueSensorInterface", [])]}
 
 
 def test_a_sensor_is_published_under_its_name(robot: Any) -> None:

@@ -112,7 +112,7 @@ def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
     assert run(tool("controller_manager", "list")) == (0, "No controllers are loaded in mechanism control\n")
     assert run(tool("controller_manager", "spawn", "states")) == (0, "Loaded states\nStarted ['states'] successfully\n")
     code, output = run(tool("controller_manager", "list"))
-    assert (code, output) == (0, "'states' - 'hardware_interface/JointStateInterface' ( running )\n")
+    assert (code, output) == (0, "'states' - 'hardware_interface::JointStateInterface' ( running )\n")
     assert "position_controllers/JointTrajectoryController" in run(tool("controller_manager", "list-types"))[1]
     assert run(tool("controller_manager", "reload-libraries", "--restore"))[0] == 0
     assert states() == {"states": "running"}

@@ -280,7 +280,7 @@ def test_types_and_claimed_joints_are_listed(robot: Any) -> None:
     assert "position_controllers/JointTrajectoryController" in types.types
     entry = next(entry for entry in call("list_controllers", ListControllers).controller if entry.name == "arm")
     assert entry.type == "position_controllers/JointTrajectoryController"
-    assert entry.claimed_resources[0].hardware_interface == "hardware_interface/PositionJointInterface"
+    assert entry.claimed_resources[0].hardware_interface == "hardware_interface::PositionJointInterface"
     assert sorted(entry.claimed_resources[0].resources) == sorted(JOINTS)
     assert not call("reload_controller_libraries", ReloadControllerLibraries, False).ok
 

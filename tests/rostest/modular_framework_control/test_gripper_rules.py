@@ -118,8 +118,7 @@ def test_a_new_goal_preempts_and_a_cancelled_one_leaves_the_joint_where_it_is(ro
     assert gripper.commanded.position == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize(("position", "effort"), [(float("nan"), 0.0), (float("inf"), 0.0), (0.1, float("nan")),
-                                                  (0.1, -1.0)])
+@pytest.mark.parametrize(("position", "effort"), [(float("nan"), 0.0), (float("inf"), 0.0), (0.1, float("nan"))])
 def test_a_goal_that_makes_no_sense_is_refused_with_what_was_got_and_is_allowed(gripper: Gripper, position: float,
                                                                                 effort: float) -> None:
     state, _, text = gripper.result(gripper.send(position, effort))

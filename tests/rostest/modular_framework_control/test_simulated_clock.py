@@ -2,9 +2,12 @@
 """The controllers under a simulated clock: it sets their pace, may stand still, and may jump back."""
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
+import xmlrpc.client
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import actionlib
@@ -115,3 +118,16 @@ def test_after_the_clock_jumps_back_goals_end_and_new_ones_are_followed(
         assert time.monotonic() < end, "the status topic must survive the jump"
         time.sleep(0.05)
     subscriber.unregister()
+
+
+def test_while_the_clock_stands_still_the_node_ends_when_it_is_told_to(clock: ClockSource) -> None:
+    clock.running = False
+    _, _, uri = rospy.get_master().lookupNode("/robot_hw")
+    node = xmlrpc.client.ServerProxy(uri)
+    _, _, pid = node.getPid("/test")
+    with contextlib.suppress(OSError):  # the node may end before it answers
+        node.shutdown("/test", "as rosnode kill does")
+    end = time.monotonic() + 30.0
+    while Path(f"/proc/{pid}").exists():
+        assert time.monotonic() < end
+        time.sleep(0.02)

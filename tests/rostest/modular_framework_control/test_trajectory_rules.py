@@ -414,7 +414,7 @@ INF, NAN = math.inf, math.nan
     (faulty(names=[], points=[]), INVALID_JOINTS, "joints missing: shoulder, elbow, wrist"),
     (faulty(names=["shoulder", "elbow", "wrist", "knee"], points=[(1.0, [0.0] * 4, None)]), INVALID_JOINTS, "'knee'"),
     (faulty(path_tolerance=[JointTolerance(name="knee", position=1.0)]), INVALID_GOAL,
-     "path_tolerance names joint 'knee', which is not in the goal; it moves: shoulder, elbow, wrist"),
+     "path_tolerance names joint 'knee', which the controller does not have; it has: shoulder, elbow, wrist"),
     (faulty(goal_tolerance=[JointTolerance(name="elbow", position=NAN)]), INVALID_GOAL,
      "goal_tolerance of joint 'elbow' is not a number: position nan"),
 ])

@@ -39,7 +39,7 @@ class FakeGripper:
     """A finger that moves at 2 rad/s, and stalls against an obstacle when there is one."""
 
     def __init__(self) -> None:
-        self.position = 0.0
+        self.position = self.speed = 0.0
         self.obstacle = float("inf")
         self.deaf = False
         self.lag = 0
@@ -53,11 +53,11 @@ class FakeGripper:
         threading.Thread(target=self._publish, daemon=True).start()
 
     def _publish(self) -> None:
-        seen = [self.position] * 20
+        seen = [(self.position, self.speed)] * 20
         while not rospy.is_shutdown():
-            seen = [*seen[1:], self.position]
-            now, before = seen[-1 - self.lag], seen[-2 - self.lag]
-            self._publisher.publish(JointState(name=["f"], position=[now], velocity=[(now - before) / 0.02]))
+            seen = [*seen[1:], (self.position, self.speed)]
+            position, speed = seen[-1 - self.lag]
+            self._publisher.publish(JointState(name=["f"], position=[position], velocity=[speed]))
             self.published += 1
             time.sleep(0.02)
 
@@ -66,6 +66,7 @@ class FakeGripper:
         self.moving.set()
         while not rospy.is_shutdown():
             if self._server.is_preempt_requested():
+                self.speed = 0.0
                 self.canceled.set()
                 self._server.set_preempted()
                 return
@@ -73,10 +74,12 @@ class FakeGripper:
             step = max(-0.04, min(0.04, away))
             stalled = self.position + step > self.obstacle
             if not self.deaf and (stalled or abs(away) < 1e-3):
+                self.speed = 0.0
                 result = GripperCommandResult(self.position, 0.0, stalled, not stalled)
                 (self._server.set_aborted if stalled else self._server.set_succeeded)(result)
                 return
             if not stalled and not self.deaf:
+                self.speed = step / 0.02
                 self.position += step
             time.sleep(0.02)
 

@@ -37,6 +37,7 @@ class FakeHand:
     def __init__(self) -> None:
         self.positions = {"a": 0.0, "b": 0.0}
         self.obstacle = float("inf")
+        self.fault = ""
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
         self._server = actionlib.SimpleActionServer("hand/follow_joint_trajectory", FollowJointTrajectoryAction,
                                                     self._follow, False)
@@ -55,7 +56,9 @@ class FakeHand:
         wanted = dict(zip(goal.trajectory.joint_names, point.positions, strict=True))
         self.positions = {name: min(position, self.obstacle) for name, position in wanted.items()}
         time.sleep(0.1)
-        if self.positions == wanted:
+        if self.fault:
+            self._server.set_aborted(FollowJointTrajectoryResult(FollowJointTrajectoryResult.INVALID_GOAL, self.fault))
+        elif self.positions == wanted:
             self._server.set_succeeded(FollowJointTrajectoryResult())
         else:
             code = FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED
@@ -91,6 +94,14 @@ def test_fingers_resting_short_of_their_targets_hold_something(hand: FakeHand) -
     hand.obstacle = 1.1
     state, flags, text = send(hand, GraspCommand.GRASP_STATE)
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
+
+
+def test_fingers_that_a_fault_stopped_hold_nothing(hand: FakeHand) -> None:
+    hand.obstacle, hand.fault = 0.8, "hardware fault: servo 1: overload"
+    state, flags, text = send(hand, GraspCommand.GRASP_STATE)
+    hand.fault = ""
+    assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
+    assert "gave up: hardware fault: servo 1: overload" in text
 
 
 def test_a_hand_that_shuts_holds_nothing(hand: FakeHand) -> None:

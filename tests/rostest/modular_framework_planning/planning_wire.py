@@ -59,7 +59,7 @@ class FakeArm:
     def __init__(self, with_gripper: bool = False) -> None:
         self.positions = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}
         self.cancelled = threading.Event()
-        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
+        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=20)
         self._server = actionlib.SimpleActionServer("arm_trajectory_controller/follow_joint_trajectory",
                                                     FollowJointTrajectoryAction, self._follow, auto_start=False)
         self._server.start()

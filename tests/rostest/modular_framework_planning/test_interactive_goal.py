@@ -2,6 +2,7 @@
 """The goal one drags in RViz: this test sends what RViz would send, and sees what RViz would show."""
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -15,6 +16,8 @@ from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK
 from planning_wire import ARM, DOWN, LAUNCH, OK, START, FakeArm, add, box, call, plan, report_of, request
 from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
+
+from modular_framework_planning.ros_interactive_goal import InteractiveGoal
 
 NODE = "/interactive_goal"
 LAUNCH_FILE = "$(find modular_framework_planning)/launch/interactive_goal.launch"
@@ -120,7 +123,7 @@ def rviz(arm: FakeArm) -> Rviz:
 @pytest.fixture(autouse=True)
 def clean(arm: FakeArm, rviz: Rviz) -> None:
     arm.positions.update(zip(ARM, START, strict=True))
-    time.sleep(0.2)  # ten joint states: the nodes have heard of the jump
+    arm.settle()
     assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
     rviz.select("Start: follow the robot")
     said = len(LAST_WORDS)
@@ -217,3 +220,36 @@ def test_the_chosen_planner_is_asked_for(rviz: Rviz) -> None:
     until(lambda: rviz.goal_is_at(*NEAR), "the dragged goal")
     _, report = report_of(lambda: rviz.select("Plan"), "plan")
     assert "RRTstar" in report["planner_id"]
+
+
+class WatchedLock:
+    """A lock that tells when somebody waits for it."""
+
+    def __init__(self) -> None:
+        self._lock, self.awaited = threading.Lock(), threading.Event()
+        self.release = self._lock.release
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        if blocking and self._lock.locked():
+            self.awaited.set()
+        return self._lock.acquire(blocking, timeout)
+
+
+class GoalWithoutRobot(InteractiveGoal):
+    """Its jobs only."""
+
+    def __init__(self) -> None:
+        self._job = WatchedLock()
+        self.awaited = self._job.awaited
+        self.said: list[str] = []
+        self._tell = self.said.append
+
+
+def test_a_job_begins_when_the_one_before_has_said_its_last_word_and_not_while_it_works() -> None:
+    goal, done, finish = GoalWithoutRobot(), threading.Event(), threading.Event()
+    goal._begin("planning", lambda: goal.awaited.wait(30.0))
+    goal._begin("executing", lambda: done.set() or finish.wait(30.0))
+    assert done.wait(30.0), goal.said
+    goal._begin("planning again", lambda: None)
+    finish.set()
+    assert goal.said[-1] == "not planning again: busy; stop first"

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import actionlib
 import pytest
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -46,6 +45,8 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_control.ros_action_client import SteadyActionClient
 
 MILLION, MANY = 1_000_000, 100_000
 SERVICES = {"plan_kinematic_path": GetMotionPlan, "compute_cartesian_path": GetCartesianPath,
@@ -112,7 +113,7 @@ def test_services_answer_nonsense_with_a_refusal(name: str, style: str) -> None:
 
 @pytest.fixture(scope="module")
 def clients(session: Any) -> dict[str, Any]:
-    made = {name: actionlib.SimpleActionClient(name, kind) for name, kind in ACTIONS.items()}
+    made = {name: SteadyActionClient(name, kind) for name, kind in ACTIONS.items()}
     for name, client in made.items():
         assert client.wait_for_server(rospy.Duration(20.0)), name
     return made

@@ -72,7 +72,8 @@ class Camera:
         info = CameraInfo(height=480, width=640)
         info.K = [FOCUS, 0, CENTER[0], 0, FOCUS, CENTER[1], 0, 0, 1]
         self._info.publish(info)
-        until(lambda: self._image.get_num_connections() > 0, "move_group listens to the camera")
+        until(lambda: self._image.get_num_connections() > 0 and self._info.get_num_connections() > 0,
+              "move_group listens to the camera")
 
     @staticmethod
     def depth(boxes: list[tuple[tuple[float, float, float], tuple[float, float, float]]]) -> np.ndarray:

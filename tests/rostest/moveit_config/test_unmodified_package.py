@@ -14,6 +14,7 @@ import rosgraph
 import rospy
 from moveit_commander import MoveGroupCommander
 from moveit_msgs.msg import MoveItErrorCodes
+from ros_session import until
 from sensor_msgs.msg import JointState
 
 PACKAGES = Path(__file__).parents[2] / "packages"
@@ -71,9 +72,12 @@ def test_a_motion_is_planned_and_executed(arm: MoveGroupCommander) -> None:
     assert arm.execute(trajectory)
     duration_s = trajectory.joint_trajectory.points[-1].time_from_start.to_sec()
     assert time.monotonic() - begun >= duration_s, "a fake robot takes its time"
+    names = trajectory.joint_trajectory.joint_names
+    until(lambda: any(state.name == names and np.allclose(state.position, REACHING, atol=1e-3)
+                      for state in list(states)), "the last state of the motion")
     listener.unregister()
     assert arm.get_current_joint_values() == pytest.approx(REACHING, abs=1e-3)
-    travelled = np.array([state.position for state in states if state.name == trajectory.joint_trajectory.joint_names])
+    travelled = np.array([state.position for state in states if state.name == names])
     assert len(travelled) > 5 and np.allclose(travelled[-1], REACHING, atol=1e-3)
 
 

@@ -14,6 +14,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 import smach
+from modular_framework_control.ros_action_client import SteadyActionClient
 
 pytestmark = pytest.mark.usefixtures("ros_session")
 
@@ -244,6 +245,7 @@ class Double(smach.State):
 
 def test_a_machine_is_offered_as_an_action():
     from smach_ros import ActionServerWrapper
+    from smach_ros.action_server_wrapper import EARLIEST_END_S
 
     machine = smach.StateMachine(["done", "odd", "stopped"], ["action_goal", "number"], ["answer"])
     double = Double()
@@ -254,11 +256,13 @@ def test_a_machine_is_offered_as_an_action():
         goal_slots_map={"goal": "number"}, result_slots_map={"result": "answer"},
     )
     wrapper.run_server()
-    client = actionlib.SimpleActionClient("double", TestAction)
+    client = SteadyActionClient("double", TestAction)
     assert client.wait_for_server(rospy.Duration(60.0))
 
     def end_of(number):
+        sent_s = time.monotonic()
         assert client.send_goal_and_wait(TestGoal(number), rospy.Duration(30.0)) is not None
+        assert time.monotonic() - sent_s >= EARLIEST_END_S, "a client that is still sending misses the end"
         return client.get_state(), client.get_result().result, client.get_goal_status_text()
 
     assert end_of(2)[:2] == (GoalStatus.SUCCEEDED, 4)
@@ -278,10 +282,11 @@ def test_a_machine_is_offered_as_an_action():
 def test_transitions_send_the_mapped_feedback_and_slots_are_expanded_and_packed():
     from smach_ros import ActionServerWrapper
 
-    feedback, heard = [], threading.Event()
+    feedback, sent, heard = [], threading.Event(), threading.Event()
 
     @smach.cb_interface(outcomes=["next"], input_keys=["goal"], output_keys=["progress", "result"])
     def work(userdata):
+        assert sent.wait(60.0)  # a client that is still sending does not listen to feedback yet
         userdata.progress = userdata.goal + 1
         userdata.result = userdata.goal + 2
         return "next"
@@ -303,6 +308,7 @@ def test_transitions_send_the_mapped_feedback_and_slots_are_expanded_and_packed(
     client = actionlib.SimpleActionClient("staged", TestAction)
     assert client.wait_for_server(rospy.Duration(60.0))
     client.send_goal(TestGoal(5), feedback_cb=lambda message: feedback.append(message.feedback) or heard.set())
+    sent.set()
     assert client.wait_for_result(rospy.Duration(60.0))
     assert client.get_result().result == 7
     assert feedback == [6]

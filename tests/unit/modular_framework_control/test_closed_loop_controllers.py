@@ -85,6 +85,30 @@ def test_velocity_feed_forward_alone_follows_what_the_gains_would_lag_behind(sta
     assert largest_error({"a": 1.0, "b": 1.0}) < 0.03 < largest_error({})
 
 
+@pytest.mark.parametrize("raises", [False, True])
+@pytest.mark.parametrize("family", ["PosVel", "PosVelAcc"])
+def test_what_ends_in_motion_leaves_a_position_and_nothing_that_leads_on(make_loop: Callable[..., Any], family: str,
+                                                                        raises: bool) -> None:
+    prefix = {"PosVel": "pos_vel", "PosVelAcc": "pos_vel_acc"}[family]
+    loop = make_loop({"hw": {"joints": ["a", "b"], "command_interface": f"{family}JointInterface"},
+                      "c": {"type": f"{prefix}_controllers/JointTrajectoryController", "joints": ["a", "b"]}})
+    loop.spawn("c")
+    loop.controllers["c"].submit(goal((2.0, (4.0, 4.0))))
+    loop.run(0.5)
+    handle = next(one for one in loop.robot_hw.interfaces[1].handles if one.name == "a")
+    assert handle.command_velocity > 0.1
+    assert getattr(handle, "command_acceleration", 1.0) > 0.1
+    if raises:
+        loop.controllers["c"].on_state = "not callable"
+        loop.run(0.1)
+        assert loop.states() == {"c": "stopped"}
+    else:
+        assert loop.switch([], ["c"]) is None
+        loop.step()
+    assert handle.command == handle.position > 0.1
+    assert (handle.command_velocity, getattr(handle, "command_acceleration", 0.0)) == (0.0, 0.0)
+
+
 @pytest.mark.parametrize("family", ["velocity", "effort"])
 def test_a_stopped_controller_leaves_no_command_behind(start: Callable[..., Any], family: str) -> None:
     loop = start(family, "JointTrajectoryController", joints=["a", "b"], gains={"a": GAINS[family], "b": GAINS[family]})

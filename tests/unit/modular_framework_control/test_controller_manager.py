@@ -125,6 +125,22 @@ def test_switch_rules(loop: Any, start: list[str], stop: list[str], strictness: 
     assert {name for name, state in loop.states().items() if state == "running"} == running
 
 
+@pytest.mark.parametrize(("told", "text"), [(OSError("line is dead"), "line is dead"), (("a", 1), "('a', 1)")])
+def test_a_fault_that_is_no_text_is_told_as_one(loop: Any, told: Any, text: str) -> None:
+    heard: list[str] = []
+    loop.controllers["left"].on_hardware_fault = lambda time_s, reason: heard.append(reason)
+    loop.robot_hw.fault = lambda: told
+    loop.step(2)
+    assert loop.manager.fault == text and heard == [text]
+    assert loop.states()["left"] == "running"
+
+
+def test_faults_that_are_none_are_a_fault(loop: Any) -> None:
+    loop.robot_hw.faults = lambda: ["protective stop"]
+    loop.step()
+    assert loop.manager.fault.startswith("fault() raised AttributeError")
+
+
 def test_a_restart_stops_and_starts_in_one_cycle(loop: Any) -> None:
     assert loop.switch(["left"], ["left"]) is None
     calls = loop.controllers["left"].calls

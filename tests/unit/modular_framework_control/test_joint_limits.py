@@ -84,6 +84,79 @@ def test_velocities_change_no_faster_than_the_acceleration_allows_and_stop_at_th
     assert joint.command == pytest.approx(expected)
 
 
+def test_velocities_grow_from_command_to_command_whatever_is_measured() -> None:
+    joint = handle()
+    limiter = VelocityJointSaturation(joint, JointLimits(max_velocity=2.0, max_acceleration=2.0))
+    for cycle in range(1, 101):     # a drive that sticks at small commands, or does not tell its velocity
+        joint.command = 1.0
+        limiter.enforce_limits(0.01)
+        assert joint.command == pytest.approx(min(1.0, 0.02 * cycle))
+    joint.state.velocity = 0.5
+    limiter.reset()
+    joint.command = 1.0
+    limiter.enforce_limits(0.01)
+    assert joint.command == pytest.approx(0.52), "after a reset from the measured one"
+
+
+def test_a_velocity_ends_at_the_end_of_the_range_whatever_change_that_takes() -> None:
+    joint = handle(command=1.0)
+    limiter = VelocityJointSaturation(joint, JointLimits(-1.0, 1.0, 2.0, max_acceleration=100.0))
+    limiter.enforce_limits(0.01)
+    joint.state.position = 1.0
+    limiter.enforce_limits(0.001)
+    assert joint.command == 0.0
+
+
+@pytest.mark.parametrize("limiter_class", [VelocityJointSaturation, EffortJointSaturation])
+def test_what_is_given_in_place_of_a_command_is_nobodys_wish(limiter_class: Any) -> None:
+    joint = handle(1.1, command=0.0)
+    limiter = limiter_class(joint, LIMITS, SOFT)
+    limiter.enforce_limits(0.01)
+    assert joint.command < 0.0, "it is led back into its soft range"
+    joint.state.position = 0.0
+    limiter.enforce_limits(0.01)
+    assert joint.command == 0.0, "nobody ever commanded more"
+    joint.state.position = 1.1
+    limiter.enforce_limits(0.01)
+    limiter.reset()
+    assert joint.command == 0.0
+    joint.command = 0.1
+    joint.state.position = 0.0
+    limiter.enforce_limits(0.01)
+    limiter.enforce_limits(0.01)
+    assert joint.command == 0.1
+
+
+def test_a_position_that_is_given_in_place_of_a_command_is_where_the_joint_stays() -> None:
+    joint = handle(command=0.5)
+    limiter = PositionJointSaturation(joint, LIMITS)
+    for _ in range(5):
+        limiter.enforce_limits(0.01)
+        assert joint.command == 0.02, "whoever commanded 0.5 has stopped and left it alone"
+
+
+@pytest.mark.parametrize(("interface", "controller", "wanted"), [
+    ("VelocityJointInterface", "velocity_controllers/JointVelocityController", 1.0),
+    ("EffortJointInterface", "effort_controllers/JointEffortController", 5.0)])
+def test_a_joint_comes_to_rest_after_its_controller_stopped(make_loop: Callable[..., Any], interface: str,
+                                                            controller: str, wanted: float) -> None:
+    values = {"has_acceleration_limits": True, "max_acceleration": 2.0, "has_velocity_limits": True,
+              "max_velocity": 1.0, "has_effort_limits": True, "max_effort": 5.0}
+    soft = {"soft_lower_limit": -9.0, "soft_upper_limit": 9.0, "k_position": 10.0, "k_velocity": 10.0}
+    loop = make_loop({"joint_limits": {"j": {**values, **(soft if "Effort" in interface else {})}},
+                      "hw": {"joints": ["j"], "command_interface": interface}, "c": {"type": controller, "joint": "j"}})
+    loop.spawn("c")
+    loop.controllers["c"].submit([wanted])
+    loop.run(2.0)
+    joint = loop.robot_hw.interfaces[1].handles[0]
+    assert joint.velocity == pytest.approx(1.0, abs=0.01)
+    assert loop.switch([], ["c"]) is None
+    loop.run(1.0)
+    assert joint.command == 0.0
+    if "Velocity" in interface:     # a body without friction goes on
+        assert joint.velocity == 0.0
+
+
 @pytest.mark.parametrize(("position", "velocity", "command", "soft", "expected"), [
     (0.0, 0.0, 9.0, None, 5.0), (1.01, 0.0, 9.0, None, 0.0), (1.01, 0.0, -9.0, None, -5.0),
     (-1.01, 0.0, -9.0, None, 0.0),

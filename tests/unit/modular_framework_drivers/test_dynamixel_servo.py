@@ -102,6 +102,17 @@ def test_a_shutdown_takes_the_torque_until_it_is_given_again() -> None:
     assert servo.get(mx64.TORQUE_LIMIT) == 500
 
 
+@pytest.mark.parametrize(("torque_mode", "enabled"), [(0, 1), (1, 0)])
+@pytest.mark.parametrize("words", [b"\x1e\xf4\x01", b"\x1e\xf4\x01\x00\x00\x64\x00"],
+                         ids=["goal", "goal, speed and limit at once"])
+def test_a_goal_position_switches_the_torque_on_unless_a_torque_is_controlled(words: bytes, torque_mode: int,
+                                                                             enabled: int) -> None:
+    servo = DynamixelServo(1)
+    servo.set(mx64.TORQUE_CONTROL_MODE, torque_mode)
+    assert servo.handle(Instruction(1, 3, words, True))[4] == 0
+    assert (servo.get(mx64.GOAL_POSITION), servo.get(mx64.TORQUE_ENABLE)) == (500, enabled)
+
+
 def test_without_power_only_the_eeprom_is_remembered() -> None:
     servo = DynamixelServo(7)
     servo.set(mx64.MAX_TORQUE, 800)

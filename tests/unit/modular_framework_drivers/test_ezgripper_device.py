@@ -20,6 +20,7 @@ from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.grip import Goal, Grip, GripRules, Motion
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
+from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 MakeLine = Callable[..., DynamixelLine]
 MakeGripper = Callable[..., tuple[DynamixelLine, EzGripper]]
@@ -259,6 +260,81 @@ def test_turns_of_the_shaft_are_counted_anew_after_a_loss_of_power(line: Dynamix
     assert gripper.state().reading.position == pytest.approx(1.9, abs=TOLERANCE)
 
 
+def test_an_overload_while_the_cable_is_out_is_told_before_the_motor_gets_its_torque_again(
+        line: DynamixelLine, gripper: EzGripper) -> None:
+    line.unplug()
+    until(lambda: bool(gripper.state().fault))
+    line.overload()
+    line.plug()
+    until(lambda: "overloaded" in gripper.state().fault)
+    assert line.fingers[0].servo.get(mx64.TORQUE_LIMIT) == 0
+    until(lambda: not gripper.state().fault)
+    assert line.fingers[0].servo.get(mx64.TORQUE_LIMIT) == 400
+    assert gripper.state().reading.position == pytest.approx(1.2, abs=0.05)
+
+
+def cut_supply(line: DynamixelLine) -> None:
+    """The supply leaves its limits, which does not switch an MX-64 off."""
+    for finger in line.fingers:
+        finger.servo.shut_down(ServoErrors.VOLTAGE)
+
+
+def test_fingers_told_to_stay_do_so_when_the_cable_was_out_until_the_motor_was_well(line: DynamixelLine,
+                                                                                    gripper: EzGripper) -> None:
+    line.place_object(OBJECT_POSITION)
+    arrive(gripper, 1.94, 300)
+    cut_supply(line)
+    until(lambda: "supply" in gripper.state().fault)
+    servo = line.fingers[0].servo
+    until(lambda: not servo.get(mx64.TORQUE_CONTROL_MODE))
+    line.unplug()
+    until(lambda: "supply" not in gripper.state().fault)
+    line.remove_object()
+    servo.errors = ServoErrors.NONE
+    line.plug()
+    until(lambda: not gripper.state().fault)
+    time.sleep(0.5)
+    assert gripper.state().reading.position == pytest.approx(OBJECT_POSITION, abs=0.05)
+
+
+@pytest.mark.parametrize("fault", [cut_supply, lambda line: line.fingers[0].servo.shut_down(ServoErrors.OVERLOAD)],
+                         ids=["all out of voltage", "one of two overloaded"])
+def test_no_finger_goes_on_once_a_fault_of_a_motor_is_told(make_gripper: MakeGripper,
+                                                           fault: Callable[[DynamixelLine], None]) -> None:
+    line, gripper = make_gripper(1, 2)
+    gripper.start()
+    until(lambda: gripper.state().ready, 10.0)
+    gripper.command(0.0, 100)
+    until(lambda: gripper.state().reading.position < 1.6)
+    fault(line)
+    until(lambda: bool(gripper.state().fault))
+    time.sleep(0.2)
+    stood = [finger.opening for finger in line.fingers]
+    time.sleep(0.5)
+    assert gripper.state().fault
+    assert [finger.opening for finger in line.fingers] == pytest.approx(stood, abs=20)
+
+
+def test_a_shaft_that_was_turned_while_it_had_no_power_is_a_fault_and_nothing_moves(make_gripper: MakeGripper) -> None:
+    line, gripper = make_gripper(start_position=0.1)
+    gripper.start()
+    until(lambda: gripper.state().ready, 10.0)
+    finger = line.fingers[0]
+    line.power_off()
+    until(lambda: bool(gripper.state().fault))
+    finger.model = replace(finger.model, travel_ticks=3600.0)
+    finger.angle += 900
+    there = finger.opening
+    line.power_on()
+    until(lambda: "its shaft is not where the fingers can be" in gripper.state().fault)
+    time.sleep(1.2)  # two more attempts
+    assert "its shaft is not where the fingers can be" in gripper.state().fault
+    assert finger.opening == pytest.approx(there, abs=5)
+    finger.angle -= 900
+    until(lambda: not gripper.state().fault)
+    assert gripper.state().reading.position == pytest.approx(0.1, abs=0.05)
+
+
 def test_goals_are_ignored_while_there_is_a_fault(line: DynamixelLine, gripper: EzGripper) -> None:
     line.heat(85)
     until(lambda: bool(gripper.state().fault))
@@ -334,6 +410,7 @@ def test_a_goal_from_before_a_fault_is_void(idle: EzGripper) -> None:
     idle._publish(idle.state().reading, time.monotonic(), "")
     idle._take_orders(0.0, 0.0)
     assert idle._grip.goal.position == 0.0
+    assert (idle.state().fault, idle.state().faults, idle.state().last_fault) == ("", 1, "EzGripper: the cable is out")
     idle.command(1.2, 300)
     idle._take_orders(0.0, 0.0)
     assert idle._grip.goal.position == 1.2

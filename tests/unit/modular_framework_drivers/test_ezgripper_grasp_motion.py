@@ -35,6 +35,25 @@ class ObedientGripper(EzGripper):
         return replace(self._state, stamp_s=time.monotonic(), goal=goal, motion=Motion.REACHED, reading=reading)
 
 
+class FaultyGripper(ObedientGripper):
+    """Has a fault after a goal was given, which is over before anybody looks; the goal is void."""
+
+    def command(self, position: float, torque: int) -> int:
+        number = super().command(position, torque)
+        self._report("a blink")
+        self._state = replace(self._state, fault="")
+        return number
+
+    def state(self) -> GripperState:
+        return replace(self._state, stamp_s=time.monotonic(), motion=Motion.REACHED)
+
+
+def test_a_fault_that_came_and_went_between_two_looks_ends_the_motion_with_its_reason() -> None:
+    wanted = WantedMotion({"knuckle": 1.0}, {}, 5.0, lambda: False)
+    with pytest.raises(GraspCommandError, match="EzGripper: a blink"):
+        EzGripperManipulator(FaultyGripper(), "knuckle").move(wanted)
+
+
 @pytest.mark.parametrize(("target", "expected"), [
     (-1e-12, 0.0), (CLOSED_POSITION + 1e-12, CLOSED_POSITION), (1.0, 1.0)])
 def test_a_posture_that_rounding_put_just_outside_the_range_is_its_end(target: float, expected: float) -> None:

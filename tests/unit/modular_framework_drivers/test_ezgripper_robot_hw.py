@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -220,6 +221,55 @@ def test_wrong_parameters_are_an_error_that_says_so(caplog: pytest.LogCaptureFix
     with caplog.at_level(logging.ERROR):
         assert not EzGripperRobotHW().init(root, root.child("hand"))
     assert "/port_name: got ''" in caplog.text
+
+
+class SteadyGripper(EzGripper):
+    """Has no servos; says what it is told to say."""
+
+    def start(self) -> None:
+        self.say("")
+
+    def say(self, fault: str) -> None:
+        """The fingers move, with or without a fault."""
+        reading = replace(self._state.reading, position=1.0, velocity=0.5)
+        self._ready = True
+        self._publish(reading, time.monotonic(), fault)
+
+
+@pytest.fixture
+def steady(monkeypatch: pytest.MonkeyPatch) -> tuple[EzGripperRobotHW, SteadyGripper]:
+    made: list[SteadyGripper] = []
+    monkeypatch.setattr("modular_framework_drivers.ezgripper.ezgripper_robot_hw.EzGripper",
+                        lambda settings: made.append(SteadyGripper(settings)) or made[-1])
+    robot_hw = EzGripperRobotHW()
+    root = MappingNodeHandle({"hand": {"port_name": "/nowhere"}})
+    assert robot_hw.init(root, root.child("hand"))
+    return robot_hw, made[0]
+
+
+def test_fingers_of_which_nothing_is_known_have_no_velocity(steady: tuple[EzGripperRobotHW, SteadyGripper]) -> None:
+    robot_hw, gripper = steady
+    handle = robot_hw.get(PositionJointInterface).get_handle(JOINT)
+    robot_hw.read(0.0, PERIOD_S)
+    assert handle.velocity == 0.5
+    gripper.say("the cable is out")
+    robot_hw.read(0.0, PERIOD_S)
+    assert handle.velocity == 0.0
+
+
+def test_a_fault_that_came_and_went_between_two_looks_is_told_once_and_ends_what_was_commanded(
+        steady: tuple[EzGripperRobotHW, SteadyGripper]) -> None:
+    robot_hw, gripper = steady
+    handle = robot_hw.get(PositionJointInterface).get_handle(JOINT)
+    handle.command = 1.9
+    robot_hw.read(0.0, PERIOD_S)
+    assert (robot_hw.fault(), handle.command) == ("", 1.9)
+    gripper.say("a blink")
+    gripper.say("")
+    robot_hw.read(0.0, PERIOD_S)
+    assert (robot_hw.fault(), handle.command) == ("a blink", 1.0)
+    robot_hw.read(0.0, PERIOD_S)
+    assert robot_hw.fault() == ""
 
 
 @pytest.mark.parametrize(("max_effort", "torque"), [

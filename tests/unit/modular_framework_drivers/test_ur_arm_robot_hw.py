@@ -209,6 +209,20 @@ def test_resume_says_what_is_to_be_done_first(rig: Rig) -> None:
     assert "power_on" in rig.resume()
 
 
+def test_resume_does_not_raise_a_slider_that_was_lowered_but_lowers_one_that_was_raised(
+        make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig(speed_scale=0.5)
+    scaling = rig.hw.get(SpeedScalingInterface).handles[0]
+    for value, expected in ((0.1, 0.1), (1.0, 0.5)):
+        rig.arm.order("slider", value=value)
+        rig.until(lambda value=value: scaling.factor == pytest.approx(value))
+        rig.arm.order("protective_stop")
+        rig.until(lambda: rig.hw.fault() != "")
+        rig.arm.order("unlock")
+        rig.until(lambda: rig.resume() == "")
+        assert float(rig.arm.state()["slider"]) == pytest.approx(expected)
+
+
 def test_an_arm_that_is_switched_on_later_is_waited_for(make_rig: Callable[..., Rig], arm: EmulatedArm) -> None:
     arm.order("emergency_stop")
     arm.order("release_emergency_stop")

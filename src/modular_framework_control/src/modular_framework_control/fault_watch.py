@@ -26,6 +26,8 @@ class FaultWatch:
         """The faults it has now, with the joints they are about; never raises."""
         try:
             faults = self._robot_hw.faults()
+            if faults:  # a user's hardware may tell anything, an exception for example
+                faults = [HardwareFault(str(fault.reason), frozenset(fault.joints)) for fault in faults]
         except Exception as error:  # a user's hardware may raise anything; what cannot tell is not to be trusted
             faults = (HardwareFault(f"fault() raised {type(error).__name__}: {error}",
                                     self._robot_hw.commanded_joints),)

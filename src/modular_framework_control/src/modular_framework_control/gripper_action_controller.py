@@ -85,7 +85,7 @@ class GripperActionController(Controller):
             raise ParameterError(f"parameter {where}: got {names!r}; expected the name of one joint")
         self._handle: JointHandle = hw.get_handle(names[0])
         self._goal_tolerance = read_number(controller_nh, "goal_tolerance", 0.01)
-        self._default_max_effort = read_number(controller_nh, "max_effort", 0.0)
+        self._default_max_effort = abs(read_number(controller_nh, "max_effort", 0.0, None))
         self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
         threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
         self._stall_distance = threshold * self._stall_timeout_s
@@ -99,19 +99,19 @@ class GripperActionController(Controller):
 
         Args:
             position: where to go [rad|m].
-            max_effort: bound on the effort [Nm|N]; 0 for the controller's default.
+            max_effort: bound on the effort, whose sign does not count [Nm|N]; 0 for the controller's default.
             ticket: where to report.
 
         Raises:
-            GripperGoalError: not a number, negative effort, or the controller does not run. When it is stopped
-                meanwhile, the ticket tells the rejection.
+            GripperGoalError: not a number, or the controller does not run. When it is stopped meanwhile, the ticket
+                tells the rejection.
         """
         if not self._running:
             raise GripperGoalError("the controller is not running; start it first")
-        if not math.isfinite(position) or not math.isfinite(max_effort) or max_effort < 0.0:
-            raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers and an "
-                                   "effort of at least 0 (0 = default)")
-        self._mailbox.put(_Order(position, max_effort, ticket))
+        if not math.isfinite(position) or not math.isfinite(max_effort):
+            raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers (effort "
+                                   "0 = default)")
+        self._mailbox.put(_Order(position, abs(max_effort), ticket))
         if not self._running:
             self._reject_waiting("the controller was stopped")
 
@@ -124,6 +124,7 @@ class GripperActionController(Controller):
     def starting(self, time_s: float) -> None:
         self._reject_waiting("the goal was sent while the controller was being stopped")
         self._active, self._fault = None, ""
+        self._max_effort = self._default_max_effort
         self._hold()
         self._apply(0.0)
         self._running = True
@@ -198,8 +199,8 @@ class GripperActionController(Controller):
             self.on_feedback(order.ticket, self._state(False, False))
 
     def _hold(self) -> None:
+        """Stay, with no more effort than before: there may be something between the fingers."""
         self._command = self._handle.position
-        self._max_effort = self._default_max_effort
 
     def _apply(self, period_s: float) -> None:
         """Command the joint; `period_s` [s] is the time since the last call, 0 at a start."""

@@ -6,7 +6,8 @@ Where the hardware takes what is commanded, it is passed on; where it takes some
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from modular_framework_control.controller import Controller, ControllerError
@@ -19,6 +20,33 @@ from modular_framework_control.hardware_interface import (
 from modular_framework_control.joint_limits import JointLimits, limits_from_urdf
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names
 from modular_framework_control.pid import Pid, read_pid
+
+CYCLES_A_REPORT = 10
+
+
+@dataclass(frozen=True, slots=True)
+class JointControlSnapshot:
+    """What a controller with gains of one joint saw and did in a cycle.
+
+    Attributes:
+        time_s: time of the cycle [s].
+        period_s: time since the one before [s].
+        set_point: what is wanted.
+        process_value: what is measured of it.
+        process_value_dot: how fast that changes; 0 where it is not measured.
+        error: what the gains made the command of.
+        command: to the joint.
+        pid: the gains.
+    """
+
+    time_s: float
+    period_s: float
+    set_point: float
+    process_value: float
+    process_value_dot: float
+    error: float
+    command: float
+    pid: Pid
 
 
 class JointCommandController(Controller):
@@ -145,8 +173,20 @@ class EffortJointGroupEffortController(EffortJointEffortController):
     single = False
 
 
-class _WithGains(_Zeroing):
-    """Parameters besides: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several."""
+class GainsController(_Zeroing):
+    """Base of those with gains.
+
+    Parameters besides: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several.
+
+    Attributes:
+        on_state: of controllers of one joint, called in the control loop every CYCLES_A_REPORT cycles; must not block.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.on_state: Callable[[JointControlSnapshot], None] | None = None
+        self._error = 0.0
+        self._cycles = 0
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
@@ -154,13 +194,25 @@ class _WithGains(_Zeroing):
         self._pids: list[Pid] = [read_pid(controller_nh.child(name)) for name in where]
         return True
 
+    def update(self, time_s: float, period_s: float) -> None:
+        super().update(time_s, period_s)
+        self._cycles += 1
+        if self.single and self.on_state is not None and self._cycles % CYCLES_A_REPORT == 0:
+            value, rate = self._measured()
+            self.on_state(JointControlSnapshot(time_s, period_s, self._wanted[0], value, rate, self._error,
+                                               self._handles[0].command, self._pids[0]))
+
+    def _measured(self) -> tuple[float, float]:
+        """What is controlled of the first joint, and how fast it changes."""
+        return self._handles[0].position, self._handles[0].velocity
+
     def _rest(self) -> None:
         for pid in self._pids:
             pid.reset()
         super()._rest()
 
 
-class _PositionByGains(_WithGains):
+class _PositionByGains(GainsController):
     """Positions [rad|m], kept within the limits of the robot description, for joints that take something else."""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -179,6 +231,7 @@ class _PositionByGains(_WithGains):
                 error = math.remainder(value - handle.position, 2.0 * math.pi)
             else:
                 error = min(max(value, limits.min_position), limits.max_position) - handle.position
+            self._error = error
             handle.command = pid.command(error, -handle.velocity, period_s)
 
 
@@ -200,7 +253,7 @@ class EffortJointGroupPositionController(EffortJointPositionController):
     single = False
 
 
-class EffortJointVelocityController(_WithGains):
+class EffortJointVelocityController(GainsController):
     """effort_controllers/JointVelocityController: a velocity [rad/s|m/s] for a joint that takes efforts."""
 
     interface_class = EffortJointInterface
@@ -208,6 +261,9 @@ class EffortJointVelocityController(_WithGains):
     def __init__(self) -> None:
         super().__init__()
         self._last_error = math.nan
+
+    def _measured(self) -> tuple[float, float]:
+        return self._handles[0].velocity, 0.0
 
     def _rest(self) -> None:
         self._last_error = math.nan
@@ -217,5 +273,5 @@ class EffortJointVelocityController(_WithGains):
         error = self._wanted[0] - self._handles[0].velocity
         known = period_s > 0.0 and math.isfinite(self._last_error)
         rate = (error - self._last_error) / period_s if known else 0.0
-        self._last_error = error
+        self._last_error = self._error = error
         self._handles[0].command = self._pids[0].command(error, rate, period_s)

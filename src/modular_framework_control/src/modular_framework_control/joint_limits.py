@@ -113,22 +113,41 @@ class PosVelJointSaturation(PositionJointSaturation):
 
 
 class _Saturation:
-    """What bounds the commands of one joint and remembers none of them."""
+    """What bounds the velocities or efforts of one joint, and remembers what it was asked for and what it gave.
 
-    __slots__ = ("handle", "limits", "soft")
+    A controller that stops commands 0 once. So what was given in its place is no wish of anybody: the wish stays in
+    force until somebody commands anew. A position that was given is different: it is where the joint is to stay.
+    """
+
+    __slots__ = ("handle", "limits", "soft", "_wanted", "_given")
 
     def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
         self.handle = handle
         self.limits = limits
         self.soft = soft
+        self._wanted = 0.0
+        self._given: float | None = None
 
     def reset(self) -> None:
-        """Nothing is remembered."""
+        """Forget what was given, after the joint was moved by other means; what is asked for stays."""
+        self.handle.command = self._asked()
+        self._given = None
+
+    def _asked(self) -> float:
+        """What was commanded last by anybody else; 0 when that is not a number."""
+        command = self.handle.command
+        if command is not self._given:
+            self._wanted = command if command == command else 0.0
+        return self._wanted
+
+    def _give(self, command: float) -> None:
+        self._given = self.handle.command = command + 0.0   # a sum is an object of its own, as no command of others is
 
 
 class VelocityJointSaturation(_Saturation):
-    """Saturates velocity commands: largest velocity, largest change of the measured velocity; only the way back at an
-    end of the range. With soft limits at most `k_position` times the way left. Not a number becomes 0.
+    """Saturates velocity commands: largest velocity, largest change from one command to the next, the first one from
+    the measured velocity; only the way back at an end of the range, whatever change that takes. With soft limits at
+    most `k_position` times the way left. Not a number becomes 0.
 
     Args:
         handle: the joint.
@@ -140,24 +159,22 @@ class VelocityJointSaturation(_Saturation):
 
     def enforce_limits(self, period_s: float) -> None:
         """Replace `handle.command` by the nearest allowed one."""
-        limits, handle = self.limits, self.handle
-        state = handle.state
-        position = state.position
+        limits, state = self.limits, self.handle.state
+        command, position = self._asked(), state.position
         if self.soft is None:
             lowest, highest = -limits.max_velocity, limits.max_velocity
         else:
             lowest, highest = soft_velocities(position, limits, self.soft)
         if limits.max_acceleration < math.inf:
             change = limits.max_acceleration * max(0.0, period_s)
-            lowest, highest = max(lowest, state.velocity - change), min(highest, state.velocity + change)
+            last = state.velocity if self._given is None else self._given
+            lowest, highest = max(lowest, last - change), min(highest, last + change)
+        command = max(lowest, min(highest, command))
         if position >= limits.max_position:
-            highest = min(highest, 0.0)
+            command = min(command, 0.0)
         if position <= limits.min_position:
-            lowest = max(lowest, 0.0)
-        command = handle.command
-        if command != command:
-            command = 0.0
-        handle.command = max(lowest, min(highest, command))
+            command = max(command, 0.0)
+        self._give(command)
 
 
 class EffortJointSaturation(_Saturation):
@@ -176,8 +193,8 @@ class EffortJointSaturation(_Saturation):
     def enforce_limits(self, period_s: float) -> None:
         """Replace `handle.command` by the nearest allowed one."""
         del period_s
-        limits, handle = self.limits, self.handle
-        position, velocity = handle.state.position, handle.state.velocity
+        limits, state = self.limits, self.handle.state
+        position, velocity = state.position, state.velocity
         lowest, highest = -limits.max_effort, limits.max_effort
         if self.soft is not None:
             slowest, fastest = soft_velocities(position, limits, self.soft)
@@ -189,10 +206,7 @@ class EffortJointSaturation(_Saturation):
             lowest = max(lowest, 0.0)
         if position > limits.max_position or velocity > limits.max_velocity:
             highest = min(highest, 0.0)
-        command = handle.command
-        if command != command:
-            command = 0.0
-        handle.command = max(lowest, min(highest, command))
+        self._give(max(lowest, min(highest, self._asked())))
 
 
 def _clamped(value: float, bound: float) -> float:

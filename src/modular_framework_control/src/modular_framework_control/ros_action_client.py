@@ -13,7 +13,9 @@ class SteadyActionClient(actionlib.SimpleActionClient):
     """An actionlib.SimpleActionClient for servers that answer at once.
 
     actionlib's own client knows its goal only when `send_goal` has returned, and drops whatever the server says before
-    that: a goal accepted or ended within that time stays pending for ever. This one lets such an answer wait.
+    that: a goal accepted or ended within that time stays pending for ever. This one lets such an answer wait. It also
+    lets the next goal wait until the end of the one before is noted: `done_cb` is told first, and whoever then sends a
+    goal would have it marked as done. So `done_cb` must not wait for another thread that sends a goal.
     """
 
     def __init__(self, ns: str, action_spec: type[Any]) -> None:
@@ -27,6 +29,5 @@ class SteadyActionClient(actionlib.SimpleActionClient):
 
     def _handle_transition(self, gh: ClientGoalHandle) -> None:
         with self._sending:
-            tracked = gh == self.gh
-        if tracked:
-            super()._handle_transition(gh)
+            if gh == self.gh:
+                super()._handle_transition(gh)

@@ -20,6 +20,8 @@ MakeResult = Callable[[GoalTicket[Any]], Any]
 
 # actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
 EARLIEST_END_S = 0.05
+LAST_WORD_S = 0.15
+"""For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
 
 
 class SteadyActionServer(ActionServer):
@@ -30,6 +32,7 @@ class SteadyActionServer(ActionServer):
 
     def initialize(self) -> None:
         self._came_s: dict[str, float] = {}
+        self._told_s = -LAST_WORD_S
         self._ends_to_tell: set[threading.Timer] = set()
         super().initialize()
         timer: rospy.Timer | None = getattr(self, "status_timer", None)
@@ -45,7 +48,7 @@ class SteadyActionServer(ActionServer):
     def publish_result(self, status: Any, result: Any) -> None:
         early_s = self._came_s.pop(status.goal_id.id, 0.0) + EARLIEST_END_S - time.monotonic()
         if early_s <= 0.0:
-            super().publish_result(status, result)
+            self._tell_end(status, result)
             return
         later = threading.Timer(early_s, self._tell_end, (status, result))  # whoever calls has other work to do
         later.daemon = True
@@ -54,12 +57,14 @@ class SteadyActionServer(ActionServer):
 
     def _tell_end(self, status: Any, result: Any) -> None:
         super().publish_result(status, result)
+        self._told_s = time.monotonic()
         self._ends_to_tell.discard(threading.current_thread())  # type: ignore[arg-type]
 
     def stop(self) -> None:
         """Stop serving, once every end has been told."""
         for later in list(self._ends_to_tell):
             later.join()
+        time.sleep(max(0.0, self._told_s + LAST_WORD_S - time.monotonic()))
         super().stop()
 
     def publish_status(self) -> None:

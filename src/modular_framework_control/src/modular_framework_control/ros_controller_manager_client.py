@@ -93,6 +93,13 @@ class ControllerManagerClient:
             except rospy.ROSException as error:
                 if self._ended.is_set():
                     raise ControllerManagerClientError(f"told to end while waiting for service {name}") from error
-                if time.monotonic() > deadline or rospy.is_shutdown():
+                if _simulation_is_starting() and not rospy.is_shutdown():
+                    deadline = time.monotonic() + self._timeout_s
+                elif time.monotonic() > deadline or rospy.is_shutdown():
                     raise ControllerManagerClientError(f"waited {self._timeout_s:.0f} s for service {name} in vain; is "
                                                        "the simulation or the hardware's node running?") from error
+
+
+def _simulation_is_starting() -> bool:
+    """Whether nobody has told the simulated time yet: a simulation that loads a large world takes its time."""
+    return not rospy.rostime.is_wallclock() and rospy.get_rostime().is_zero()

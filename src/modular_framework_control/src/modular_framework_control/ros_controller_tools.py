@@ -59,7 +59,8 @@ def controller_manager_main() -> int:
 
 def _add_common(parser: argparse.ArgumentParser, names: str = "+") -> None:
     parser.add_argument("--namespace", default="", help="namespace of the robot")
-    parser.add_argument("--timeout", type=float, default=30.0, help="seconds to wait for the controller manager")
+    parser.add_argument("--timeout", type=float, default=30.0,
+                        help="seconds to wait for the controller manager; 0 or less: for ever")
     parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
     parser.add_argument("--shutdown-timeout", type=float, help="accepted, not used")
     parser.add_argument("controllers", nargs=names, help="names, or YAML files whose keys are names")
@@ -72,7 +73,7 @@ def _run(parser: argparse.ArgumentParser, name: str,
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     rospy.init_node(name, anonymous=True, disable_signals=True)
-    timeout_s = math.inf if arguments.no_timeout else arguments.timeout
+    timeout_s = math.inf if arguments.no_timeout or arguments.timeout <= 0.0 else arguments.timeout
     try:
         arguments.files = [Path(argument) for argument in arguments.controllers if Path(argument).is_file()]
         arguments.controllers = names_of(arguments.controllers)

@@ -12,6 +12,7 @@ import rospy
 
 from modular_framework_control.combined_robot_hw import robot_hw_of_type
 from modular_framework_control.cycle_pacer import CyclePacer, LoopStatistics
+from modular_framework_control.hardware_interface import EffortJointInterface, VelocityJointInterface
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import ParameterError, read_bool, read_number
 from modular_framework_control.plugins import PluginError
@@ -21,6 +22,7 @@ from modular_framework_control.real_time import (
     processors_for_loop,
     run_in_real_time,
 )
+from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.ros_controller_manager import RosControllerManager
 from modular_framework_control.ros_hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
 from modular_framework_control.ros_loop_report import LoopReport
@@ -29,12 +31,22 @@ from modular_framework_control.ros_node_handle import RosNodeHandle
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
 CLOCK_TOLERANCE_S = 1e-6
+REST_VELOCITY = 0.01
+"""What is no faster [rad/s|m/s] is at rest, for hardware whose measured velocities are never quite 0."""
+HELD_UP_S = 0.05
+"""A cycle that comes so late, or two periods late, finds the motions where they were."""
+RESTLESS_S = 0.2
+"""How long such hardware is written to before it is believed to be at rest [s]."""
+LONGEST_END_S = 2.0
+"""How long the end of the loop waits for rest [s]."""
+
 
 class RobotHwNode:
-    """Node `robot_hw`.
+    """Node `robot_hw`; its namespace is that of the robot: there are its controllers, services and parameters.
 
-    Parameters: `/robot_hardware`: a list of hardware, each with its parameters in the namespace of that name, which is
+    Parameters: `robot_hardware`: a list of hardware, each with its parameters in the namespace of that name, which is
     combined to one robot; without it, `~type` (MockRobotHW of this package) is one hardware, with private parameters.
+    `robot_description` and `joint_limits/...`: limits of the joints, as far as there are any.
     `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
     says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
     itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that
@@ -55,10 +67,12 @@ class RobotHwNode:
         self._loop_time = loop_time if loop_time is not None else LoopTime()
         self._nh = RosNodeHandle("~")
         self._period_s = 1.0 / read_number(self._nh, "rate", 125.0, 1.0)
+        self._loop_time.longest_step_s = max(HELD_UP_S, 2.0 * self._period_s)
         self._real_time = read_bool(self._nh, "real_time", True)
         self._ready_timeout_s = read_number(self._nh, "ready_timeout", 60.0)
-        listed = RosNodeHandle("/").has_param("robot_hardware") and not self._nh.has_param("type")
-        self._hw_nh = RosNodeHandle("/") if listed else self._nh
+        self._root_nh = RosNodeHandle(rospy.get_namespace())
+        listed = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
+        self._hw_nh = self._root_nh if listed else self._nh
         type_name = COMBINED_TYPE if listed else self._nh.get_param("type", MOCK_TYPE)
         try:
             self._robot_hw = robot_hw_of_type(type_name)
@@ -77,14 +91,21 @@ class RobotHwNode:
         Raises:
             ParameterError: the hardware refused its parameters.
         """
-        if not self._robot_hw.init(RosNodeHandle("/"), self._hw_nh):
+        self._warn_of_a_description_elsewhere()
+        if not self._robot_hw.init(self._root_nh, self._hw_nh):
             raise ParameterError(f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
                                  "its own message above says why")
         self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
         self._readiness.connect()
-        self._manager = RosControllerManager(self._robot_hw, loop_time=self._loop_time)
+        self._manager = RosControllerManager(self._robot_hw, rospy.get_namespace(), loop_time=self._loop_time)
         self._report = LoopReport(self._statistics, self._period_s, type(self._robot_hw).__name__, self._fault)
         self._report.connect()
+
+    def _warn_of_a_description_elsewhere(self) -> None:
+        if (rospy.get_namespace() != "/" and not self._root_nh.has_param("robot_description")
+                and RosNodeHandle("/").has_param("robot_description")):
+            rospy.logwarn("/robot_description is not taken, the robot's own is looked for: %s/robot_description. "
+                          "Without one, no limits of joints are known from it", self._root_nh.namespace)
 
     def _fault(self) -> str:
         return self._manager.manager.fault if self._manager is not None else ""
@@ -94,7 +115,7 @@ class RobotHwNode:
         self._robot_hw.close()
 
     def run(self) -> bool:
-        """Run the control loop until it is told to end; then stop all controllers and write what they leave.
+        """Run the control loop until it is told to end; then stop all controllers and bring the robot to rest.
 
         Returns:
             Whether it ended because it was told to; otherwise the log says why.
@@ -155,24 +176,42 @@ class RobotHwNode:
         begun_s = rospy.get_time()
         tick = rospy.rostime.get_rostime_cond()
         while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
-            if self._ended.is_set() or self._failure:
+            if not self._goes_on():
                 break
             with tick:
                 tick.wait(0.1)
 
     def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
-        """Stop the controllers, write what they leave as commands (velocities and efforts of 0), close everything.
+        """Stop the controllers, bring the robot to rest, close everything.
 
         The robot comes first: to close is work on the network, which may take long, or fail.
         """
         self._ended.set()
         manager.manager.stop_all()
-        _attempt(f"last write of hardware {type(self._robot_hw).__name__}",
-                 lambda: self._robot_hw.write(self._last_s + self._period_s, self._period_s))
+        _attempt("bringing the robot to rest", self._bring_to_rest)
         starter.join(timeout=2.0)
         _attempt("closing the topics of ready hardware", self._readiness.close)
         _attempt("closing the controllers", manager.close)
         _attempt("closing the report of the loop", self._report.close)
+
+    def _bring_to_rest(self) -> None:
+        """Write what the controllers left as commands (velocities and efforts of 0) until nothing moves any more: what
+        brakes, be it the hardware or the limits of its commands, does so cycle by cycle. It goes by real time, as a
+        simulated clock may stand."""
+        begun_s = due_s = time.monotonic()
+        going = self._attempt_last("write")
+        while going and time.monotonic() - begun_s < LONGEST_END_S:
+            if not moves(self._robot_hw, 0.0 if time.monotonic() - begun_s < RESTLESS_S else REST_VELOCITY):
+                break
+            due_s += self._period_s
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            self._last_s += self._period_s
+            going = self._attempt_last("read") and self._attempt_last("write")
+
+    def _attempt_last(self, step: str) -> bool:
+        """Read or write a period after the last cycle; answers whether that succeeded."""
+        return _attempt(f"last {step} of hardware {type(self._robot_hw).__name__}",
+                        lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s))
 
     def _get_ready(self, manager: RosControllerManager) -> None:
         """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
@@ -189,11 +228,24 @@ class RobotHwNode:
                 rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())
 
 
-def _attempt(what: str, action: Callable[[], None]) -> None:
+def moves(robot_hw: RobotHW, slow: float) -> bool:
+    """Whether a joint that can be commanded is faster than `slow` [rad/s|m/s], or commanded a velocity or effort."""
+    for interface in robot_hw.interfaces:
+        if interface.claims_resources:
+            rates = isinstance(interface, (VelocityJointInterface, EffortJointInterface))
+            for handle in interface.handles:
+                if abs(getattr(handle, "velocity", 0.0)) > slow or (rates and handle.command != 0.0):
+                    return True
+    return False
+
+
+def _attempt(what: str, action: Callable[[], None]) -> bool:
     try:
         action()
     except Exception as error:  # hardware and network may raise anything; what follows must be done all the same
         rospy.logerr("%s raised %s: %s", what, type(error).__name__, error)
+        return False
+    return True
 
 
 def main() -> int:

@@ -50,18 +50,19 @@ class Tolerances:
 
 
 def read_tolerances(controller_nh: NodeHandle, joint_names: Sequence[str]) -> Tolerances:
-    """Defaults from `constraints/{goal_time, stopped_velocity_tolerance, <joint>/{trajectory, goal}}`.
+    """Defaults from `constraints/{goal_time, stopped_velocity_tolerance, <joint>/{trajectory, goal}}`; what is not
+    positive, as a tolerance, is not checked.
 
     Raises:
-        ParameterError: a value that is not a number of at least 0.
+        ParameterError: a value that is not a number, or a negative time.
     """
     constraints = controller_nh.child("constraints")
-    stopped = _bound(read_number(constraints, "stopped_velocity_tolerance", 0.01))
+    stopped = _bound(read_number(constraints, "stopped_velocity_tolerance", 0.01, None))
     path = np.full((2, len(joint_names)), math.inf)
     goal = np.full((2, len(joint_names)), math.inf)
     for i, name in enumerate(joint_names):
-        path[0, i] = _bound(read_number(constraints, f"{name}/trajectory", 0.0))
-        goal[0, i] = _bound(read_number(constraints, f"{name}/goal", 0.0))
+        path[0, i] = _bound(read_number(constraints, f"{name}/trajectory", 0.0, None))
+        goal[0, i] = _bound(read_number(constraints, f"{name}/goal", 0.0, None))
         goal[1, i] = stopped
     return Tolerances(path, goal, read_number(constraints, "goal_time", 0.0))
 
@@ -84,12 +85,11 @@ def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints:
         goal_time_s: positive replaces the default [s], 0 keeps it, negative means no time at all.
 
     Raises:
-        InvalidTrajectoryError: a tolerance for a joint that is not of the goal, or one that is not a number.
+        InvalidTrajectoryError: a tolerance for a joint that the controller does not have, or one that is not a number.
     """
-    moved = [joint_names[i] for i in joints]
     given = [(kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()]
-    faults = [f"{kind}_tolerance names joint '{name}', which is not in the goal; it moves: {', '.join(moved)}"
-              for kind, name, _ in given if name not in moved]
+    faults = [f"{kind}_tolerance names joint '{name}', which the controller does not have; it has: "
+              f"{', '.join(joint_names)}" for kind, name, _ in given if name not in joint_names]
     faults += [f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
                f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the parameter's) or less (not checked)"
                for kind, name, tolerance in given if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)]

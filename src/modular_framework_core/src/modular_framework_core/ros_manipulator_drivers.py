@@ -14,6 +14,7 @@ from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
     FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
     GripperCommandAction,
     GripperCommandGoal,
 )
@@ -26,6 +27,8 @@ from modular_framework_core.ros_calls import wait_for_action, wait_for_result, w
 
 REST_SPEED = 0.02  # [rad/s or m/s]
 REST_TIMEOUT_S = 1.0
+HELD_UP = (FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED, FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED)
+"""How a trajectory ends whose joints something holds up; any other end is no stall."""
 
 
 class JointMonitor:
@@ -156,11 +159,11 @@ class TrajectoryDriver:
         self._client = SteadyActionClient(action, FollowJointTrajectoryAction)
 
     def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
-        """Moves the joints; fingers that rest short of their targets are stalled.
+        """Moves the joints; fingers that rest out of the controller's tolerances are stalled.
 
         Raises:
             CallError: The controller is not there.
-            GraspCommandError: The controller refused the motion or did not end it.
+            GraspCommandError: The controller refused the motion, gave it up for another reason, or did not end it.
         """
         wait_for_action(self._client, self._action, 10.0)
         goal = FollowJointTrajectoryGoal()
@@ -171,12 +174,13 @@ class TrajectoryDriver:
         status = wait_for_result(self._client, motion.timeout_s, motion.stop_requested)
         result = self._client.get_result()
         _refuse_unfinished(status, self._action, motion)
-        if status == GoalStatus.REJECTED:
-            raise GraspCommandError(f"controller action '{self._action}' rejected the posture: "
-                                    f"{result.error_string if result else self._client.get_goal_status_text()}")
+        held_up = status == GoalStatus.ABORTED and result is not None and result.error_code in HELD_UP
+        text = (result.error_string if result else "") or self._client.get_goal_status_text()
+        if status != GoalStatus.SUCCEEDED and not held_up:
+            did = "rejected the posture" if status == GoalStatus.REJECTED else "gave up"
+            raise GraspCommandError(f"controller action '{self._action}' {did}: {text or 'no reason given'}")
         rests = monitor.wait_for_rest(motion)
-        return Outcome(monitor.positions(motion.targets), status != GoalStatus.SUCCEEDED and rests,
-                       result.error_string if result else "")
+        return Outcome(monitor.positions(motion.targets), held_up and rests, text)
 
 
 def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], duration_s: float) -> ManipulatorDriver:

@@ -39,7 +39,7 @@ from modular_framework_core.task_constructor.faults import TaskFault
 from modular_framework_core.task_record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
 
-STOP_GRACE_S = 0.8
+STOP_GRACE_S = 0.6
 """How long running states have to stop [s] before the node gives up on them."""
 
 STATUS_PERIOD_S = 0.5

@@ -31,6 +31,7 @@ RANDOM_ATTEMPTS = 200
 WORDS_ABOVE_TIP_M = 0.45  # clear of the hand
 WORDS_WIDTH, WORDS_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
+JOB_END_S = 0.2  # a job says that it is done before it makes way for the next one
 DEFAULT_PLANNER = "move_group's default"
 
 
@@ -140,7 +141,7 @@ class InteractiveGoal:
 
     # ---------------------------------------------------------------- jobs, one at a time
     def _begin(self, what: str, job: Callable[[], Any]) -> None:
-        if not self._job.acquire(blocking=False):
+        if not self._job.acquire(timeout=JOB_END_S):
             self._tell(f"not {what}: busy; stop first")
             return
 

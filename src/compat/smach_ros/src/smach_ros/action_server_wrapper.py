@@ -2,6 +2,7 @@
 """Offers a state machine as an action: a goal runs it, its outcome is the end of the goal."""
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -12,6 +13,9 @@ from actionlib import SimpleActionServer
 import smach
 
 __all__ = ["ActionServerWrapper"]
+
+# actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
+EARLIEST_END_S = 0.05
 
 
 class ActionServerWrapper:
@@ -156,6 +160,7 @@ class ActionServerWrapper:
 
     def execute_cb(self, goal: Any) -> None:
         """Run the container for a goal, and end the goal as its outcome says."""
+        begun_s = time.monotonic()
         container = self.wrapped_container
         self._new_goal_data(goal)
         for slot in goal.__slots__ if self._expand_goal_slots else ():
@@ -171,8 +176,10 @@ class ActionServerWrapper:
             result = self._packed_result()
         except Exception as error:  # whatever a state raises ends this goal, not the server
             smach.logerr(f"'{self._server_name}': the state machine raised:\n{traceback.format_exc()}")
+            _sleep_until(begun_s + EARLIEST_END_S)
             self._action_server.set_aborted(text=f"the state machine raised {type(error).__name__}: {error}")
             return
+        _sleep_until(begun_s + EARLIEST_END_S)
         self._end_goal(outcome, result)
 
     def _packed_result(self) -> Any:
@@ -197,3 +204,7 @@ class ActionServerWrapper:
             self._action_server.set_preempted(result, text)
         else:
             self._action_server.set_aborted(result, text)
+
+
+def _sleep_until(time_s: float) -> None:
+    time.sleep(max(0.0, time_s - time.monotonic()))

@@ -205,9 +205,10 @@ class DynamixelServo:
         errors = self._faults(frozenset(places))
         if errors:
             self._table[:] = before
-        elif mx64.TORQUE_LIMIT.address in places and self.get(mx64.TORQUE_LIMIT):
+            return errors
+        if mx64.TORQUE_LIMIT.address in places and self.get(mx64.TORQUE_LIMIT):
             self.errors &= ~ServoErrors.OVERLOAD
-        elif mx64.GOAL_POSITION.address in places and not self.get(mx64.TORQUE_CONTROL_MODE):
+        if mx64.GOAL_POSITION.address in places and not self.get(mx64.TORQUE_CONTROL_MODE):
             self.set(mx64.TORQUE_ENABLE, 1)
         return errors
 

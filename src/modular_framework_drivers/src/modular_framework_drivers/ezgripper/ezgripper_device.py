@@ -46,6 +46,8 @@ class GripperState:
         goal: what they do it for.
         ready: calibrated, and has been at its start position.
         fault: why it cannot be used just now, "" when it can.
+        faults: grows with every fault, so that one that came and went between two looks is not missed.
+        last_fault: the latest of them, "" before the first.
     """
 
     stamp_s: float
@@ -54,6 +56,8 @@ class GripperState:
     goal: Goal
     ready: bool
     fault: str
+    faults: int = 0
+    last_fault: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +124,9 @@ class EzGripper:
         return state
 
     def command(self, position: float, torque: int) -> int:
-        """Leave a goal; while there is a fault it is ignored.
+        """Leave a goal; while there is a fault it is ignored, and one left just before a fault is told is void.
+
+        So who waits for a goal looks at `state().faults` too: once it has changed, the goal may never be worked on.
 
         Args:
             position: of the knuckle joint [rad].
@@ -185,21 +191,24 @@ class EzGripper:
             raise _Ended
 
     def _connect(self) -> None:
-        """Open the line, and bring the servos into a known state."""
+        """Open the line, and bring the servos into a known state; a motor with a fault is left to the next cycle."""
         self._bus.open()
         self._servos.set_up()
-        faithful = False
-        if not self._servos.calibrated:
+        known = self._servos.calibrated
+        faithful = known and self._servos.find_again()
+        if not known:
             self._report("calibrating", logging.INFO)
             self._servos.calibrate()
             self._follow_anew(self.settings.start_position)
-        else:
-            faithful = self._servos.find_again()
-            if not faithful:
-                self._follow_anew(self._servos.read().position)
-        self._off_since_s = None
         reading, now_s = self._servos.read(), time.monotonic()
-        if faithful:
+        was_off, self._off_since_s = self._off_since_s is not None, None
+        if reading.errors & MOTOR_FAULTS:
+            self._servos.forget()
+            self._follow_anew(reading.position)
+            return
+        if known and (was_off or not faithful):
+            self._follow_anew(reading.position)
+        elif known:
             self._grip.stop(reading.position)
         self._servos.drive(self._grip.update(reading.position, now_s))
 
@@ -236,13 +245,17 @@ class EzGripper:
             self._grip.retarget(wish.goal, position, time_s)
 
     def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
-        """Say it; after a pause give the torque again, where the fingers are."""
+        """Say it, and let the fingers stay, for not every fault switches every motor off; after a pause give the torque
+        again, where they are."""
         text = f"{self.settings.name}: {describe_errors(reading.errors, reading.temperature, reading.voltage)}"
-        if self._off_since_s is None:
+        since_s = self._off_since_s
+        if since_s is None:
             self._off_since_s = now_s
             LOGGER.error("%s", text)
         self._publish(reading, now_s, text)
-        if now_s - self._off_since_s >= self.settings.fault_pause_s:
+        if since_s is None:
+            self._servos.stay()
+        elif now_s - since_s >= self.settings.fault_pause_s:
             self._off_since_s = now_s
             self._servos.forget()
             self._servos.drive(Drive(reading.position, self.settings.start_torque))
@@ -255,9 +268,12 @@ class EzGripper:
 
     def _publish(self, reading: GripperReading, now_s: float, fault: str) -> None:
         recovered = self._state.fault and not fault
-        self._state = GripperState(now_s, reading, self._grip.motion, self._grip.goal, self._ready, fault)
+        state = replace(self._state, stamp_s=now_s, reading=reading, motion=self._grip.motion, goal=self._grip.goal,
+                        ready=self._ready, fault="")
         if fault:
-            self._faults += 1
+            self._tell(state, fault)
+        else:
+            self._state = state
         if recovered:
             LOGGER.info("%s: in use", self.settings.name)
 
@@ -266,5 +282,9 @@ class EzGripper:
         text = f"{self.settings.name}: {problem}"
         if text != self._state.fault:
             LOGGER.log(level, "%s", text)
-        self._state = replace(self._state, fault=text)
+        self._tell(self._state, text)
+
+    def _tell(self, state: GripperState, fault: str) -> None:
+        # counted after it can be seen: a goal that was left in between is void
+        self._state = replace(state, fault=fault, faults=self._faults + 1, last_fault=fault)
         self._faults += 1

@@ -41,6 +41,7 @@ class EzGripperRobotHW(RobotHW):
     def __init__(self) -> None:
         super().__init__()
         self._gripper: EzGripper | None = None
+        self._faults, self._missed = 0, ""
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         where = join_names(robot_hw_nh.namespace, "")
@@ -62,6 +63,7 @@ class EzGripperRobotHW(RobotHW):
                          self._gripper.state().fault or "it has not come to its start position")
             self.close()
             return False
+        self._faults = self._gripper.state().faults
         self.read(0.0, 0.0)
         self._handle.command = self._handle.position
         return True
@@ -87,9 +89,11 @@ class EzGripperRobotHW(RobotHW):
         if self._gripper is None:
             return
         state, joint = self._gripper.state(), self._handle.state
-        joint.position, joint.velocity = state.reading.position, state.reading.velocity
+        joint.position, joint.velocity = state.reading.position, 0.0 if state.fault else state.reading.velocity
         joint.effort = state.reading.load * TORQUE_MAX / FULL_TORQUE * self._full_effort
-        if state.fault:
+        self._missed = state.last_fault if state.faults != self._faults else ""
+        self._faults = state.faults
+        if state.fault or self._missed:
             self._handle.command = joint.position
             self._guard.reset()
 
@@ -107,7 +111,7 @@ class EzGripperRobotHW(RobotHW):
         return round(min(1.0, self._handle.max_effort / self._full_effort) * FULL_TORQUE)
 
     def fault(self) -> str:
-        return self._gripper.state().fault if self._gripper is not None else ""
+        return (self._gripper.state().fault or self._missed) if self._gripper is not None else ""
 
     def close(self) -> None:
         if self._gripper is not None:

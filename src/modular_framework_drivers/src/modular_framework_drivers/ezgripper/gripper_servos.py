@@ -160,7 +160,7 @@ class GripperServos:
 
         Raises:
             BusError: a servo does not answer.
-            GripperError: a shaft is where it cannot be.
+            GripperError: a shaft is where it cannot be; its zero is kept, so that nothing moves to find another.
         """
         faithful = all(self._remembers(servo) for servo in self._servos)
         for servo in self._servos:
@@ -169,15 +169,14 @@ class GripperServos:
             position = self._reading(servo).position
             ticks = (position - servo.zero + SLACK_TICKS) % mx64.TICKS_PER_TURN - SLACK_TICKS
             if ticks > TRAVEL_TICKS + SLACK_TICKS:
-                servo.zero = None
-                raise GripperError(f"servo {servo.servo_id}: its shaft is not where the fingers can be; free the "
-                                   "fingers, they are calibrated anew")
+                raise GripperError(f"servo {servo.servo_id}: its shaft is not where the fingers can be; free them and "
+                                   "check the tendon, or start the node again to calibrate them anew")
             servo.zero = position - ticks
             servo.written.clear()
         return faithful
 
     def _remembers(self, servo: _Servo) -> bool:
-        return bool(servo.written) and all(
+        return mx64.TORQUE_ENABLE in servo.written and all(
             mx64.from_bytes(self._bus.read(servo.servo_id, register)[0]) == value % (1 << 8 * register.size)
             for register, value in servo.written.items())
 
@@ -211,19 +210,33 @@ class GripperServos:
             BusError: a servo does not answer.
         """
         for servo in self._servos:
-            self._write(servo, mx64.TORQUE_LIMIT, drive.torque)
+            # a motor that may do more than before must not yet have its old goal; it never does more than is allowed
+            if drive.position is None or drive.torque < servo.written.get(mx64.TORQUE_LIMIT, 0):
+                self._write(servo, mx64.TORQUE_LIMIT, drive.torque)
             if drive.position is None:
                 self._write(servo, mx64.GOAL_TORQUE, mx64.direction_word(-drive.direction * drive.torque))
             else:
                 self._write(servo, mx64.GOAL_POSITION, (servo.zero or 0) + ticks_from_joint(drive.position))
             self._write(servo, mx64.TORQUE_CONTROL_MODE, int(drive.position is None))
+            self._write(servo, mx64.TORQUE_LIMIT, drive.torque)
             self._write(servo, mx64.TORQUE_ENABLE, 1)
+
+    def stay(self) -> None:
+        """Tell every motor to stay where it is, with the torque it has: one that has shut down stays off.
+
+        Raises:
+            BusError: a servo does not answer.
+        """
+        for servo in self._servos:
+            self._write(servo, mx64.GOAL_POSITION, self._reading(servo).position)
+            self._write(servo, mx64.TORQUE_CONTROL_MODE, 0)
 
     def _reading(self, servo: _Servo) -> Reading:
         return mx64.parse_reading(*self._bus.read(servo.servo_id, mx64.READING))
 
     def _write(self, servo: _Servo, register: Register, value: int) -> None:
         if servo.written.get(register) != value:
+            servo.written.pop(register, None)  # when its answer is lost nobody knows whether the servo has done it
             self._bus.write(servo.servo_id, register, value)
             servo.written[register] = value
 

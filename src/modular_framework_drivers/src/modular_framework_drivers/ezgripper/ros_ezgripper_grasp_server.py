@@ -66,7 +66,8 @@ class EzGripperManipulator:
         if self._joint in motion.efforts:
             torque = round(motion.efforts[self._joint] * FULL_TORQUE)
             refuse_no_effort(self._joint, torque)
-        self._refuse_fault(self._gripper.state())
+        before = self._gripper.state()
+        self._refuse_fault(before)
         position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # what was rounded is forgiven
         number = self._gripper.command(position, torque)
         end_s = time.monotonic() + motion.timeout_s
@@ -74,6 +75,9 @@ class EzGripperManipulator:
         while True:
             state = self._gripper.state()
             self._refuse_fault(state)
+            if state.faults != before.faults:    # come and gone between two looks; the goal may be void by it
+                self._stop()
+                raise GraspCommandError(state.last_fault)
             if motion.stop_requested():
                 self._stop()
                 raise GraspCommandError("stopped on request")

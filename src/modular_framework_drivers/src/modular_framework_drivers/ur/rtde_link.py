@@ -45,7 +45,8 @@ class LinkSettings:
     Attributes:
         address: of its controller.
         timeout_s: without news for so long the link counts as lost [s].
-        speed_scale: what to set its speed slider to, None to leave it, 0 to 1.
+        speed_scale: what to set its speed slider to, None to leave it, 0 to 1; once it has followed, the slider is not
+            raised any more.
         payload_kg: mass of the manipulator [kg].
         payload_centre_m: its centre of mass in the flange frame [m].
         lookahead_s: of servoj, 0.03 to 0.2 [s].
@@ -265,8 +266,10 @@ class RtdeLink:
             self.drop_program(f"the program was not accepted {late}")
 
     def _control_arguments(self) -> list[str]:
-        settings = self._settings
-        scale = [] if settings.speed_scale is None else ["--speed-scale", _written(settings.speed_scale)]
+        settings, wanted = self._settings, self._settings.speed_scale
+        if wanted is not None and self._has_commanded and self.state is not None:
+            wanted = min(wanted, self.state.speed_fraction)    # who has made it slower meanwhile has done so on purpose
+        scale = [] if wanted is None else ["--speed-scale", _written(wanted)]
         return [*scale, "--payload", _written(settings.payload_kg),
                 "--payload-centre", *map(_written, settings.payload_centre_m),
                 "--lookahead", _written(settings.lookahead_s), "--gain", _written(settings.gain)]

@@ -183,6 +183,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         except Exception as error:  # ur-rtde raises many kinds; all mean that this connection is over
             text = str(error).strip() or type(error).__name__
+            if "Failed to start control script" in text:    # ur-rtde does not say so of every arm
+                text += "; is the arm in remote control?"
             try:
                 _send(channel, FAILED + text.encode()[:MESSAGE_SIZE - 1])
             except OSError:

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Two nodes robot_hw in the namespaces of two robots: each serves its own, and takes nothing of the other."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import actionlib
+import pytest
+import rosgraph
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from controller_manager_msgs.srv import LoadController, SwitchController
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+LAUNCH = """
+<launch>
+  <param name="robot_description" value="&lt;robot name='nobody'/&gt;"/>
+  <group ns="left">
+    <rosparam>
+      robot_hardware: [arm_hw]
+      arm_hw: {type: modular_framework_control/MockRobotHW, joints: [left_joint], topic_to_wait_for: arm_ready}
+      joint_limits: {left_joint: {has_position_limits: true, min_position: -1.0, max_position: 0.1}}
+      states: {type: joint_state_controller/JointStateController, publish_rate: 50}
+      arm: {type: position_controllers/JointTrajectoryController, joints: [left_joint],
+            constraints: {goal_time: 10.0}}
+    </rosparam>
+    <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen"/>
+  </group>
+  <group ns="right">
+    <rosparam>
+      states: {type: joint_state_controller/JointStateController, publish_rate: 50}
+      arm: {type: position_controllers/JointTrajectoryController, joints: [right_joint],
+            constraints: {goal_time: 10.0}}
+    </rosparam>
+    <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen">
+      <rosparam>{joints: [right_joint]}</rosparam>
+    </node>
+  </group>
+</launch>
+"""
+ROBOTS = ["left", "right"]
+
+
+@pytest.fixture(scope="module")
+def robots(ros_launch: Callable[..., Any]) -> Any:
+    session = ros_launch(LAUNCH)
+    for robot in ROBOTS:
+        manager = f"/{robot}/controller_manager"
+        rospy.wait_for_service(f"{manager}/switch_controller", 60.0)
+        for name in ("states", "arm"):
+            assert rospy.ServiceProxy(f"{manager}/load_controller", LoadController)(name).ok
+        switch = rospy.ServiceProxy(f"{manager}/switch_controller", SwitchController)
+        assert switch(["states", "arm"], [], 2, False, 0.0).ok
+    return session
+
+
+def test_each_serves_its_own_namespace_and_none_the_root(robots: Any) -> None:
+    _, _, services = rosgraph.Master("/test").getSystemState()
+    providers = {name: nodes for name, nodes in services if "controller_manager/" in name or "reset_stat" in name}
+    assert {name.split("/")[1] for name in providers} == set(ROBOTS)
+    for name, nodes in providers.items():
+        assert nodes == [f"/{name.split('/')[1]}/robot_hw"], name
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_each_tells_the_states_of_its_own_joints(robots: Any, robot: str) -> None:
+    assert rospy.wait_for_message(f"/{robot}/joint_states", JointState, 30.0).name == [f"{robot}_joint"]
+    assert not any(topic == "/joint_states" for topic, _ in rospy.get_published_topics())
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_each_moves_its_own_joint_within_its_own_limits(robots: Any, robot: str) -> None:
+    client = actionlib.SimpleActionClient(f"/{robot}/arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(30.0))
+    point = JointTrajectoryPoint(positions=[0.5], time_from_start=rospy.Duration.from_sec(0.3))
+    client.send_goal(FollowJointTrajectoryGoal(
+        trajectory=JointTrajectory(joint_names=[f"{robot}_joint"], points=[point])))
+    assert client.wait_for_result(rospy.Duration(30.0)) and client.get_state() == GoalStatus.SUCCEEDED
+    reached, deadline = {"left": 0.1, "right": 0.5}[robot], time.monotonic() + 30.0
+    while abs(rospy.wait_for_message(f"/{robot}/joint_states", JointState, 30.0).position[0] - reached) > 1e-6:
+        assert time.monotonic() < deadline
+
+
+def test_readiness_and_figures_are_told_under_the_names_of_each(robots: Any) -> None:
+    assert rospy.wait_for_message("/left/arm_ready", Bool, 30.0).data is True
+    seen: set[str] = set()
+    deadline = time.monotonic() + 30.0
+    while seen != {"left/robot_hw: control loop", "right/robot_hw: control loop"}:
+        seen.update(status.name for status in rospy.wait_for_message("/diagnostics", DiagnosticArray, 30.0).status)
+        assert time.monotonic() < deadline, seen
+
+
+def test_a_description_that_is_not_the_robots_is_not_taken_and_the_log_says_so(robots: Any) -> None:
+    assert "/robot_description is not taken, the robot's own is looked for: /right/robot_description" in robots.log()
