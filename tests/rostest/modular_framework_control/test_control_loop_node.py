@@ -187,7 +187,7 @@ def test_a_processor_that_something_more_urgent_takes_away_costs_hardly_a_cycle(
     for processor in processors:
         subprocess.run([sys.executable, "-c", HOG, str(processor)], check=True, timeout=30.0)
     values = figures()[2]
-    assert int(values["cycles"]) > 100
+    assert int(values["cycles"]) + int(values["missed"]) > 100
     assert int(values["missed"]) < 25, "one processor was away for 50 cycles, then the other"
 
 

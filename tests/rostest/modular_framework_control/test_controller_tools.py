@@ -13,6 +13,7 @@ import pytest
 import rospy
 from controller_manager_msgs.msg import ControllersStatistics
 from controller_manager_msgs.srv import ListControllers
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
 LAUNCH = """
@@ -143,14 +144,35 @@ def test_statistics_of_the_controllers_are_published(tool: Callable[..., Any]) -
     assert run(tool("controller_manager", "kill", "states"))[0] == 0
 
 
-def test_a_spawner_that_waits_for_its_manager_can_be_ended(tool: Callable[..., Any]) -> None:
-    process = tool("spawner", "--no-timeout", "--namespace", "/elsewhere", "arm")
+@pytest.mark.parametrize("patience", [("--no-timeout",), ("--timeout", "0")])
+def test_a_spawner_that_waits_for_its_manager_can_be_ended(tool: Callable[..., Any], patience: tuple[str, ...]) -> None:
+    process = tool("spawner", *patience, "--namespace", "/elsewhere", "arm")
     for line in process.stdout:
         if "Waiting for service /elsewhere/controller_manager/load_controller" in line:
             break
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(1.0)
     process.send_signal(signal.SIGINT)
     code, output = run(process)
     assert code == 1 and "told to end while waiting" in output
+
+
+def test_a_spawner_has_patience_with_a_simulation_whose_clock_has_not_begun(tool: Callable[..., Any]) -> None:
+    rospy.set_param("/use_sim_time", True)
+    try:
+        process = tool("spawner", "--timeout", "1", "--namespace", "/elsewhere", "arm")
+        for line in process.stdout:
+            if "Waiting for service /elsewhere/controller_manager/load_controller" in line:
+                break
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(3.0)
+        clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+        clock.publish(Clock(rospy.Time(1)))
+        code, output = run(process)
+        clock.unregister()
+    finally:
+        rospy.delete_param("/use_sim_time")
+    assert code == 1 and "waited 1 s for service" in output
 
 
 def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:

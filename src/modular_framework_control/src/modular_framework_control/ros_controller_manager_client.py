@@ -35,12 +35,15 @@ class ControllerManagerClient:
         namespace: namespace of the robot; "" for that of the node.
         timeout_s: how long to wait for a service [s of real time]; infinite waits for ever.
         ended: set when nobody waits any more.
+        await_clock: whether the time counts only from when the simulated clock, if it is to be used, has begun.
     """
 
-    def __init__(self, namespace: str = "", timeout_s: float = 30.0, ended: threading.Event | None = None) -> None:
+    def __init__(self, namespace: str = "", timeout_s: float = 30.0, ended: threading.Event | None = None,
+                 await_clock: bool = False) -> None:
         self.namespace = rospy.resolve_name(namespace) if namespace else rospy.get_namespace()
         self._timeout_s = timeout_s
         self._ended = ended if ended is not None else threading.Event()
+        self._await_clock = await_clock
 
     def last_calls(self) -> ControllerManagerClient:
         """A client for what is to be done at the end; it waits for a service that has gone for a short while only."""
@@ -93,7 +96,7 @@ class ControllerManagerClient:
             except rospy.ROSException as error:
                 if self._ended.is_set():
                     raise ControllerManagerClientError(f"told to end while waiting for service {name}") from error
-                if _simulation_is_starting() and not rospy.is_shutdown():
+                if self._await_clock and _simulation_is_starting() and not rospy.is_shutdown():
                     deadline = time.monotonic() + self._timeout_s
                 elif time.monotonic() > deadline or rospy.is_shutdown():
                     raise ControllerManagerClientError(f"waited {self._timeout_s:.0f} s for service {name} in vain; is "

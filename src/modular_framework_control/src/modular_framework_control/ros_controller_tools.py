@@ -77,7 +77,8 @@ def _run(parser: argparse.ArgumentParser, name: str,
     try:
         arguments.files = [Path(argument) for argument in arguments.controllers if Path(argument).is_file()]
         arguments.controllers = names_of(arguments.controllers)
-        action(ControllerManagerClient(arguments.namespace, timeout_s, ended), arguments, ended)
+        client = ControllerManagerClient(arguments.namespace, timeout_s, ended, await_clock=True)
+        action(client, arguments, ended)
     except ControllerManagerClientError as error:
         rospy.logerr("%s", error)
         return 1
