@@ -27,13 +27,8 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
         self._velocity_ff = [read_number(forward, name, 0.0, None) for name in self.joint_names]
         return True
 
-    def stopping(self, time_s: float) -> None:
+    def _command_end(self) -> None:
         self._command_rest()
-        super().stopping(time_s)
-
-    def failed(self, time_s: float, reason: str) -> None:
-        self._command_rest()
-        super().failed(time_s, reason)
 
     def _command_rest(self) -> None:
         for handle, pid in zip(self._handles, self._pids, strict=True):

@@ -151,6 +151,7 @@ class JointTrajectoryController(Controller):
         self._rest()
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
+        self._command_end()
         self._running = False
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
         self._reject_waiting(text)
@@ -189,6 +190,9 @@ class JointTrajectoryController(Controller):
         """Command what keeps the joints where they are measured."""
         for handle in self._handles:
             handle.command = handle.position
+
+    def _command_end(self) -> None:
+        """Command what is in force while the controller does not run; positions stay as they are."""
 
     def _read_actual(self) -> None:
         states = [handle.state for handle in self._handles]

@@ -25,20 +25,11 @@ class PosVelJointTrajectoryController(JointTrajectoryController):
 
     def _command_rest(self) -> None:
         super()._command_rest()
-        self._command_no_motion()
+        self._command_end()
 
-    def _command_no_motion(self) -> None:
-        """Leave the positions as they are, and command nothing that leads on from them."""
+    def _command_end(self) -> None:
         for handle in self._handles:
             handle.command_velocity = 0.0
-
-    def stopping(self, time_s: float) -> None:
-        self._command_no_motion()
-        super().stopping(time_s)
-
-    def failed(self, time_s: float, reason: str) -> None:
-        self._command_no_motion()
-        super().failed(time_s, reason)
 
 
 class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
@@ -51,7 +42,7 @@ class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
         for handle, acceleration in zip(self._handles, desired[ACCELERATION].tolist(), strict=True):
             handle.command_acceleration = acceleration
 
-    def _command_no_motion(self) -> None:
-        super()._command_no_motion()
+    def _command_end(self) -> None:
+        super()._command_end()
         for handle in self._handles:
             handle.command_acceleration = 0.0
