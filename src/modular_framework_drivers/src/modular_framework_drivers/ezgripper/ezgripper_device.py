@@ -90,7 +90,6 @@ class EzGripper:
         self._thread: threading.Thread | None = None
         first = Goal(0, settings.start_position, settings.start_torque)
         self._numbers = itertools.count(1)
-        self._faults = 0
         self._wish = self._taken = _Wish(first, 0)
         self._grip = Grip(settings.rules, first)
         self._bus = DynamixelBus(settings.port_name, settings.baudrate, settings.link_timeout_s)
@@ -142,14 +141,14 @@ class EzGripper:
             raise ValueError(f"{self.settings.name}: position {position} rad is outside [0, {CLOSED_POSITION}]")
         if not 0 <= torque <= TORQUE_MAX:
             raise ValueError(f"{self.settings.name}: torque {torque} is outside [0, {TORQUE_MAX}]")
-        faults, goal = self._faults, Goal(next(self._numbers), position, torque)
-        if not self._state.fault:
-            self._wish = _Wish(goal, faults)
+        state, goal = self._state, Goal(next(self._numbers), position, torque)
+        if not state.fault:
+            self._wish = _Wish(goal, state.faults)
         return goal.number
 
     def stop(self) -> None:
         """Stop the fingers where they are; what they hold they go on holding."""
-        self._wish = _Wish(None, self._faults)
+        self._wish = _Wish(None, self._state.faults)
 
     # ---- the gripper's thread ----
 
@@ -234,7 +233,7 @@ class EzGripper:
 
     def _take_orders(self, position: float, time_s: float) -> None:
         wish = self._wish
-        if wish is self._taken or wish.faults != self._faults:
+        if wish is self._taken or wish.faults != self._state.faults:
             return
         self._taken, before = wish, self._grip.goal
         if wish.goal is None:
@@ -285,6 +284,4 @@ class EzGripper:
         self._tell(self._state, text)
 
     def _tell(self, state: GripperState, fault: str) -> None:
-        # counted after it can be seen: a goal that was left in between is void
-        self._state = replace(state, fault=fault, faults=self._faults + 1, last_fault=fault)
-        self._faults += 1
+        self._state = replace(state, fault=fault, faults=state.faults + 1, last_fault=fault)
