@@ -12,10 +12,21 @@ import numpy as np
 import pytest
 import rosgraph
 import rospy
+from geometry_msgs.msg import Pose, Quaternion
 from moveit_commander import MoveGroupCommander
-from moveit_msgs.msg import MoveItErrorCodes
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    Constraints,
+    MoveItErrorCodes,
+    PlanningScene,
+    PlanningSceneComponents,
+    RobotState,
+)
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetStateValidity
 from ros_session import until
 from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
 
 PACKAGES = Path(__file__).parents[2] / "packages"
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
@@ -119,6 +130,38 @@ def test_a_stop_leaves_the_robot_on_its_way(arm: MoveGroupCommander) -> None:
         places.append(arm.get_current_joint_values())
     assert not np.allclose(places[-1], REACHING, atol=0.05)
     arm.set_max_velocity_scaling_factor(1.0)
+
+
+def test_a_coarse_link_is_checked_against_the_links_that_are_enabled_only(arm: MoveGroupCommander) -> None:
+    read = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
+    matrix = read(PlanningSceneComponents(PlanningSceneComponents.ALLOWED_COLLISION_MATRIX)
+                  ).scene.allowed_collision_matrix
+    assert (matrix.default_entry_names, matrix.default_entry_values) == (["panda_hand_sc"], [True])
+    coarse = matrix.entry_values[matrix.entry_names.index("panda_hand_sc")].enabled
+    assert [name for name, allowed in zip(matrix.entry_names, coarse, strict=True) if not allowed] == ["panda_link1"]
+    held = AttachedCollisionObject(link_name="panda_hand", touch_links=["panda_leftfinger", "panda_rightfinger"])
+    held.object.id, held.object.header.frame_id = "cube", "panda_hand"
+    held.object.pose.position.z, held.object.pose.orientation.w = 0.11, 1.0
+    held.object.primitives = [SolidPrimitive(SolidPrimitive.BOX, [0.04, 0.04, 0.04])]
+    held.object.primitive_poses = [Pose(orientation=Quaternion(0.0, 0.0, 0.0, 1.0))]
+    change = PlanningScene(is_diff=True)
+    change.robot_state.is_diff = True
+    change.robot_state.attached_collision_objects = [held]
+    apply = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
+    assert apply(change).success
+    check = rospy.ServiceProxy("check_state_validity", GetStateValidity)
+    answer = check(RobotState(is_diff=True), "", Constraints())
+    assert answer.valid, answer.contacts
+    change.robot_state.attached_collision_objects = []
+    change.allowed_collision_matrix.default_entry_names = ["panda_hand_sc"]
+    for allowed in (False, True):
+        change.allowed_collision_matrix.default_entry_values = [allowed]
+        assert apply(change).success
+        assert check(RobotState(is_diff=True), "", Constraints()).valid == allowed
+    held.object.operation = CollisionObject.REMOVE
+    change.robot_state.attached_collision_objects = [held]
+    change.world.collision_objects = [CollisionObject(id="cube", operation=CollisionObject.REMOVE)]
+    assert apply(change).success
 
 
 def test_a_start_elsewhere_is_refused(arm: MoveGroupCommander, demo: Any) -> None:

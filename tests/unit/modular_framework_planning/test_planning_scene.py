@@ -106,6 +106,37 @@ def test_defaults_hold_only_where_no_entry_speaks_and_both_must_allow() -> None:
     assert acm.with_entry("a", "b", True).allows("b", "a")
 
 
+COARSE_ARM = """<robot name="r">
+<link name="base"><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+<link name="upper"><collision><geometry><box size="0.1 0.1 0.3"/></geometry></collision></link>
+<link name="upper_coarse"><collision><geometry><box size="0.5 0.5 0.5"/></geometry></collision></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="f" type="fixed"><parent link="upper"/><child link="upper_coarse"/></joint></robot>"""
+
+
+def touching(defaults: str) -> set[frozenset[str]]:
+    """Bodies that touch: the coarse shape overlaps the base and both objects, the fine one only the held object."""
+    srdf = f'<robot name="r"><group name="arm"><joint name="j"/></group>{defaults}</robot>'
+    scene = empty_scene(RobotModel(COARSE_ARM, srdf)).with_object(box("crate", at(0.2, 0, 0.38)))
+    held = CollisionObject("held", pin.SE3.Identity(), ((Box(0.1, 0.1, 0.1), at(0.2, 0.0, 0.0)),))
+    scene = scene.with_attached(AttachedObject(held, "upper", frozenset()))
+    contacts = CollisionChecker(scene).contacts(scene.positions)
+    return {frozenset((item.first.name, item.second.name)) for item in contacts}
+
+
+def test_a_link_without_default_collisions_touches_nothing_but_what_is_enabled() -> None:
+    held_by_the_coarse, base = frozenset({"upper_coarse", "held"}), frozenset({"upper_coarse", "base"})
+    everything = {held_by_the_coarse, base, frozenset({"upper_coarse", "crate"}), frozenset({"held", "crate"})}
+    assert touching("") == everything
+    off = '<disable_default_collisions link="upper_coarse"/>'
+    enabled = '<enable_collisions link1="base" link2="upper_coarse"/>'
+    assert touching(off) == {frozenset({"held", "crate"})}
+    assert touching(off + enabled) == {base, frozenset({"held", "crate"})}
+    assert touching(off + '<disable_collisions link1="upper_coarse" link2="base"/>' + enabled) == {
+        frozenset({"held", "crate"})}, "a disabled pair goes before an enabled one, wherever they stand"
+
+
 def test_a_matrix_that_is_not_square_is_refused() -> None:
     with pytest.raises(ValueError, match="one row per name"):
         matrix_from_rows(["a", "b"], [[True]], {})

@@ -33,7 +33,7 @@ from modular_framework_planning.robot_model import RobotModel  # noqa: E402
 from modular_framework_planning.scene_conversions import (  # noqa: E402
     apply_attached_object,
     apply_collision_object,
-    matrix_from_message,
+    with_matrix_of,
 )
 from modular_framework_planning.scene_difference import difference_message  # noqa: E402
 from modular_framework_planning.scene_messages import apply_scene, scene_message  # noqa: E402
@@ -165,13 +165,13 @@ def test_detaching_asks_for_the_right_link_and_without_a_name_takes_all_of_a_lin
     assert moved_over.attached["a"].link == WRIST and np.allclose(translation(moved_over, "a"), [1, 0, 0])
 
 
-def test_a_matrix_that_was_read_and_sent_back_means_the_same() -> None:
+def test_a_matrix_that_was_read_and_sent_back_means_the_same(scene: Scene) -> None:
     message = PlanningScene().allowed_collision_matrix
     message.entry_names = ["a", "b", "c"]
     message.entry_values = [AllowedCollisionEntry(row) for row in
                             ([False, True, False], [True, False, False], [False, False, False])]
     message.default_entry_names, message.default_entry_values = ["a", "<octomap>"], [True, True]
-    matrix = matrix_from_message(message)
+    matrix = with_matrix_of(scene, message).acm
     assert matrix.allows("a", "b") and not matrix.allows("a", "c"), "an entry goes before a default"
     assert matrix.allows("a", "new") and matrix.allows("<octomap>", "new") and not matrix.allows("b", "new")
     back = PlanningScene()
@@ -181,9 +181,21 @@ def test_a_matrix_that_was_read_and_sent_back_means_the_same() -> None:
     assert back.allowed_collision_matrix.entry_names == ["a", "b", "c", "<octomap>"]
     row = back.allowed_collision_matrix.entry_values[3].enabled
     assert row == [True, True, True, True], "the matrix holds verdicts, defaults applied"
-    again = matrix_from_message(back.allowed_collision_matrix)
+    again = with_matrix_of(scene, back.allowed_collision_matrix).acm
     bodies = ["a", "b", "c", "<octomap>", "new"]
     assert all(again.allows(x, y) == matrix.allows(x, y) for x in bodies for y in bodies)
+
+
+def test_a_message_with_nothing_but_defaults_keeps_the_entries(scene: Scene) -> None:
+    message = PlanningScene(is_diff=True)
+    message.allowed_collision_matrix.default_entry_names = [WRIST, "<octomap>"]
+    message.allowed_collision_matrix.default_entry_values = [True, False]
+    changed = apply_scene(scene, message)
+    assert dict(changed.acm.defaults) == {WRIST: True, "<octomap>": False}
+    assert changed.acm.entries == scene.acm.entries and changed.acm.allows(WRIST, "crate")
+    message.allowed_collision_matrix.default_entry_values = [True]
+    with pytest.raises(PlanningError, match="2 default_entry_names and 1 default_entry_values"):
+        apply_scene(scene, message)
 
 
 def test_padding_and_scale_are_margins_that_never_fall_short(scene: Scene) -> None:

@@ -2,8 +2,10 @@
 """Says which pairs of bodies may touch: explicit entries first, then defaults of a body."""
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+from modular_framework_planning.srdf import SemanticDescription
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,11 @@ class AllowedCollisionMatrix:
         names = self.names + tuple(name for name in dict.fromkeys((first, second)) if name not in self.names)
         return replace(self, entries=entries, names=names)
 
+    def with_defaults(self, defaults: Mapping[str, bool]) -> AllowedCollisionMatrix:
+        """Returns a matrix in which the named bodies have the given default verdicts."""
+        names = self.names + tuple(name for name in defaults if name not in self.names)
+        return replace(self, defaults={**self.defaults, **defaults}, names=names)
+
     def as_rows(self) -> list[list[bool]]:
         """Returns the square matrix of verdicts over `names`, defaults applied, as the message wants it."""
         return [[self.allows(row, column) for column in self.names] for row in self.names]
@@ -44,9 +51,17 @@ def _default(defaults: Mapping[str, bool], first: str, second: str) -> bool:
     return bool(verdicts) and all(verdicts)
 
 
-def matrix_from_pairs(pairs: Iterable[frozenset[str]], links: Sequence[str]) -> AllowedCollisionMatrix:
-    """Builds the initial matrix: the listed pairs of links may touch, every link is named."""
-    return AllowedCollisionMatrix(entries={pair: True for pair in pairs if len(pair) == 2}, names=tuple(links))
+def matrix_from_semantics(semantics: SemanticDescription, links: Sequence[str]) -> AllowedCollisionMatrix:
+    """Builds the matrix a robot begins with; every link is named.
+
+    As in MoveIt: links with disabled default collisions may touch anything by default, then enabled pairs are entered,
+    and disabled pairs last. Names the robot does not have mean nothing.
+    """
+    known = frozenset(links)
+    entries = {pair: verdict for pairs, verdict in ((semantics.enabled_pairs, False), (semantics.disabled_pairs, True))
+               for pair in pairs if len(pair) == 2 and pair <= known}
+    defaults = {link: True for link in semantics.touching_links if link in known}
+    return AllowedCollisionMatrix(entries, defaults, tuple(links))
 
 
 def matrix_from_rows(names: Sequence[str], rows: Sequence[Sequence[bool]],

@@ -8,7 +8,7 @@ from itertools import count
 
 import numpy as np
 
-from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_pairs
+from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_semantics
 from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
 from modular_framework_planning.padding import Padding
 from modular_framework_planning.robot_model import RobotModel
@@ -280,6 +280,6 @@ def _place_in_message(shape: Shape) -> int:
 
 def empty_scene(model: RobotModel, positions: Array | None = None) -> PlanningScene:
     """Returns the scene of a robot alone in the world, with the SRDF's allowed collisions."""
-    acm = matrix_from_pairs(model.semantics.disabled_pairs, model.document.links)
+    acm = matrix_from_semantics(model.semantics, model.document.links)
     start = model.default_positions() if positions is None else model.with_mimics(positions)
     return PlanningScene(model=model, positions=start, acm=acm)

@@ -153,14 +153,23 @@ def _detached(scene: PlanningScene, name: str, link: str) -> PlanningScene:
     return scene
 
 
-def matrix_from_message(message: Any) -> AllowedCollisionMatrix:
-    """Reads an allowed collision matrix; raises GeometryError when it is not square."""
+def with_matrix_of(scene: PlanningScene, message: Any) -> PlanningScene:
+    """Returns the scene with the allowed collisions of a message; one that names no body changes nothing.
+
+    A message with nothing but defaults changes these defaults and leaves the rest as it is.
+
+    Raises:
+        GeometryError: the matrix is not square, or names and values of defaults differ in number.
+    """
     if len(message.default_entry_names) != len(message.default_entry_values):
-        raise GeometryError("allowed_collision_matrix: default_entry_names and default_entry_values differ in length")
+        raise GeometryError(f"allowed_collision_matrix: {len(message.default_entry_names)} default_entry_names and "
+                            f"{len(message.default_entry_values)} default_entry_values; give one value for each name")
     defaults = dict(zip(message.default_entry_names, map(bool, message.default_entry_values), strict=True))
+    if not message.entry_names:
+        return scene.with_acm(scene.acm.with_defaults(defaults)) if defaults else scene
     try:
         rows = [list(row.enabled) for row in message.entry_values]
-        return matrix_from_rows(list(message.entry_names), rows, defaults)
+        return scene.with_acm(matrix_from_rows(list(message.entry_names), rows, defaults))
     except ValueError as error:
         raise GeometryError(str(error)) from error
 

@@ -16,8 +16,8 @@ from modular_framework_planning.scene_conversions import (
     colors_to_message,
     fixed_frames_from,
     frames_to_message,
-    matrix_from_message,
     object_to_message,
+    with_matrix_of,
     write_matrix,
 )
 
@@ -48,9 +48,7 @@ def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
         scene = scene.with_fixed_frames(fixed_frames_from(scene, message.fixed_frame_transforms))
     scene = scene_with_state(scene, message.robot_state, "planning scene robot_state")
     scene = apply_world(scene, message.world)
-    matrix = message.allowed_collision_matrix
-    if matrix.entry_names or matrix.default_entry_names:
-        scene = scene.with_acm(matrix_from_message(matrix))
+    scene = with_matrix_of(scene, message.allowed_collision_matrix)
     if message.link_padding or message.link_scale:
         scene = scene.with_padding(scene.padding.with_links(
             {item.link_name: item.padding for item in message.link_padding},

@@ -42,7 +42,13 @@ class VirtualJoint:
 
 @dataclass(frozen=True, slots=True)
 class SemanticDescription:
-    """Everything of an SRDF the planner uses."""
+    """Everything of an SRDF the planner uses.
+
+    Attributes:
+        touching_links: links that may touch anything by default (<disable_default_collisions>).
+        enabled_pairs: pairs that are checked all the same (<enable_collisions>).
+        disabled_pairs: pairs that may touch, and the reason the file gives (<disable_collisions>).
+    """
 
     robot_name: str
     groups: Mapping[str, GroupSpec] = field(default_factory=dict)
@@ -50,6 +56,8 @@ class SemanticDescription:
     end_effectors: tuple[EndEffector, ...] = ()
     virtual_joints: tuple[VirtualJoint, ...] = ()
     passive_joints: frozenset[str] = frozenset()
+    touching_links: tuple[str, ...] = ()
+    enabled_pairs: frozenset[frozenset[str]] = frozenset()
     disabled_pairs: Mapping[frozenset[str], str] = field(default_factory=dict)
 
 
@@ -78,6 +86,10 @@ def _group_states(root: ET.Element) -> dict[str, dict[str, dict[str, float]]]:
     return states
 
 
+def _pair(element: ET.Element) -> frozenset[str]:
+    return frozenset((_need(element, "link1").strip(), _need(element, "link2").strip()))
+
+
 def parse_srdf(text: str) -> SemanticDescription:
     """Parses an SRDF document.
 
@@ -103,6 +115,8 @@ def parse_srdf(text: str) -> SemanticDescription:
             VirtualJoint(_need(e, "name"), _need(e, "type"), _need(e, "parent_frame"), _need(e, "child_link"))
             for e in root.findall("virtual_joint")),
         passive_joints=frozenset(_need(e, "name") for e in root.findall("passive_joint")),
-        disabled_pairs={frozenset((_need(e, "link1"), _need(e, "link2"))): e.get("reason", "")
-                        for e in root.findall("disable_collisions")},
+        touching_links=tuple(dict.fromkeys(
+            _need(e, "link").strip() for e in root.findall("disable_default_collisions"))),
+        enabled_pairs=frozenset(map(_pair, root.findall("enable_collisions"))),
+        disabled_pairs={_pair(e): e.get("reason", "") for e in root.findall("disable_collisions")},
     )
