@@ -75,7 +75,7 @@ def two(one: Recorder, other: Recorder) -> CombinedRobotHW:
 
 def info(name: str, **claims: Sequence[str]) -> ControllerInfo:
     return ControllerInfo(name, "some/Type", tuple(InterfaceResources(f"hardware_interface/{kind}JointInterface",
-                                                                      frozenset(names))
+                                                                      tuple(names))
                                                    for kind, names in claims.items()))
 
 
@@ -90,7 +90,7 @@ def test_one_joint_may_be_in_different_interfaces_of_two_parts() -> None:
     robot_hw = two(one, other)
     assert robot_hw.get(PositionJointInterface).get_handle("j") is one.get(PositionJointInterface).get_handle("j")
     assert robot_hw.get(VelocityJointInterface).get_handle("j") is other.get(VelocityJointInterface).get_handle("j")
-    assert robot_hw.check_for_conflict([info("p", Position=["j"]), info("v", Velocity=["j"])]) == ""
+    assert robot_hw.check_for_conflict([info("p", Position=["j"])]) == ""
 
 
 def test_a_joint_measured_by_two_parts_is_that_of_the_later_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
@@ -140,7 +140,19 @@ def test_a_switch_is_done_when_every_part_is(caplog: pytest.LogCaptureFixture) -
 def test_a_conflict_names_the_part() -> None:
     robot_hw = combined()
     text = robot_hw.check_for_conflict([info("one", Position=["finger"]), info("other", Position=["finger"])])
-    assert text == "gripper: joint 'finger' is claimed by 'one' and by 'other'"
+    assert text.startswith("gripper: joint 'finger' is claimed by 'one' and by 'other'; stop one of them")
+
+
+def test_two_controllers_may_not_command_one_joint_through_two_parts() -> None:
+    robot_hw = two(Recorder(PositionJointInterface, ["j", "k"]), Recorder(VelocityJointInterface, ["j"]))
+    by_position, by_velocity = info("p", Position=["k", "j"]), info("v", Velocity=["j"])
+    for controllers in ([by_position, by_velocity], [by_velocity, by_position]):
+        text = robot_hw.check_for_conflict(controllers)
+        assert "joint 'j' is claimed by" in text and "'p'" in text and "'v'" in text and "'k'" not in text
+    assert robot_hw.check_for_conflict([info("p", Position=["k"]), by_velocity]) == ""
+    assert "joint 'j' is claimed by 'both' through hardware_interface/PositionJointInterface and through " \
+           "hardware_interface/VelocityJointInterface" in robot_hw.check_for_conflict(
+               [info("both", Position=["j"], Velocity=["j"])])
 
 
 @pytest.mark.parametrize(("parameters", "words"), [

@@ -11,10 +11,16 @@ import pytest
 
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.hardware_interface import ControllerInfo, PositionJointInterface
+from modular_framework_control.hardware_interface import (
+    ControllerInfo,
+    JointHandle,
+    JointStateHandle,
+    PositionJointInterface,
+    VelocityJointInterface,
+)
 from modular_framework_control.mock_robot_hw import MockRobotHW
 from modular_framework_control.node_handle import NodeHandle, read_names
-from modular_framework_control.robot_hw import SwitchState
+from modular_framework_control.robot_hw import RobotHW, SwitchState
 
 BEST_EFFORT, STRICT = 1, 2
 JOINTS = {"left": "a", "right": "b", "both": ["a", "b"], "left_too": "a"}
@@ -46,6 +52,12 @@ class Recorder(Controller):
         self.calls.append(call)
         if call == self.raises_in:
             raise RuntimeError("broken on purpose")
+
+    def waiting(self, time_s: float) -> None:
+        self._note("waiting")
+
+    def aborting(self, time_s: float) -> None:
+        self._note("aborting")
 
     def starting(self, time_s: float) -> None:
         self._note("starting")
@@ -228,10 +240,62 @@ def test_reloading_needs_force_while_controllers_are_loaded(loop: Any) -> None:
     assert loop.states() == {}
 
 
+class TwoInterfaces(Recorder):
+    """Claims joints of a second interface besides its own, and first."""
+
+    interface_class = VelocityJointInterface
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        for name in controller_nh.get_param("position_joints"):
+            self.robot_hw.get(PositionJointInterface).get_handle(name)
+        for name in controller_nh.get_param("velocity_joints"):
+            hw.get_handle(name)
+        return True
+
+
+class TwoInterfaceHardware(RobotHW):
+    """Joints that take positions or velocities."""
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        for interface in (PositionJointInterface(), VelocityJointInterface()):
+            for name in ("a", "b", "c"):
+                interface.register_handle(JointHandle(JointStateHandle(name)))
+            self.register_interface(interface)
+        return True
+
+
+@pytest.fixture
+def two_interfaces(make_loop: Callable[..., Any]) -> Any:
+    known = types()
+    known.register("test/TwoInterfaces", TwoInterfaces)
+    made = make_loop({
+        "apart": {"type": "test/TwoInterfaces", "position_joints": ["c"], "velocity_joints": ["b", "a"]},
+        "at_once": {"type": "test/TwoInterfaces", "position_joints": ["a"], "velocity_joints": ["b", "a"]},
+    }, robot_hw=TwoInterfaceHardware(), types=known)
+    for name in ("apart", "at_once"):
+        made.manager.load_controller(name)
+    return made
+
+
+def test_claims_are_listed_in_the_order_of_the_controller(two_interfaces: Any) -> None:
+    claims = two_interfaces.manager.list_controllers()[0].info.claimed_resources
+    assert [(claim.hardware_interface, claim.resources) for claim in claims] == [
+        ("hardware_interface/VelocityJointInterface", ("b", "a")),
+        ("hardware_interface/PositionJointInterface", ("c",))]
+
+
+def test_a_controller_that_claims_a_joint_through_two_interfaces_is_not_started(two_interfaces: Any) -> None:
+    raised = two_interfaces.switch(["at_once"], [], STRICT)
+    assert "joint 'a' is claimed by 'at_once' through hardware_interface/VelocityJointInterface and through " \
+           "hardware_interface/PositionJointInterface" in str(raised)
+    assert two_interfaces.switch(["apart"], [], STRICT) is None
+    assert two_interfaces.states() == {"apart": "running", "at_once": "initialized"}
+
+
 def test_types_and_claims_are_listed(loop: Any) -> None:
     assert ("test/Recorder", "controller_interface::ControllerBase") in loop.manager.list_controller_types()
     info = {report.info.name: report.info for report in loop.manager.list_controllers()}["both"]
-    assert info.claimed_resources[0].resources == {"a", "b"}
+    assert info.claimed_resources[0].resources == ("a", "b")
     assert info.claimed_resources[0].hardware_interface == "hardware_interface/PositionJointInterface"
 
 
@@ -294,6 +358,32 @@ def test_hardware_that_takes_too_long_or_refuses_fails_the_switch(slow: Any) -> 
     slow.robot_hw.accepts = False
     assert "refused to prepare" in str(slow.switch(["left"], []))
     assert slow.states()["left"] == "aborted"
+
+
+def test_a_controller_hears_each_cycle_that_it_waits_and_once_that_it_is_aborted(slow: Any) -> None:
+    calls = slow.controllers["left"].calls
+    assert slow.switch(["left"], [], STRICT, True) is None
+    assert calls[:2] == ["waiting", "starting"]
+    assert slow.switch([], ["left"]) is None
+    calls.clear()
+    slow.robot_hw.asks.update(left=10**6)
+    assert "not ready within 0.1 s" in str(slow.switch(["left"], [], STRICT, True, 0.1))
+    assert set(calls[:-1]) == {"waiting"} and calls[-1] == "aborting"
+    calls.clear()
+    slow.robot_hw.asks.update(left=0)
+    slow.robot_hw.result = SwitchState.ERROR
+    assert "hardware refused to switch for 'left'" in str(slow.switch(["left"], [], STRICT, True))
+    assert calls == ["aborting"] and slow.states()["left"] == "aborted"
+
+
+@pytest.mark.parametrize(("raises_in", "state"), [("waiting", "stopped"), ("aborting", "aborted")])
+def test_a_controller_that_raises_while_it_waits_or_is_aborted_holds_nobody_up(slow: Any, raises_in: str,
+                                                                               state: str) -> None:
+    slow.controllers["left"].raises_in = raises_in
+    slow.robot_hw.asks.update(left=10**6, right=0)
+    assert slow.switch(["left", "right"], [], STRICT, True, 0.1) is not None
+    assert slow.states() == {"left": state, "right": "running"}
+    assert f"{raises_in}() raised RuntimeError" in slow.manager.list_controllers()[0].failure
 
 
 def test_hardware_that_raises_in_a_switch_leaves_nothing_waiting(slow: Any) -> None:

@@ -142,7 +142,8 @@ def test_a_joint_comes_to_rest_after_its_controller_stopped(make_loop: Callable[
                                                             controller: str, wanted: float) -> None:
     values = {"has_acceleration_limits": True, "max_acceleration": 2.0, "has_velocity_limits": True,
               "max_velocity": 1.0, "has_effort_limits": True, "max_effort": 5.0}
-    soft = {"soft_lower_limit": -9.0, "soft_upper_limit": 9.0, "k_position": 10.0, "k_velocity": 10.0}
+    soft = {"has_soft_limits": True, "soft_lower_limit": -9.0, "soft_upper_limit": 9.0, "k_position": 10.0,
+            "k_velocity": 10.0}
     loop = make_loop({"joint_limits": {"j": {**values, **(soft if "Effort" in interface else {})}},
                       "hw": {"joints": ["j"], "command_interface": interface}, "c": {"type": controller, "joint": "j"}})
     loop.spawn("c")
@@ -182,7 +183,8 @@ def test_soft_limits_are_read_from_the_description_and_replaced_as_a_whole_by_pa
     known = soft_limits_from_urdf(URDF)
     assert known["j"] == SOFT
     assert (known["wheel"].min_position, known["wheel"].max_position) == (-math.inf, math.inf)
-    values = {"soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 1.0, "k_velocity": 2.0}
+    values = {"has_soft_limits": True, "soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 1.0,
+              "k_velocity": 2.0}
     root = MappingNodeHandle({"joint_limits": {"j": values}})
     assert soft_limits_with_parameters("j", SOFT, root) == SoftJointLimits(-0.5, 0.5, 1.0, 2.0)
     assert soft_limits_with_parameters("other", SOFT, root) == SOFT
@@ -197,12 +199,34 @@ def test_a_limit_said_to_be_absent_is_removed() -> None:
     assert limits_with_parameters("j", LIMITS, root) == JointLimits(continuous=True, max_acceleration=3.0)
 
 
+SOFT_VALUES = {"soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 1.0, "k_velocity": 2.0}
+
+
+@pytest.mark.parametrize(("values", "words"), [
+    ({"has_position_limits": True, "max_position": 0.1}, "only max_position are set"),
+    ({"has_position_limits": True}, "of min_position, max_position only none are set"),
+    ({"has_velocity_limits": True}, "of max_velocity only none are set"),
+    ({"min_position": -0.1, "max_position": 0.1}, "min_position, max_position without has_position_limits: true"),
+    ({"has_soft_limits": True, "k_position": 1.0}, "only k_position are set"),
+    (SOFT_VALUES, "k_velocity without has_soft_limits: true"),
+    ({"has_soft_limits": False, **SOFT_VALUES}, ""),
+])
+def test_limits_that_are_not_complete_or_not_in_force_change_nothing(values: dict[str, Any], words: str,
+                                                                     caplog: pytest.LogCaptureFixture) -> None:
+    root = MappingNodeHandle({"joint_limits": {"j": values}})
+    assert limits_with_parameters("j", LIMITS, root) == LIMITS
+    assert soft_limits_with_parameters("j", SOFT, root) == SOFT
+    assert words in caplog.text and bool(words) == ("/joint_limits/j" in caplog.text)
+
+
 @pytest.mark.parametrize(("values", "words"), [
     ({"has_position_limits": True, "min_position": 2.0, "max_position": 1.0}, "must not exceed"),
     ({"has_position_limits": "yes"}, "/joint_limits/j/has_position_limits: got 'yes'"),
     ({"has_velocity_limits": True, "max_velocity": -1.0}, "/joint_limits/j/max_velocity: got -1.0"),
-    ({"k_position": 1.0}, "only k_position are set"),
-    ({"soft_lower_limit": 1.0, "soft_upper_limit": 1.0, "k_position": 1.0, "k_velocity": 1.0}, "must be below"),
+    ({"has_soft_limits": True, "soft_lower_limit": 1.0, "soft_upper_limit": 1.0, "k_position": 1.0, "k_velocity": 1.0},
+     "must be below"),
+    ({"has_soft_limits": True, "soft_lower_limit": 0.0, "soft_upper_limit": 1.0, "k_position": -1.0, "k_velocity": 1.0},
+     "neither may be negative"),
 ])
 def test_limits_that_make_no_sense_refuse_the_hardware(values: dict[str, Any], words: str,
                                                        caplog: pytest.LogCaptureFixture) -> None:

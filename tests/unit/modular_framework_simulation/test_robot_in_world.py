@@ -174,7 +174,7 @@ def test_an_effort_joint_accelerates_as_newton_says(world: PhysicsWorld, convex_
 
 def test_a_starting_controller_takes_a_joint_over_without_a_jump(lifter: Lifter) -> None:
     lifter.run(0.2)
-    claim = InterfaceResources(PositionJointInterface.type_name, frozenset({"lift"}))
+    claim = InterfaceResources(PositionJointInterface.type_name, ("lift",))
     lifter.commands["lift"].command = 0.4
     lifter.hardware.do_switch([ControllerInfo("c", "t", (claim,))], [])
     assert lifter.commands["lift"].command == pytest.approx(0.1, abs=1e-3)

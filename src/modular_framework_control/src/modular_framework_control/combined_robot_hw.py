@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -38,10 +39,10 @@ class HardwarePart:
         """The controllers that claim something of this hardware, with those claims only."""
         kept: list[ControllerInfo] = []
         for controller in controllers:
-            claims = [(claim.hardware_interface, claim.resources & self.resources.get(claim.hardware_interface,
-                                                                                      frozenset()))
+            claims = [InterfaceResources(claim.hardware_interface, tuple(
+                          name for name in claim.resources if name in self.resources.get(claim.hardware_interface, ())))
                       for claim in controller.claimed_resources]
-            mine = tuple(InterfaceResources(interface, names) for interface, names in claims if names)
+            mine = tuple(claim for claim in claims if claim.resources)
             if mine:
                 kept.append(ControllerInfo(controller.name, controller.type, mine))
         return kept
@@ -55,7 +56,8 @@ class CombinedRobotHW(RobotHW):
 
     The interfaces of all parts are combined class by class. A joint may be in different interfaces of different parts;
     two parts may not command it through the same interface. When two parts measure it, the later one in the list is
-    the one whose state is seen, and a warning says so. Each part decides about the claims on its own joints only.
+    the one whose state is seen, and a warning says so. Each part decides about the claims on its own joints only; of a
+    joint that several parts command, one controller may claim one interface.
 
     Args:
         make: makes hardware of a type name; looks among the plugins of the workspace when not given.
@@ -161,7 +163,16 @@ class CombinedRobotHW(RobotHW):
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         everything = list(controllers)
         answers = ((part.name, part.hardware.check_for_conflict(part.concerned(everything))) for part in self._parts)
-        return "; ".join(f"{name}: {answer}" for name, answer in answers if answer)
+        within = "; ".join(f"{name}: {answer}" for name, answer in answers if answer)
+        return within or super().check_for_conflict(self._claims_on_shared_joints(everything))
+
+    def _claims_on_shared_joints(self, controllers: Iterable[ControllerInfo]) -> Iterator[ControllerInfo]:
+        """The controllers with their claims on joints that several parts command, which no part sees as a whole."""
+        commanded = Counter(name for part in self._parts for name in part.hardware.commanded_joints)
+        for controller in controllers:
+            yield ControllerInfo(controller.name, controller.type, tuple(
+                InterfaceResources(claim.hardware_interface, tuple(n for n in claim.resources if commanded[n] > 1))
+                for claim in controller.claimed_resources))
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
         for part, mine in self._concerned_by(start, stop):

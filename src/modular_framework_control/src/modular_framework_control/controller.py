@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What every controller is: a class made without arguments that is initialised, started, updated and stopped.
 
-`init` runs on a thread that may wait; `starting`, `update`, `stopping` and `failed` run in the control loop and must
-not block. The loop calls them from either of two threads, one at a time; what is started there inherits the processor
-and the priority of the loop, so start threads and processes in `init`. All time a controller knows is the time it is
-given there, so that it behaves alike under simulated and real time.
+`init` runs on a thread that may wait; `waiting`, `starting`, `update`, `stopping`, `aborting` and `failed` run in the
+control loop and must not block. The loop calls them from either of two threads, one at a time; what is started there
+inherits the processor and the priority of the loop, so start threads and processes in `init`. All time a controller
+knows is the time it is given there, so that it behaves alike under simulated and real time.
 """
 from __future__ import annotations
 
@@ -44,6 +44,12 @@ class Controller:
         """
         del hw, root_nh, controller_nh
         return True
+
+    def waiting(self, time_s: float) -> None:
+        """Called in every cycle in which the hardware is not ready yet for this controller, which is to start."""
+
+    def aborting(self, time_s: float) -> None:
+        """Called once in place of `starting` when the hardware refused the switch or took longer than allowed."""
 
     def starting(self, time_s: float) -> None:
         """Called once before the first update after a start."""

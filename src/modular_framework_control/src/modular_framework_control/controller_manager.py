@@ -139,7 +139,7 @@ class ControllerManager:
             except Exception as error:
                 LOGGER.exception("switch_controller: the hardware raised")
                 request.errors.append(f"hardware raised {type(error).__name__}: {error}")
-                request.give_up()
+                request.give_up(time_s)
                 finished = True
             if finished:
                 self._pending = None
@@ -187,9 +187,9 @@ class ControllerManager:
                 raise ControllerError("init() returned False")
         except Exception as error:  # a user's controller may raise anything
             raise ControllerError(f"cannot load controller '{name}': {error}") from error
-        taken = [(interface, interface.take_claims()) for interface in self._robot_hw.interfaces]
-        return tuple(InterfaceResources(interface.type_name, claims) for interface, claims in taken
-                     if claims or interface is main)
+        others = [interface for interface in self._robot_hw.interfaces if interface is not main]
+        claims = [InterfaceResources(interface.type_name, interface.take_claims()) for interface in (main, *others)]
+        return tuple(claim for claim in claims if claim.resources or claim is claims[0])
 
     def unload_controller(self, name: str) -> None:
         """Forget a controller that is not running.
@@ -241,7 +241,7 @@ class ControllerManager:
             raise ControllerError("cannot switch controllers: check_for_conflict() or prepare_switch() of the hardware "
                                   f"raised {type(error).__name__}: {error}") from error
         if conflict:
-            raise ControllerError(f"cannot switch controllers: {conflict}; stop one of them in the same request")
+            raise ControllerError(f"cannot switch controllers: {conflict}")
         if not prepared:
             raise ControllerError("cannot switch controllers: the hardware refused to prepare for it")
 
@@ -258,7 +258,7 @@ class ControllerManager:
                 return
         with self._slot_lock:
             self._pending = None
-            request.give_up()
+            request.give_up(self._last_time_s)
         if not request.done.is_set():
             raise ControllerError(f"the control loop did not carry out the switch: it made no cycle for "
                                   f"{self._update_wait_s:.1f} s; is it running, or paused?")
@@ -298,7 +298,7 @@ class ControllerManager:
             request, self._pending = self._pending, None
             if request is not None:
                 request.errors.append("the switch was not carried out: the control loop has ended")
-                request.give_up()
+                request.give_up(self._last_time_s)
                 request.done.set()
         for entry in self._loaded:
             if entry.running:

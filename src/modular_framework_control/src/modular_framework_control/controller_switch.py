@@ -92,6 +92,24 @@ class LoadedController:
         self.state = ControllerState.RUNNING
         return ""
 
+    def wait(self, time_s: float) -> str:
+        """One cycle of waiting for the hardware; returns why it cannot go on waiting, or ""."""
+        self.state = ControllerState.WAITING
+        try:
+            self.controller.waiting(time_s)
+        except Exception as error:  # a user's controller may raise anything; the loop must go on
+            return self.fail(time_s, f"waiting() raised {type(error).__name__}: {error}")
+        return ""
+
+    def abort(self, time_s: float) -> None:
+        """Start it no more; a failure while aborting is reported and leaves it aborted."""
+        self.state = ControllerState.ABORTED
+        try:
+            self.controller.aborting(time_s)
+        except Exception as error:
+            self.failure = f"aborting() raised {type(error).__name__}: {error}"
+            LOGGER.exception("controller '%s': %s", self.name, self.failure)
+
     def stop(self, time_s: float) -> None:
         """Stop it; a failure while stopping is reported and leaves it stopped."""
         self.state = ControllerState.STOPPED
@@ -229,14 +247,13 @@ class SwitchRequest:
         if self._waiting and 0.0 < self.timeout_s < time_s - begun_s:
             names = ", ".join(entry.name for entry in self._waiting)
             self.errors.append(f"hardware was not ready within {self.timeout_s} s to start: {names}")
-            self.give_up()
+            self.give_up(time_s)
         return not self._waiting
 
-    def give_up(self) -> None:
+    def give_up(self, time_s: float) -> None:
         """Start no more of the controllers that still wait."""
-        for entry in self._waiting:
-            entry.state = ControllerState.ABORTED
-        self._waiting.clear()
+        while self._waiting:
+            self._waiting.pop(0).abort(time_s)
 
     def _begin(self, robot_hw: RobotHW, time_s: float) -> None:
         self._begun_s = time_s
@@ -245,18 +262,22 @@ class SwitchRequest:
             if entry.running:
                 entry.stop(time_s)
         self._waiting = list(self.plan.start)
-        for entry in self._waiting:
-            entry.state = ControllerState.WAITING
 
     def _advance(self, entries: list[LoadedController], result: SwitchState, time_s: float) -> None:
-        if result is SwitchState.ONGOING:
-            return
         for entry in entries:
+            failure = ""
+            match result:
+                case SwitchState.ONGOING:
+                    failure = entry.wait(time_s)
+                    if not failure:
+                        continue
+                case SwitchState.ERROR:
+                    entry.abort(time_s)
+                    self.errors.append(f"hardware refused to switch for '{entry.name}'")
+                case SwitchState.DONE:
+                    failure = entry.start(time_s)
+                case _:
+                    raise ValueError(f"switch_result() answered {result!r}; expected a SwitchState")
             self._waiting.remove(entry)
-            if result is SwitchState.ERROR:
-                entry.state = ControllerState.ABORTED
-                self.errors.append(f"hardware refused to switch for '{entry.name}'")
-                continue
-            failure = entry.start(time_s)
             if failure:
                 self.errors.append(f"'{entry.name}' did not start: {failure}")

@@ -98,7 +98,7 @@ def joint_state_to_msg(snapshot: JointStateSnapshot, ahead_s: float = 0.0) -> Jo
 
 def controller_report_to_msg(report: ControllerReport) -> ControllerState:
     """One line of list_controllers; interfaces have the names of C++ there."""
-    claims = [HardwareInterfaceResources(claim.hardware_interface.replace("/", "::"), sorted(claim.resources))
+    claims = [HardwareInterfaceResources(claim.hardware_interface.replace("/", "::"), list(claim.resources))
               for claim in report.info.claimed_resources]
     return ControllerState(report.info.name, report.state.value, report.info.type, claims)
 

@@ -51,7 +51,7 @@ class HardwareInterface(Generic[HandleT]):
 
     def __init__(self) -> None:
         self._handles: dict[str, HandleT] = {}
-        self._claims: set[str] = set()
+        self._claims: dict[str, None] = {}
 
     def register_handle(self, handle: HandleT) -> HandleT:
         """Add a handle; returns it for chaining.
@@ -77,7 +77,7 @@ class HardwareInterface(Generic[HandleT]):
             known = ", ".join(sorted(self._handles)) or "none"
             raise HardwareInterfaceError(f"{self.type_name}: no {self.noun} '{name}'; it has: {known}") from None
         if self.claims_resources:
-            self._claims.add(name)
+            self._claims[name] = None
         return handle
 
     @property
@@ -90,9 +90,9 @@ class HardwareInterface(Generic[HandleT]):
         """All handles in the order of registration; reading them claims nothing (for the RobotHW itself)."""
         return list(self._handles.values())
 
-    def take_claims(self) -> frozenset[str]:
-        """Joints claimed since the last call; forgets them."""
-        claims = frozenset(self._claims)
+    def take_claims(self) -> tuple[str, ...]:
+        """Joints claimed since the last call, in the order they were asked for; forgets them."""
+        claims = tuple(self._claims)
         self._claims.clear()
         return claims
 
@@ -192,10 +192,10 @@ def interface_from_name(type_name: str) -> type[AnyInterface]:
 
 @dataclass(frozen=True, slots=True)
 class InterfaceResources:
-    """The joints a controller claims of one interface."""
+    """The joints a controller claims of one interface, in the order in which it asked for them."""
 
     hardware_interface: str
-    resources: frozenset[str]
+    resources: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,17 +3,22 @@
 
 The names are those of ros_control: `has_position_limits`, `min_position`, `max_position`, `angle_wraparound`,
 `has_velocity_limits`, `max_velocity`, `has_acceleration_limits`, `max_acceleration`, `has_effort_limits`, `max_effort`,
-and for soft limits `soft_lower_limit`, `soft_upper_limit`, `k_position`, `k_velocity` (all four, or none).
+and for soft limits `has_soft_limits`, `soft_lower_limit`, `soft_upper_limit`, `k_position`, `k_velocity`. As in
+ros_control, a value without its `has_...: true` is not in force, and a group that is not complete changes nothing;
+since limits are there for safety, the log says so.
 """
 from __future__ import annotations
 
+import logging
 import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+from modular_framework_control.node_handle import NodeHandle, ParameterError, read_bool, read_number
 
+LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
+SOFT_LIMIT_KEYS = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +78,7 @@ def soft_limits_from_urdf(robot_description: str) -> dict[str, SoftJointLimits]:
     for name, joint in _movable_joints(robot_description).items():
         element = joint.find("safety_controller")
         if element is not None:
-            keys = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
-            values = [_number(name, element, key, "0") for key in keys]
+            values = [_number(name, element, key, "0") for key in SOFT_LIMIT_KEYS]
             if joint.get("type") == "continuous" or values[0] >= values[1]:
                 values[:2] = -INFINITY, INFINITY
             found[name] = SoftJointLimits(*values)
@@ -118,11 +122,10 @@ def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) 
         ParameterError: a value of the wrong type, or a range that ends before it begins.
     """
     handle = root_nh.child(f"joint_limits/{name}")
-    bounded = _said(handle, "has_position_limits")
-    if bounded:
-        limits = replace(limits, min_position=_bound(handle, "min_position", limits.min_position, None),
-                         max_position=_bound(handle, "max_position", limits.max_position, None))
-    elif bounded is False:
+    bounds = _complete(handle, "has_position_limits", ("min_position", "max_position"))
+    if bounds is not None:
+        limits = replace(limits, min_position=bounds[0], max_position=bounds[1])
+    elif _given(handle, "has_position_limits") is False:
         continuous = read_bool(handle, "angle_wraparound", limits.continuous)
         limits = replace(limits, min_position=-INFINITY, max_position=INFINITY, continuous=continuous)
     if limits.min_position > limits.max_position:
@@ -133,38 +136,47 @@ def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) 
                    max_effort=_largest(handle, "effort", limits.max_effort))
 
 
-def _said(handle: NodeHandle, key: str) -> bool | None:
+def _given(handle: NodeHandle, key: str) -> bool | None:
     return read_bool(handle, key, False) if handle.has_param(key) else None
 
 
-def _bound(handle: NodeHandle, key: str, known: float, minimum: float | None = 0.0) -> float:
-    return read_number(handle, key, 0.0, minimum) if handle.has_param(key) else known
+def _complete(handle: NodeHandle, has: str, keys: tuple[str, ...], minimum: float | None = None) -> list[float] | None:
+    """The numbers of `keys`, if `has` is true and all of them are set; None, and a warning, when only some are."""
+    present = [key for key in keys if handle.has_param(key)]
+    if _given(handle, has):
+        if len(present) == len(keys):
+            return [read_number(handle, key, 0.0, minimum) for key in keys]
+        LOGGER.warning("parameters %s: %s is true, but of %s only %s are set; they are ignored, set all of them",
+                       handle.namespace, has, ", ".join(keys), ", ".join(present) or "none")
+    elif present and not handle.has_param(has):
+        LOGGER.warning("parameters %s: %s without %s: true; they are ignored, set it", handle.namespace,
+                       ", ".join(present), has)
+    return None
 
 
 def _largest(handle: NodeHandle, what: str, known: float) -> float:
-    limited = _said(handle, f"has_{what}_limits")
-    if limited is None:
-        return known
-    return _bound(handle, f"max_{what}", known) if limited else INFINITY
+    largest = _complete(handle, f"has_{what}_limits", (f"max_{what}",), 0.0)
+    if largest is not None:
+        return largest[0]
+    return INFINITY if _given(handle, f"has_{what}_limits") is False else known
 
 
 def soft_limits_with_parameters(name: str, limits: SoftJointLimits | None,
                                 root_nh: NodeHandle) -> SoftJointLimits | None:
-    """`limits`, or what `joint_limits/<name>/` says instead; None when neither is there.
+    """`limits`, or what `joint_limits/<name>/` puts in their place; None when neither is there.
 
     Raises:
-        ParameterError: only some of the four values are there, one is not a number, or the range is none.
+        ParameterError: a value is not a number, or the range is none.
     """
     handle = root_nh.child(f"joint_limits/{name}")
-    keys = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
-    given = [key for key in keys if handle.has_param(key)]
-    if not given:
+    values = _complete(handle, "has_soft_limits", SOFT_LIMIT_KEYS)
+    if values is None:
         return limits
-    if len(given) < len(keys):
-        raise ParameterError(f"parameters {join_names(handle.namespace, '')}: of the soft limits only "
-                             f"{', '.join(given)} are set; set all of {', '.join(keys)}, or none")
-    lower, upper = (read_number(handle, key, 0.0, None) for key in keys[:2])
+    lower, upper, k_position, k_velocity = values
     if lower >= upper:
         raise ParameterError(f"parameters {handle.namespace}: soft limits from {lower} to {upper}; soft_lower_limit "
                              "must be below soft_upper_limit")
-    return SoftJointLimits(lower, upper, *(read_number(handle, key, 0.0) for key in keys[2:]))
+    if min(k_position, k_velocity) < 0.0:
+        raise ParameterError(f"parameters {handle.namespace}: k_position is {k_position} and k_velocity {k_velocity}; "
+                             "neither may be negative")
+    return SoftJointLimits(lower, upper, k_position, k_velocity)

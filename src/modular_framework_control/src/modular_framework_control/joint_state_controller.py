@@ -2,15 +2,19 @@
 """Reports the measured state of all joints at a fixed rate."""
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from modular_framework_control.controller import Controller
 from modular_framework_control.hardware_interface import JointStateHandle, JointStateInterface
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
-from modular_framework_control.rates import next_due, period_of
+from modular_framework_control.node_handle import NodeHandle, join_names, read_names, read_number
+from modular_framework_control.rates import first_due, next_due, period_of
+
+LOGGER = logging.getLogger("rosout.joint_state_controller")
+STATE_KEYS = ("position", "velocity", "effort")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +39,10 @@ class JointStateSnapshot:
 class JointStateController(Controller):
     """joint_state_controller/JointStateController.
 
-    Parameters, below the controller's name: `publish_rate` [1/s] 50; `joints`: which ones, in which order, all of them
-    by name when not given; `extra_joints`: list of {name, position, velocity, effort} reported as constants unless the
-    hardware has a joint of that name.
+    Parameters, below the controller's name: `publish_rate` [1/s] 50, with 0 nothing is published; `joints`: which ones,
+    in which order, all of them by name when not given; `extra_joints`: list of {name, position, velocity, effort}
+    reported as constants unless the hardware has a joint of that name. As in ros_controllers an entry that makes no
+    sense is skipped with an error on the log.
 
     Attributes:
         on_state: called in the control loop at `publish_rate`; must not block.
@@ -60,7 +65,7 @@ class JointStateController(Controller):
         return True
 
     def starting(self, time_s: float) -> None:
-        self._next_s = time_s
+        self._next_s = first_due(self._period_s, time_s)
 
     def update(self, time_s: float, period_s: float) -> None:
         if time_s < self._next_s or self.on_state is None:
@@ -75,18 +80,26 @@ def _extra_joints(controller_nh: NodeHandle) -> list[JointStateHandle]:
     entries = controller_nh.get_param("extra_joints", [])
     where = join_names(controller_nh.namespace, "extra_joints")
     if not isinstance(entries, list):
-        raise ParameterError(f"parameter {where}: got {entries!r}; expected a list of mappings with name, position, "
-                             "velocity, effort")
+        LOGGER.error("parameter %s is ignored: got %r; expected a list of mappings with name, %s", where, entries,
+                     ", ".join(STATE_KEYS))
+        return []
     joints: dict[str, JointStateHandle] = {}
     for number, entry in enumerate(entries):
-        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
-            raise ParameterError(f"parameter {where}: entry {number} is {entry!r}; expected a mapping with a name")
-        name = entry["name"]
-        if name in joints:
-            raise ParameterError(f"parameter {where}: entry {number} names joint '{name}' again; name each joint once")
-        values = [entry.get(key, 0.0) for key in ("position", "velocity", "effort")]
-        if any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values):
-            raise ParameterError(f"parameter {where}: entry {number} ('{name}'): position, velocity, effort are "
-                                 f"{values}; expected finite numbers")
-        joints[name] = JointStateHandle(name, *map(float, values))
+        fault = _fault_of_extra_joint(entry, joints)
+        if fault:
+            LOGGER.error("parameter %s: entry %d is skipped: %s", where, number, fault)
+        else:
+            name = entry["name"]
+            joints[name] = JointStateHandle(name, *(float(entry.get(key, 0.0)) for key in STATE_KEYS))
     return list(joints.values())
+
+
+def _fault_of_extra_joint(entry: Any, joints: Mapping[str, Any]) -> str:
+    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
+        return f"it is {entry!r}; expected a mapping with a name"
+    if entry["name"] in joints:
+        return f"it names joint '{entry['name']}' again; name each joint once"
+    values = [entry.get(key, 0.0) for key in STATE_KEYS]
+    if any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values):
+        return f"{', '.join(STATE_KEYS)} of joint '{entry['name']}' are {values}; expected finite numbers"
+    return ""

@@ -8,6 +8,11 @@ def period_of(rate: float) -> float:
     return 1.0 / rate if rate > 0.0 else math.inf
 
 
+def first_due(period_s: float, time_s: float) -> float:
+    """When something with this period is due first after a start at `time_s` [s]: at once, or never."""
+    return time_s if period_s < math.inf else math.inf
+
+
 def next_due(due_s: float, period_s: float, time_s: float) -> float:
     """When something with this period is due after it was done at `time_s` [s]; missed turns are not made up for."""
     following_s = due_s + period_s

@@ -144,18 +144,22 @@ class RobotHW:
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         """Why these controllers may not run together; "" when they may.
 
-        The rule of the base class: a joint may be claimed by one controller only, whatever the interface. Hardware that
+        The rule of the base class: a joint may be claimed once, by one controller through one interface. Hardware that
         knows better overrides this.
         """
-        owners: dict[str, str] = {}
-        conflicts: list[str] = []
+        owners: dict[str, tuple[str, str]] = {}
+        conflicts: dict[str, None] = {}
         for controller in controllers:
-            joints = {joint for claim in controller.claimed_resources for joint in claim.resources}
-            for joint in sorted(joints):
-                if joint in owners:
-                    conflicts.append(f"joint '{joint}' is claimed by '{owners[joint]}' and by '{controller.name}'")
-                else:
-                    owners[joint] = controller.name
+            for claim in controller.claimed_resources:
+                for joint in claim.resources:
+                    owner, interface = owners.setdefault(joint, (controller.name, claim.hardware_interface))
+                    if owner != controller.name:
+                        conflicts[f"joint '{joint}' is claimed by '{owner}' and by '{controller.name}'; stop one of "
+                                  "them in the same request"] = None
+                    elif interface != claim.hardware_interface:
+                        conflicts[f"joint '{joint}' is claimed by '{owner}' through {interface} and through "
+                                  f"{claim.hardware_interface}; a controller may claim a joint through one interface "
+                                  "only, change its parameters"] = None
         return "; ".join(conflicts)
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:

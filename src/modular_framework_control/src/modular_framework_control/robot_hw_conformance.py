@@ -228,7 +228,7 @@ class RobotHWConformance(ABC):
     def test_two_controllers_may_not_claim_one_joint(self) -> None:
         robot_hw, handles = self._ready()
         name = handles[0].name
-        claim = (InterfaceResources(PositionJointInterface.type_name, frozenset({name})),)
+        claim = (InterfaceResources(PositionJointInterface.type_name, (name,)),)
         one, other = ControllerInfo("one", "some/Type", claim), ControllerInfo("other", "some/Type", claim)
         assert robot_hw.check_for_conflict([one]) == ""
         assert name in robot_hw.check_for_conflict([one, other])
@@ -237,7 +237,7 @@ class RobotHWConformance(ABC):
     def test_switches_are_done_and_leave_it_where_it_is(self) -> None:
         robot_hw, handles = self._ready()
         before = {handle.name: handle.position for handle in handles}
-        claim = (InterfaceResources(PositionJointInterface.type_name, frozenset(before)),)
+        claim = (InterfaceResources(PositionJointInterface.type_name, tuple(before)),)
         info = ControllerInfo("one", "some/Type", claim)
         for start, stop in (([info], []), ([], [info])):
             assert robot_hw.prepare_switch(start, stop) is True

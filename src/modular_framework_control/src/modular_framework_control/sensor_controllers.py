@@ -14,13 +14,13 @@ from modular_framework_control.hardware_interface import (
     SpeedScalingInterface,
 )
 from modular_framework_control.node_handle import NodeHandle, read_number
-from modular_framework_control.rates import next_due, period_of
+from modular_framework_control.rates import first_due, next_due, period_of
 
 
 class SensorController(Controller):
     """Base: every sensor of one kind is reported at a fixed rate.
 
-    Parameters, below the controller's name: `publish_rate` [1/s] 50.
+    Parameters, below the controller's name: `publish_rate` [1/s] 50; with 0 nothing is published.
 
     Attributes:
         sensor_names: the sensors, in the order of the hardware.
@@ -41,7 +41,7 @@ class SensorController(Controller):
         return True
 
     def starting(self, time_s: float) -> None:
-        self._next_s = time_s
+        self._next_s = first_due(self._period_s, time_s)
 
     def update(self, time_s: float, period_s: float) -> None:
         if time_s < self._next_s or self.on_reading is None:

@@ -147,7 +147,7 @@ class PyBulletRobotHW(RobotHW):
                 self._drives[name] = Drive(mode, handle.command, 0.0, self._efforts[name])
 
 
-def _claims(controllers: Iterable[ControllerInfo]) -> Iterable[tuple[Mode, frozenset[str]]]:
+def _claims(controllers: Iterable[ControllerInfo]) -> Iterable[tuple[Mode, tuple[str, ...]]]:
     for controller in controllers:
         for claim in controller.claimed_resources:
             if claim.hardware_interface in _MODES:
