@@ -175,7 +175,7 @@ def _rewrite_meshes(
             mesh = shape.find("geometry/mesh")
             if mesh is None:
                 continue
-            path = _mesh_path(link.get("name", ""), mesh.get("filename", ""), find_package)
+            path = mesh_path(link.get("name", ""), mesh.get("filename", ""), find_package)
             if shape.tag == "visual":
                 mesh.set("filename", str(path))
                 continue
@@ -194,7 +194,12 @@ def _give_frames_no_weight(root: ElementTree.Element) -> None:
             ElementTree.SubElement(inertial, "inertia", moments)
 
 
-def _mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:
+def mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:
+    """Returns the file of a mesh of a link.
+
+    Raises:
+        DescriptionError: The URI has another scheme, or leads nowhere.
+    """
     where = f"robot_description: mesh of link '{link}'"
     scheme, separator, rest = uri.partition("://")
     if separator and scheme == "package":

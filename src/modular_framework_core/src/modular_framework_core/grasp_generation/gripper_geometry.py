@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Computes from the robot description how wide a two-finger gripper opens, and where its pads and tips are then."""
+"""Computes from the robot description how wide a two-finger gripper opens, and where its parts are then."""
 from __future__ import annotations
 
-import itertools
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from modular_framework_core.grasp_generation.convex_bodies import (
+    ConvexBody,
+    ShapeError,
+    collision_body,
+    column_fronts,
+)
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200
@@ -16,6 +23,23 @@ SAMPLES = 200
 
 class GripperGeometryError(ValueError):
     """The robot description does not describe a two-finger gripper; the text says what is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandPart:
+    """A convex part of the hand in the grasp frame, at every sampled position of the gripper's joint.
+
+    Attributes:
+        link: Link it belongs to.
+        corners: (n, k, 3) corners [m].
+        planes: (n, m, 4) outward unit normal and offset of each face; inside, normal . point + offset <= 0.
+        is_pad: Whether it is one of the two pads, which are to touch the object.
+    """
+
+    link: str
+    corners: Array
+    planes: Array
+    is_pad: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +54,7 @@ class GripperGeometry:
         tips: (n,) z of the foremost point of the fingers [m].
         pad_half_width: Half the width of a pad along y [m].
         pad_half_height: Half the height of a pad along z [m].
-        palm: z of the foremost point of the palm and of the open hand's knuckles; an object must end before it [m].
+        parts: Everything an object may run into: the fingers, the link they hang on, and what is fixed to that.
     """
 
     joint: str
@@ -40,7 +64,7 @@ class GripperGeometry:
     tips: Array
     pad_half_width: float
     pad_half_height: float
-    palm: float
+    parts: tuple[HandPart, ...]
 
     @property
     def max_opening(self) -> float:
@@ -67,9 +91,37 @@ class GripperGeometry:
         order = np.argsort(self.openings)
         return float(np.interp(opening, self.openings[order], self.pad_centres[order]))
 
+    def lowest_heights(self, openings: Array, top: Array, margin: float, with_pads: bool, floor: float) -> Array:
+        """Computes how far down the hand can come over an object without touching it.
+
+        A hand that comes down along its approach direction sweeps everything behind its parts too. It is clear of a
+        point of the object exactly if, in the column of that point, the foremost point of each part is behind it.
+
+        Args:
+            openings: (n,) free widths between the pads [m].
+            top: (m, 3) highest points of the object: x along the closing direction and y across, both from the middle
+                of the hand, z upwards [m].
+            margin: Room to keep around each part [m].
+            with_pads: False leaves the pads out, which touch the object in the end.
+            floor: Height below which the hand does not come anyway [m].
+
+        Returns:
+            (n,) least z of the grasp frame [m], at least the floor.
+        """
+        samples = [int(np.argmin(np.abs(self.openings - opening))) for opening in openings]
+        heights = np.full(len(samples), floor)
+        for part in self.parts:
+            if part.is_pad and not with_pads:
+                continue
+            near = top[top[:, 2] > floor - float(part.corners[samples, :, 2].max()) - 2 * margin]
+            if len(near):
+                fronts = column_fronts(part.planes[samples], near[:, :2], margin)
+                heights = np.maximum(heights, (fronts + near[:, 2]).max(axis=1))
+        return heights
+
 
 def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
-    """Moves the gripper's joint through its range and measures the boxes of the last finger links.
+    """Moves the gripper's joint through its range and measures the collision shapes of the hand.
 
     Args:
         urdf: Text of the robot description.
@@ -80,7 +132,7 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
         The gripper's geometry.
 
     Raises:
-        GripperGeometryError: A link or joint is missing, or there are no two fingers with collision boxes.
+        GripperGeometryError: A link or joint is missing, or there are no two fingers with collision shapes.
     """
     model = _Model(urdf)
     element = model.joints.get(joint)
@@ -88,31 +140,57 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     if limit is None or grasp_link not in model.links:
         raise GripperGeometryError(f"the robot description lacks the joint '{joint}' with limits, or the link "
                                    f"'{grasp_link}'; name the gripper's actuated joint and the grasp frame")
-    fingers = model.finger_links(joint)
     positions = np.linspace(float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0)), SAMPLES)
-    measured = [_measure(model, fingers, grasp_link, {joint: float(position)}) for position in positions]
-    openings, centres, tips, half_widths, half_heights = (np.array(column) for column in zip(*measured, strict=True))
-    middle = int(np.argmin(np.abs(openings - openings.max() / 2)))
-    most_open = {joint: float(positions[int(np.argmax(openings))])}
-    palm = model.palm_front(joint, grasp_link, most_open)
-    return GripperGeometry(joint, positions, openings, centres, tips, float(half_widths[middle]),
-                           float(half_heights[middle]), palm)
+    parts = list(_parts(model, grasp_link, joint, positions))
+    fingers = model.finger_links(joint)
+    measured = [_measure(parts, fingers, grasp_link, sample) for sample in range(SAMPLES)]
+    openings = np.array([each.opening for each in measured])
+    middle = measured[int(np.argmin(np.abs(openings - openings.max() / 2)))]
+    marked = tuple(HandPart(part.link, part.corners, part.planes, any(part is pad for pad in middle.pads))
+                   for part in parts)
+    return GripperGeometry(joint, positions, openings, np.array([each.pad_centre for each in measured]),
+                           np.array([each.tip for each in measured]), middle.pad_half_width, middle.pad_half_height,
+                           marked)
 
 
-def _measure(model: _Model, fingers: list[str], grasp_link: str,
-             state: dict[str, float]) -> tuple[float, float, float, float, float]:
-    boxes = [corners for link in fingers for corners in model.boxes_in(link, grasp_link, state)]
-    right = [corners for corners in boxes if corners[:, 0].mean() > 0]
-    left = [corners for corners in boxes if corners[:, 0].mean() <= 0]
+def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
+    """Places the collision shapes of the hand in the grasp frame, at every joint position."""
+    for link in model.hand_links(joint):
+        transforms = np.array([np.linalg.inv(model.pose(grasp_link, {joint: position})) @
+                               model.pose(link, {joint: position}) for position in positions.tolist()])
+        for body in model.bodies_of(link):
+            corners = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.corners) + transforms[:, None, :3, 3]
+            normals = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.planes[:, :3])
+            offsets = body.planes[:, 3] - np.einsum("nki,ni->nk", normals, transforms[:, :3, 3])
+            yield HandPart(link, corners, np.concatenate([normals, offsets[:, :, None]], axis=2))
+
+
+@dataclass(frozen=True, slots=True)
+class _Measure:
+    """The fingers at one joint position: see GripperGeometry."""
+
+    opening: float
+    pad_centre: float
+    tip: float
+    pad_half_width: float
+    pad_half_height: float
+    pads: tuple[HandPart, HandPart]
+
+
+def _measure(parts: list[HandPart], fingers: list[str], grasp_link: str, sample: int) -> _Measure:
+    tips = [part for part in parts if part.link in fingers]
+    right = [part for part in tips if part.corners[sample, :, 0].mean() > 0]
+    left = [part for part in tips if part.corners[sample, :, 0].mean() <= 0]
     if not right or not left:
-        raise GripperGeometryError(f"the last finger links {fingers} have no collision boxes on both sides of "
-                                   f"'{grasp_link}'")
-    right_pad = min(right, key=lambda corners: float(corners[:, 0].min()))
-    left_pad = max(left, key=lambda corners: float(corners[:, 0].max()))
-    opening = max(0.0, float(right_pad[:, 0].min() - left_pad[:, 0].max()))
-    tip = max(float(corners[:, 2].max()) for corners in boxes)
-    low, high = right_pad.min(axis=0), right_pad.max(axis=0)
-    return opening, float(low[2] + high[2]) / 2, tip, float(high[1] - low[1]) / 2, float(high[2] - low[2]) / 2
+        raise GripperGeometryError(f"the last finger links {fingers} have no collision shapes on both sides of "
+                                   f"'{grasp_link}'; give each a collision element")
+    right_pad = min(right, key=lambda part: float(part.corners[sample, :, 0].min()))
+    left_pad = max(left, key=lambda part: float(part.corners[sample, :, 0].max()))
+    pad = right_pad.corners[sample]
+    opening = max(0.0, float(pad[:, 0].min() - left_pad.corners[sample, :, 0].max()))
+    low, high = pad.min(axis=0), pad.max(axis=0)
+    return _Measure(opening, float(low[2] + high[2]) / 2, max(float(part.corners[sample, :, 2].max()) for part in tips),
+                    float(high[1] - low[1]) / 2, float(high[2] - low[2]) / 2, (right_pad, left_pad))
 
 
 class _Model:
@@ -147,26 +225,24 @@ class _Model:
         parents = {_link(self.joints[self.parent_joint[link]], "parent") for link in moving}
         return [link for link in moving if link not in parents]
 
-    def palm_front(self, joint: str, grasp_link: str, state: dict[str, float]) -> float:
-        """Foremost z of the link the fingers hang on and of the links between it and the last ones."""
-        last = self.finger_links(joint)
-        links = [_link(self.joints[joint], "parent"), *(link for link in self.moving_links(joint) if link not in last)]
-        boxes = [corners for link in links for corners in self.boxes_in(link, grasp_link, state)]
-        return max((float(corners[:, 2].max()) for corners in boxes), default=-math.inf)
+    def hand_links(self, joint: str) -> list[str]:
+        """Moving links, the link they hang on, and every link that is fixed to that."""
+        links = {_link(self.joints[joint], "parent"), *self.moving_links(joint)}
+        while True:
+            ends = [{_link(other, "parent"), _link(other, "child")} for other in self.joints.values()
+                    if other.get("type") == "fixed"]
+            more = set().union(*(pair for pair in ends if pair & links)) - links
+            if not more:
+                return [link for link in self.links if link in links]
+            links |= more
 
-    def boxes_in(self, link: str, frame: str, state: dict[str, float]) -> list[Array]:
-        """Corners (8, 3) of the collision boxes of a link, in another link's frame."""
-        transform = np.linalg.inv(self.pose(frame, state)) @ self.pose(link, state)
-        found = []
+    def bodies_of(self, link: str) -> Iterator[ConvexBody]:
+        """Collision shapes of a link in its own frame."""
         for collision in self.links[link].findall("collision"):
-            size = collision.find("geometry/box")
-            if size is None:
-                continue
-            half = np.array([float(value) for value in size.get("size", "0 0 0").split()]) / 2
-            corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
-            local = transform @ _origin(collision.find("origin"))
-            found.append(corners @ local[:3, :3].T + local[:3, 3])
-        return found
+            try:
+                yield collision_body(collision).moved(_origin(collision.find("origin")))
+            except ShapeError as error:
+                raise GripperGeometryError(f"the collision shape of link '{link}' {error}") from error
 
     def pose(self, link: str, state: dict[str, float]) -> Array:
         """Pose (4, 4) of a link in the root link."""

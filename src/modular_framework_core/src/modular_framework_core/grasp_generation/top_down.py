@@ -3,9 +3,10 @@
 
 The hand points straight down. For several closing directions and places along the object, the part of the object
 between the pads is measured: it must fit the opening with room to spare, its sides must face the pads, and the
-fingertips must stay above the support. What remains is ranked by how squarely the sides face the pads, how near the
-grasp is to the centre of mass, how much room there is, how much of the pads touches, and how comfortable the place is
-for the arm.
+fingertips must stay above the support. No other part of the hand may touch the object, neither on the way down nor
+while the pads close: where it would, the hand opens wider or stays higher. What remains is ranked by how squarely the
+sides face the pads, how near the grasp is to the centre of mass, how much room there is, how much of the pads touches,
+and how comfortable the place is for the arm.
 """
 from __future__ import annotations
 
@@ -22,6 +23,12 @@ from modular_framework_core.grasp_generation.surface_points import Surface
 Array = npt.NDArray[np.float64]
 
 CONTACT_DEPTH_M = 0.001
+CLOSING_CLEARANCE_M = 0.002
+"""Room between the object and what is not a pad when the pads touch it: the spacing error of surface points."""
+CLOSING_STEPS, OPENING_STEPS = 5, 8
+HEIGHT_TOLERANCE_M = 0.0005
+HEIGHT_ROUNDS = 4
+COLUMN_M = 0.004
 SAME_DIRECTION_RAD = math.radians(3.0)
 
 
@@ -32,7 +39,7 @@ class TopDownSettings:
     Attributes:
         approach_distance_m: Height of the pregrasp pose over the grasp pose [m].
         lift_distance_m: Height of the postgrasp pose over the grasp pose [m].
-        finger_clearance_m: Room between a pad and the object on each side when the hand comes down [m].
+        finger_clearance_m: Room between the hand and the object on each side when the hand comes down [m].
         tip_clearance_m: Smallest distance of the fingertips from the support [m].
         min_pad_overlap_m: Least height of the pads that must touch [m].
         min_side_alignment: Least cosine between a side's normal and the closing direction.
@@ -92,12 +99,14 @@ def top_down_grasps(surface: Surface, support_z: float, gripper: GripperGeometry
         Usable grasps, best first; empty when the object cannot be grasped from above.
     """
     grasps = []
+    top = _highest_points(surface.points)
     for yaw in _directions(surface, settings.yaw_step_rad):
         closing = np.array([math.cos(yaw), math.sin(yaw)])
         across = np.array([math.sin(yaw), -math.cos(yaw)])
         x, y = surface.points[:, :2] @ closing, surface.points[:, :2] @ across
         facing = surface.normals[:, :2] @ closing
-        flat = _Slice(x, y, surface.points[:, 2], facing)
+        flat = _Slice(x, y, surface.points[:, 2], facing,
+                      np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]]))
         for place in _places(y, float(surface.centroid[:2] @ across), settings.place_step_m):
             grasp = _grasp_at(flat, place, yaw, surface, support_z, gripper, settings)
             if grasp is not None:
@@ -107,12 +116,28 @@ def top_down_grasps(surface: Surface, support_z: float, gripper: GripperGeometry
 
 @dataclass(frozen=True, slots=True)
 class _Slice:
-    """Surface points in the directions of the hand: x closing, y across, z up, and how much each faces along x."""
+    """Surface points in the directions of the hand: x closing, y across, z up, and how much each faces along x.
+
+    Attributes:
+        top: (n, 3) the highest points alone.
+    """
 
     x: Array
     y: Array
     z: Array
     facing: Array
+    top: Array
+
+    def top_around(self, x: float, y: float) -> Array:
+        """Returns the highest points relative to a place in the plane."""
+        return self.top - [x, y, 0.0]
+
+
+def _highest_points(points: Array) -> Array:
+    """Keeps the highest point of each small column: what a hand from above meets first."""
+    order = np.argsort(-points[:, 2])
+    _, first = np.unique(np.floor(points[order, :2] / COLUMN_M).astype(np.int64), axis=0, return_index=True)
+    return points[order[first]]
 
 
 def _directions(surface: Surface, step: float) -> list[float]:
@@ -141,34 +166,101 @@ def _grasp_at(flat: _Slice, place: float, yaw: float, surface: Surface, support_
     between = np.abs(flat.y - place) <= gripper.pad_half_width
     if not between.any():
         return None
-    width_guess = min(float(np.ptp(flat.x[between])), gripper.max_opening)
-    pad_offset = gripper.pad_centre_at(width_guess)
-    top = float(flat.z[np.abs(flat.y - place) <= gripper.pad_half_width + 0.01].max())
-    wanted = min(float(surface.centroid[2]), top - gripper.pad_half_height / 2) + pad_offset
-    lowest = max(top + gripper.palm, support_z + gripper.max_tip) + settings.tip_clearance_m
-    z = max(wanted, lowest)
-    pad_z = z - pad_offset
-    touching = between & (np.abs(flat.z - pad_z) <= gripper.pad_half_height)
-    overlap = min(top, pad_z + gripper.pad_half_height) - (pad_z - gripper.pad_half_height)
-    if overlap < settings.min_pad_overlap_m or not touching.any():
+    hold = _highest_hold(flat, place, between, float(surface.centroid[2]), support_z, gripper, settings)
+    if hold is None:
         return None
-    low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
-    straddled = flat.x[between & (flat.z >= z - gripper.max_tip)]
-    middle = (low + high) / 2
-    straddle = 2 * max(float(straddled.max()) - middle, middle - float(straddled.min()))
-    opening = straddle + 2 * settings.finger_clearance_m
-    if opening > gripper.max_opening:
-        return None
-    alignment = min(_alignment(flat, touching & (flat.x <= low + CONTACT_DEPTH_M), -1.0),
-                    _alignment(flat, touching & (flat.x >= high - CONTACT_DEPTH_M), 1.0))
+    alignment = min(_alignment(flat, hold.touching & (flat.x <= hold.low + CONTACT_DEPTH_M), -1.0),
+                    _alignment(flat, hold.touching & (flat.x >= hold.high - CONTACT_DEPTH_M), 1.0))
     if alignment < settings.min_side_alignment:
         return None
     closing, across = (math.cos(yaw), math.sin(yaw)), (math.sin(yaw), -math.cos(yaw))
-    position = (middle * closing[0] + place * across[0], middle * closing[1] + place * across[1], z)
-    offset = math.dist((position[0], position[1], pad_z), tuple(surface.centroid))
-    quality = _quality(alignment, offset, (gripper.max_opening - opening) / gripper.max_opening,
-                       overlap / (2 * gripper.pad_half_height), position, settings)
-    return TopDownGrasp(position, yaw, high - low, gripper.position_for(opening), quality)
+    middle = (hold.low + hold.high) / 2
+    position = (middle * closing[0] + place * across[0], middle * closing[1] + place * across[1], hold.z)
+    offset = math.dist((position[0], position[1], hold.pad_z), tuple(surface.centroid))
+    quality = _quality(alignment, offset, (gripper.max_opening - hold.opening) / gripper.max_opening,
+                       hold.overlap / (2 * gripper.pad_half_height), position, settings)
+    return TopDownGrasp(position, yaw, hold.high - hold.low, gripper.position_for(hold.opening), quality)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hold:
+    """How the hand holds the object at a place.
+
+    Attributes:
+        z: Height of the grasp frame [m].
+        pad_z: Height of the pads' centre when they touch [m].
+        low, high: Where the pads touch, along the closing direction [m].
+        overlap: Height over which they touch [m].
+        opening: Free width between the pads on the way down [m].
+        touching: Points between the pads.
+    """
+
+    z: float
+    pad_z: float
+    low: float
+    high: float
+    overlap: float
+    opening: float
+    touching: npt.NDArray[np.bool_]
+
+
+def _highest_hold(flat: _Slice, place: float, between: npt.NDArray[np.bool_], centroid_z: float, support_z: float,
+                  gripper: GripperGeometry, settings: TopDownSettings) -> _Hold | None:
+    """Raises the hand from where the pads are over the centre of mass until all of it is clear of the object.
+
+    How wide the hand must open depends on how deep it goes, and how deep it can go on how wide it is: a few rounds
+    settle both, since the hand only ever goes up.
+    """
+    pad_offset = gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))
+    top = float(flat.z[np.abs(flat.y - place) <= gripper.pad_half_width + 0.01].max())
+    z = max(min(centroid_z, top - gripper.pad_half_height / 2) + pad_offset,
+            support_z + gripper.max_tip + settings.tip_clearance_m)
+    for _ in range(HEIGHT_ROUNDS):
+        pad_z = z - pad_offset
+        touching = between & (np.abs(flat.z - pad_z) <= gripper.pad_half_height)
+        overlap = min(top, pad_z + gripper.pad_half_height) - (pad_z - gripper.pad_half_height)
+        if overlap < settings.min_pad_overlap_m or not touching.any():
+            return None
+        low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
+        middle = (low + high) / 2
+        straddled = flat.x[between & (flat.z >= z - gripper.max_tip)]
+        needed = 2 * (max(float(straddled.max()) - middle, middle - float(straddled.min())) +
+                      settings.finger_clearance_m)
+        if needed > gripper.max_opening:
+            return None
+        lowest, opening = _lowest_height(flat.top_around(middle, place), high - low, needed, z, gripper, settings)
+        if lowest <= z + HEIGHT_TOLERANCE_M:
+            return _Hold(z, pad_z, low, high, overlap, opening, touching)
+        z = lowest
+    return None
+
+
+def _lowest_height(top: Array, width: float, needed: float, wanted: float, gripper: GripperGeometry,
+                   settings: TopDownSettings) -> tuple[float, float]:
+    """Chooses the opening with which the hand can come down to a wanted height, or else the farthest.
+
+    Args:
+        top: Highest points of the object around the middle of the hand.
+        width: Opening at which the pads touch [m].
+        needed: Least opening on the way down [m].
+        wanted: Height of the grasp frame that is wanted [m].
+        gripper: Geometry of the hand.
+        settings: What counts as usable.
+
+    Returns:
+        The least height at which the hand is clear all the time [m], and the opening to come down with [m].
+    """
+    closing = np.linspace(width, needed, CLOSING_STEPS, endpoint=False)
+    coming = np.linspace(needed, gripper.max_opening, OPENING_STEPS)
+    openings = np.concatenate([closing, coming])
+    while_closing = np.maximum.accumulate(
+        gripper.lowest_heights(openings, top, CLOSING_CLEARANCE_M, with_pads=False, floor=wanted))
+    # The pads' own room is in the opening already; without the last bit, rounding would open the hand a step wider.
+    coming_down = gripper.lowest_heights(coming, top, max(0.0, settings.finger_clearance_m - CONTACT_DEPTH_M),
+                                         with_pads=True, floor=wanted)
+    heights = np.maximum(while_closing[CLOSING_STEPS:], coming_down)
+    chosen = int(np.argmax(heights <= heights.min() + HEIGHT_TOLERANCE_M))
+    return float(heights[chosen]), float(coming[chosen])
 
 
 def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns the collision shapes of a URDF into convex bodies, and computes how far each reaches in a direction."""
+from __future__ import annotations
+
+import itertools
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import ConvexHull, QhullError
+
+Array = npt.NDArray[np.float64]
+
+ROUND_SIDES = 24
+PARALLEL = 1e-9
+
+
+class ShapeError(ValueError):
+    """A collision shape cannot be used; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConvexBody:
+    """A convex body.
+
+    Attributes:
+        corners: (k, 3) its corners [m].
+        planes: (m, 4) outward unit normal and offset of each face; inside, normal . point + offset <= 0.
+    """
+
+    corners: Array
+    planes: Array
+
+    def moved(self, transform: Array) -> ConvexBody:
+        """Returns the body after a transform (4, 4)."""
+        normals = self.planes[:, :3] @ transform[:3, :3].T
+        offsets = self.planes[:, 3] - normals @ transform[:3, 3]
+        return ConvexBody(self.corners @ transform[:3, :3].T + transform[:3, 3], np.column_stack([normals, offsets]))
+
+
+def convex_hull(points: Array) -> ConvexBody:
+    """Computes the convex hull of points (n, 3) [m].
+
+    Raises:
+        ShapeError: They lie in one plane.
+    """
+    try:
+        hull = ConvexHull(points)
+    except QhullError as error:
+        raise ShapeError(f"has no volume: {len(points)} points, all in one plane; a solid is needed") from error
+    return ConvexBody(points[hull.vertices], np.unique(np.round(hull.equations, 12), axis=0))
+
+
+def collision_body(collision: ElementTree.Element) -> ConvexBody:
+    """Makes the convex body of a URDF collision element, in the frame of the shape.
+
+    Round shapes become prisms of 24 sides around them. A mesh becomes its convex hull.
+
+    Raises:
+        ShapeError: The element has no shape that is known, or its mesh cannot be read.
+    """
+    shape = next(iter(collision.find("geometry") or ()), None)
+    match shape.tag if shape is not None else "":
+        case "box":
+            return convex_hull(_corners_of_box(_numbers(shape, "size", "0 0 0")))
+        case "cylinder":
+            return convex_hull(_around_cylinder(*_numbers(shape, "radius", "0"), *_numbers(shape, "length", "0")))
+        case "sphere":
+            radius, = _numbers(shape, "radius", "0")
+            return convex_hull(_around_sphere(radius))
+        case "mesh":
+            return convex_hull(_mesh_vertices(shape))
+        case other:
+            raise ShapeError(f"is {other or 'missing'!r}; allowed are box, cylinder, sphere and mesh")
+
+
+def column_fronts(planes: Array, columns: Array, margin: float) -> Array:
+    """Computes the greatest z of convex bodies in columns along z.
+
+    Args:
+        planes: (n, m, 4) faces of n bodies with as many faces each: see ConvexBody.
+        columns: (k, 2) x and y of the columns [m].
+        margin: Distance by which each face is moved outwards first [m].
+
+    Returns:
+        (n, k) greatest z [m]; -inf where a column misses the body.
+    """
+    level = planes[:, :, :2] @ columns.T + planes[:, :, 3:] - margin  # (n, m, k); inside: level + normal_z z <= 0
+    slope = planes[:, :, 2:3]
+    bound = -level / np.where(np.abs(slope) > PARALLEL, slope, 1.0)
+    high = np.where(slope > PARALLEL, bound, np.inf).min(axis=1)
+    low = np.where(slope < -PARALLEL, bound, -np.inf).max(axis=1)
+    beside = ((np.abs(slope) <= PARALLEL) & (level > 0.0)).any(axis=1)
+    return np.where(beside | (low > high), -np.inf, high)
+
+
+def _numbers(shape: ElementTree.Element, name: str, default: str) -> list[float]:
+    text = shape.get(name, default)
+    try:
+        values = [float(value) for value in text.split()]
+    except ValueError:
+        values = []
+    if not values or not all(0.0 < value < math.inf for value in values):
+        raise ShapeError(f"has the {name} '{text}', allowed are numbers of more than 0")
+    return values
+
+
+def _corners_of_box(size: list[float]) -> Array:
+    return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
+
+
+def _around_cylinder(radius: float, length: float) -> Array:
+    angles = np.arange(ROUND_SIDES) * 2 * math.pi / ROUND_SIDES
+    ring = radius / math.cos(math.pi / ROUND_SIDES) * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.vstack([np.column_stack([ring, np.full(ROUND_SIDES, z)]) for z in (-length / 2, length / 2)])
+
+
+def _around_sphere(radius: float) -> Array:
+    rings = np.arange(ROUND_SIDES // 2 + 1) * 2 * math.pi / ROUND_SIDES - math.pi / 2
+    angles = np.arange(ROUND_SIDES) * 2 * math.pi / ROUND_SIDES
+    tilt, turn = (grid.ravel() for grid in np.meshgrid(rings, angles))
+    outside = radius / math.cos(math.pi / ROUND_SIDES) ** 2
+    return outside * np.column_stack([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
+
+
+def _mesh_vertices(shape: ElementTree.Element) -> Array:
+    import rospkg
+
+    from modular_framework_simulation.errors import DescriptionError
+    from modular_framework_simulation.mesh_files import load_mesh
+    from modular_framework_simulation.robot_description import mesh_path
+    from modular_framework_simulation.sdf_specs import Mesh
+
+    uri = shape.get("filename", "")
+    try:
+        x, y, z = _numbers(shape, "scale", "1 1 1")
+        return load_mesh(Mesh(mesh_path("a finger", uri, rospkg.RosPack().get_path), (x, y, z))).vertices
+    except DescriptionError as error:
+        raise ShapeError(f"is the mesh '{uri}', which cannot be used: {error}") from error

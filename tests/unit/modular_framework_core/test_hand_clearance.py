@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""No part of the hand but the pads touches what is grasped; distances are those of Coal, a library of its own."""
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modular_framework_core.grasp_generation import surface_points
+from modular_framework_core.grasp_generation.gripper_geometry import (
+    GripperGeometry,
+    GripperGeometryError,
+    measure_gripper,
+    rotation_about,
+)
+from modular_framework_core.grasp_generation.surface_points import Surface
+from modular_framework_core.grasp_generation.top_down import TopDownGrasp, TopDownSettings, top_down_grasps
+
+coal = pytest.importorskip("coal")
+pinocchio = pytest.importorskip("pinocchio")
+
+UP = np.array([0.0, 0.0, 1.0])
+SAMPLING_M = 0.003  # points on a surface are up to 4 mm apart, and a round side of 24 corners is 0.1 mm too wide
+PARALLEL_JAWS = """<robot name="jaws">
+  <link name="base"/>
+  <link name="housing"><collision><origin xyz="0 0 0.03"/><geometry><{housing}/></geometry></collision></link>
+  <joint name="mount" type="fixed"><parent link="base"/><child link="housing"/></joint>
+  <link name="left"><collision><origin xyz="0 0 0.095"/><geometry><box size="0.01 0.02 0.07"/></geometry></collision>
+  </link>
+  <joint name="slide" type="prismatic"><parent link="housing"/><child link="left"/><axis xyz="1 0 0"/>
+    <origin xyz="0.005 0 0"/><limit lower="0" upper="0.05" effort="1" velocity="1"/></joint>
+  <link name="right"><collision><origin xyz="0 0 0.095"/><geometry><box size="0.01 0.02 0.07"/></geometry></collision>
+  </link>
+  <joint name="slide_2" type="prismatic"><parent link="housing"/><child link="right"/><axis xyz="-1 0 0"/>
+    <origin xyz="-0.005 0 0"/><limit lower="0" upper="0.05" effort="1" velocity="1"/><mimic joint="slide"/></joint>
+  <link name="tool"/>
+  <joint name="tool_mount" type="fixed"><parent link="housing"/><child link="tool"/><origin xyz="0 0 0.115"/></joint>
+</robot>"""
+EZGRIPPER_XACRO = (Path(__file__).parents[3] / "src" / "robots" / "ur5_ezgripper_robot" / "urdf" /
+                   "ur5_with_ezgripper.urdf.xacro")
+
+
+def ezgripper() -> str:
+    from xacro_rospkg import expand
+
+    return str(expand(EZGRIPPER_XACRO, {}))
+
+
+def jaws() -> str:
+    return PARALLEL_JAWS.format(housing='cylinder radius="0.05" length="0.06"')
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object as points for the generator, and as a shape of Coal."""
+
+    surface: Surface
+    shape: Any
+    pose: Any
+
+
+def cylinder(diameter: float, height: float) -> Thing:
+    place = np.array([0.1, 0.5, height / 2])
+    return Thing(surface_points.cylinder(height, diameter / 2).moved(np.eye(3), place),
+                 coal.Cylinder(diameter / 2, height), pinocchio.SE3(np.eye(3), place))
+
+
+def block(width: float, depth: float, height: float) -> Thing:
+    turn, place = rotation_about(UP, 0.4), np.array([0.1, 0.5, height / 2])
+    return Thing(surface_points.box((width, depth, height)).moved(turn, place), coal.Box(width, depth, height),
+                 pinocchio.SE3(turn, place))
+
+
+class Hand:
+    """The hand as Pinocchio and Coal see it; the meshes of the arm are left out."""
+
+    def __init__(self, urdf: str, joint: str, frame: str) -> None:
+        urdf = re.sub(r"<collision>((?!</collision>).)*<mesh .*?</collision>", "", urdf, flags=re.DOTALL)
+        self._model = pinocchio.buildModelFromXML(urdf)
+        self._geometry = pinocchio.buildGeomFromUrdfString(self._model, urdf, pinocchio.GeometryType.COLLISION)
+        self._data, self._frame = self._model.createData(), self._model.getFrameId(frame)
+        self._joint = joint
+
+    def clearances(self, grasp: TopDownGrasp, height: float, joint: float, thing: Thing) -> dict[str, float]:
+        """Distance of each shape of the hand [m] from the object, the hand this far above the grasp."""
+        values = pinocchio.neutral(self._model)
+        self._set(values, self._joint, joint)
+        for follower, rule in FOLLOWERS.get(self._joint, {}).items():
+            self._set(values, follower, rule(joint))
+        pinocchio.framesForwardKinematics(self._model, self._data, values)
+        x, y, z, w = grasp.quaternion_xyzw
+        wanted = pinocchio.SE3(pinocchio.Quaternion(w, x, y, z).matrix(), np.array(grasp.position) + height * UP)
+        to_world = wanted * self._data.oMf[self._frame].inverse()
+        found: dict[str, float] = {}
+        for shape in self._geometry.geometryObjects:
+            name = self._model.frames[shape.parentFrame].name
+            if any(word in name for word in ("finger", "palm", "left", "right", "housing")):
+                pose = to_world * self._data.oMi[shape.parentJoint] * shape.placement
+                found[shape.name] = self._distance(shape.geometry, pose, thing)
+        return found
+
+    def _set(self, values: Any, name: str, value: float) -> None:
+        values[self._model.joints[self._model.getJointId(name)].idx_q] = value
+
+    @staticmethod
+    def _distance(shape: Any, pose: Any, thing: Thing) -> float:
+        result = coal.DistanceResult()
+        return float(coal.distance(shape, coal.Transform3s(pose.rotation, pose.translation), thing.shape,
+                                   coal.Transform3s(thing.pose.rotation, thing.pose.translation),
+                                   coal.DistanceRequest(), result))
+
+
+def _straight(angle: float) -> float:
+    return math.pi / 2 - angle
+
+
+FOLLOWERS: dict[str, dict[str, Callable[[float], float]]] = {
+    "ezgripper_knuckle_palm_L1_1": {"ezgripper_knuckle_palm_L1_2": float, "ezgripper_knuckle_L1_L2_1": _straight,
+                                    "ezgripper_knuckle_L1_L2_2": _straight},
+    "slide": {"slide_2": float}}
+GRIPPERS = [(ezgripper, "ezgripper_knuckle_palm_L1_1", "eg_manipulator"), (jaws, "slide", "tool")]
+THINGS = {"can": cylinder(0.066, 0.115), "tube": cylinder(0.04, 0.14), "thick": cylinder(0.07, 0.16),
+          "block": block(0.05, 0.06, 0.13), "cube": block(0.05, 0.05, 0.05)}
+
+
+@pytest.mark.parametrize("name", THINGS)
+@pytest.mark.parametrize(("urdf", "joint", "frame"), GRIPPERS, ids=["ezgripper", "jaws"])
+def test_nothing_but_the_pads_comes_near_the_object(urdf: Callable[[], str], joint: str, frame: str,
+                                                    name: str) -> None:
+    thing, settings, text = THINGS[name], TopDownSettings(), urdf()
+    gripper, hand = measure_gripper(text, frame, joint), Hand(text, joint, frame)
+    grasps = top_down_grasps(thing.surface, 0.0, gripper, settings)
+    assert grasps, f"no grasp of {name}"
+    for grasp in grasps[:6]:
+        for height in np.linspace(0.0, settings.approach_distance_m, 6):
+            room = hand.clearances(grasp, float(height), grasp.pregrasp_joint, thing)
+            assert min(room.values()) > settings.finger_clearance_m - SAMPLING_M, (name, grasp, height, room)
+        touch = gripper.position_for(grasp.width + 0.001)
+        for closing in np.linspace(grasp.pregrasp_joint, touch, 6):
+            room = hand.clearances(grasp, 0.0, float(closing), thing)
+            assert min(room.values()) > 0.0, (name, grasp, closing, room)
+
+
+def test_a_mesh_counts_like_the_shape_it_draws(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.cylinder(0.05, 0.06, sections=24).export(tmp_path / "housing.stl")
+    drawn = measure_gripper(PARALLEL_JAWS.format(housing=f'mesh filename="file://{tmp_path}/housing.stl"'), "tool",
+                            "slide")
+    named = measure_gripper(jaws(), "tool", "slide")
+    thing = cylinder(0.04, 0.2)
+    for mesh_grasp, grasp in zip(top_down_grasps(thing.surface, 0.0, drawn, TopDownSettings()),
+                                 top_down_grasps(thing.surface, 0.0, named, TopDownSettings()), strict=True):
+        assert mesh_grasp.position == pytest.approx(grasp.position, abs=1e-4)
+
+
+@pytest.mark.parametrize("housing", ["plane", 'mesh filename="package://moon/housing.stl"', 'box size="0.1 0 0.1"',
+                                     'cylinder radius="nan" length="0.1"'])
+def test_a_shape_that_cannot_be_used_is_refused_with_its_link(housing: str) -> None:
+    with pytest.raises(GripperGeometryError, match="collision shape of link 'housing'"):
+        measure_gripper(PARALLEL_JAWS.format(housing=housing), "tool", "slide")
+
+
+def test_a_hand_that_cannot_get_past_a_wide_top_is_not_sent_there() -> None:
+    gripper: GripperGeometry = measure_gripper(jaws(), "tool", "slide")
+    stem = surface_points.cylinder(0.10, 0.02).moved(np.eye(3), np.array([0.0, 0.0, 0.05]))
+    hat = surface_points.cylinder(0.02, 0.06).moved(np.eye(3), np.array([0.0, 0.0, 0.11]))
+    grasps = top_down_grasps(surface_points.joined([stem, hat]), 0.0, gripper, TopDownSettings())
+    assert all(grasp.position[2] > 0.12 for grasp in grasps)
