@@ -27,7 +27,12 @@ from gazebo_msgs.srv import (
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import CollisionObject
-from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneResponse
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    ApplyPlanningSceneResponse,
+    GetPlanningScene,
+    GetPlanningSceneResponse,
+)
 from ros_session import until as wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -64,7 +69,8 @@ class FakePlanningScene:
         self.objects: dict[str, Any] = {}
         self.poses: dict[str, Any] = {}
         self.refuse = False
-        self.service = rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply)
+        self.services = [rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply),
+                         rospy.Service("/get_planning_scene", GetPlanningScene, self.read)]
 
     def apply(self, request: Any) -> ApplyPlanningSceneResponse:
         if self.refuse:
@@ -78,6 +84,21 @@ class FakePlanningScene:
                     self.objects[item.id] = item
                 self.poses[item.id] = item.pose.position
         return ApplyPlanningSceneResponse(True)
+
+    def read(self, _request: Any) -> GetPlanningSceneResponse:
+        answer = GetPlanningSceneResponse()
+        with self.lock:
+            answer.scene.world.collision_objects = [CollisionObject(id=name) for name in self.objects]
+        return answer
+
+    def clear(self) -> None:
+        """What a REMOVE with an empty id does."""
+        with self.lock:
+            self.objects.clear()
+
+    def shutdown(self) -> None:
+        for service in self.services:
+            service.shutdown("test")
 
 
 def call(name: str, kind: Any, *values: Any, **fields: Any) -> Any:
@@ -282,7 +303,31 @@ def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -
         until(lambda: "ball__link" not in scene.objects, "the ball to vanish")
     finally:
         call("/gazebo/unpause_physics", Empty)
-        scene.service.shutdown("test")
+        scene.shutdown()
+
+
+def test_a_cleared_scene_and_one_of_a_new_move_group_get_the_world_again(simulation: Any) -> None:
+    scene = FakePlanningScene()
+    try:
+        expected = {"table__link", "can__link", "l_bracket__link", "ground_plane__link"}
+        until(lambda: expected <= scene.objects.keys(), "the objects of the world")
+        scene.clear()
+        until(lambda: expected <= scene.objects.keys(), "the objects of the world after clear()")
+        del scene.objects["l_bracket__link"]
+        until(lambda: "another node removed 'l_bracket__link'" in simulation.log(), "the warning in the log")
+        moved = ModelState(model_name="can", pose=Pose(Point(0.2, 0.7, 0.95), Quaternion(0, 0, 0, 1)))
+        assert call("/gazebo/set_model_state", SetModelState, moved).success
+        until(lambda: abs(scene.poses["can__link"].y - 0.7) < 0.02, "the moved can")
+        assert "l_bracket__link" not in scene.objects, "removed by its name: it stays out"
+        scene.clear()
+        until(lambda: expected <= scene.objects.keys(), "everything after another clear()")
+    finally:
+        scene.shutdown()
+    again = FakePlanningScene()
+    try:
+        until(lambda: expected <= again.objects.keys(), "the objects in a new move_group")
+    finally:
+        again.shutdown()
 
 
 def test_the_node_survived_all_this(simulation: Any) -> None:

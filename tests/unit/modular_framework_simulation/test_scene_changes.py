@@ -85,16 +85,87 @@ def test_a_held_object_that_is_deleted_is_detached_and_removed() -> None:
     assert told(snapshot(0.0, held_at=-1.0)).towards(snapshot(None)) == [Detach(CUBE, "palm"), Remove(CUBE)]
 
 
-def test_a_receiver_that_was_started_again_is_told_everything() -> None:
+BALL, TABLE = ("ball", "link"), ("table", "link")
+
+
+def three(cube_at: float = 0.0, held_at: float | None = None) -> WorldSnapshot:
+    """The world with a table, a ball and the cube."""
+    models = tuple(ModelSnapshot(name, number, False, (LinkSnapshot(LINK, at(x)),))
+                   for number, (name, x) in enumerate((("table", 1.0), ("ball", 2.0), ("cube", cube_at))))
+    return WorldSnapshot(0.0, models, HeldObject("cube", "palm", at(held_at)) if held_at is not None else None)
+
+
+def put_again(changes: SceneChanges, world: WorldSnapshot) -> set[tuple[str, str]]:
+    """The objects that are sent, all of them as new ones."""
+    found = changes.towards(world)
+    assert all(isinstance(change, Put | Attach) for change in found), found
+    changes.confirm()
+    return {change.key for change in found}
+
+
+def test_a_receiver_that_was_started_again_gets_everything() -> None:
     changes = told(snapshot(0.0, held_at=-1.0))
-    changes.forget()
+    assert changes.compare(set(), {}) == []
     assert changes.towards(snapshot(0.0, held_at=-1.0)) == [Attach(CUBE, LINK, "palm", at(1.0))]
+    changes = told(three(held_at=-1.0))
+    assert changes.compare(set(), {}) == []
+    assert put_again(changes, three(held_at=-1.0)) == {TABLE, BALL, CUBE}
 
 
-def test_an_object_that_vanished_while_the_receiver_was_in_doubt_is_removed() -> None:
+def test_a_scene_that_was_cleared_gets_everything_but_what_it_still_holds() -> None:
+    changes = told(three(held_at=-1.0))
+    assert changes.compare({TABLE, BALL}, {CUBE: "palm"}) == []
+    assert changes.towards(three(held_at=-1.0)) == []
+    assert changes.compare(set(), {CUBE: "palm"}) == []
+    assert put_again(changes, three(held_at=-1.0)) == {TABLE, BALL}
+
+
+def test_what_another_node_removes_by_name_stays_out_until_it_moves() -> None:
+    changes = told(three())
+    assert changes.compare({TABLE, BALL}, {}) == [CUBE]
+    assert changes.towards(three()) == []
+    assert changes.compare({TABLE, BALL}, {}) == [], "named once"
+    assert changes.towards(three(cube_at=0.1)) == [Put(CUBE, LINK, at(0.1))]
+
+
+def test_objects_removed_one_by_one_come_back_when_none_is_left() -> None:
+    changes = told(three())
+    assert changes.compare({TABLE, BALL}, {}) == [CUBE]
+    assert changes.towards(three()) == []
+    assert changes.compare(set(), {}) == []
+    assert put_again(changes, three()) == {TABLE, BALL, CUBE}
+
+
+def test_a_new_object_does_not_hide_that_the_scene_was_cleared() -> None:
+    changes = told(snapshot(0.0))
+    changes.compare({CUBE}, {})
+    ball = ModelSnapshot("ball", 7, False, (LinkSnapshot(LINK, at(2.0)),))
+    both = WorldSnapshot(0.0, (*snapshot(0.0).models, ball), None)
+    changes.towards(both)
+    changes.confirm()
+    assert changes.compare({BALL}, {}) == [], "the cube was cleared away before the ball came"
+    assert put_again(changes, both) == {CUBE}
+
+
+def test_what_another_node_attached_is_left_to_it_until_the_gripper_holds_it() -> None:
+    changes = told(three())
+    assert changes.compare({TABLE, BALL}, {CUBE: "palm"}) == []
+    assert changes.towards(three(cube_at=0.2)) == []
+    assert changes.towards(three(cube_at=0.2, held_at=-1.0)) == [Attach(CUBE, LINK, "palm", at(1.2))]
+    assert changes.compare({TABLE, BALL, CUBE}, {}) == []
+    assert changes.towards(three(cube_at=0.2)) == [Put(CUBE, LINK, at(0.2))], "put down by that node, somewhere"
+
+
+def test_what_another_node_detached_stays_so_until_the_gripper_lets_it_go() -> None:
+    changes = told(three(held_at=-1.0))
+    assert changes.compare({TABLE, BALL, CUBE}, {}) == []
+    assert changes.towards(three(held_at=-1.0)) == []
+    assert changes.towards(three(cube_at=0.3)) == [Put(CUBE, LINK, at(0.3))]
+
+
+def test_an_object_that_vanished_while_the_receiver_was_away_is_removed() -> None:
     changes = told(snapshot(0.0))
     changes.towards(snapshot(0.1))
-    changes.forget()
     assert changes.towards(snapshot(None)) == [Remove(CUBE)]
     changes.confirm()
     assert changes.towards(snapshot(None)) == []

@@ -28,5 +28,9 @@ RESET_WORLD = "/gazebo/reset_world"
 
 APPLY_PLANNING_SCENE = "/apply_planning_scene"
 """Service of move_group that takes objects and answers when they are in its scene."""
+GET_PLANNING_SCENE = "/get_planning_scene"
+"""Service of move_group that says which objects its scene has."""
+MONITORED_PLANNING_SCENE = "/move_group/monitored_planning_scene"
+"""Topic of move_group with every change of its scene."""
 
 WORLD_FRAME = "world"

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shows the simulated world to move_group, so that nobody has to keep a planning scene by hand.
 
-A thread of its own compares the latest snapshot of the world with what move_group was told and sends the differences to
-its service. The simulation loop only ever hands over a snapshot and never waits.
+A thread of its own compares the latest snapshot of the world with what the scene has and sends the differences to
+move_group's service. What the scene has is read back after changes and from time to time: other nodes change it too,
+and move_group may have been started again. The simulation loop only ever hands over a snapshot and never waits.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ import time
 import rosgraph
 import rospy
 from geometry_msgs.msg import Pose as PoseMsg
-from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene
-from moveit_msgs.srv import ApplyPlanningScene
+from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneComponents
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
 
 from modular_framework_simulation import conversions, ros_names
 from modular_framework_simulation.errors import SimulationError
@@ -32,12 +33,21 @@ from modular_framework_simulation.snapshots import WorldSnapshot
 _SYNC_PERIOD_S = 0.1
 _PRESENCE_PERIOD_S = 0.5
 _RETRY_PERIOD_S = 0.5
+_COMPARE_PERIOD_S = 2.0
+"""At most so long the scene differs from the world unnoticed where no change of the scene is heard of."""
+_COMPARE_PAUSE_S = 0.3
+"""After a comparison, while the scene changes all the time, as it does while the robot moves."""
+_OBJECTS = PlanningSceneComponents(
+    PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
+)
 
 
 class PlanningScenePublisher:
     """Keeps the planning scene of move_group like the simulated world.
 
-    Client of /apply_planning_scene (moveit_msgs/ApplyPlanningScene), whenever that is there.
+    Client of /apply_planning_scene (moveit_msgs/ApplyPlanningScene) and /get_planning_scene
+    (moveit_msgs/GetPlanningScene), whenever they are there.
+    Subscribes: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene), only to hear that something changed.
 
     Args:
         touch_links: Links of the gripper, which may touch an object that is held.
@@ -51,11 +61,14 @@ class PlanningScenePublisher:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="planning scene", daemon=True)
         self._server_uri = ""
-        self._next_look_s = 0.0
+        self._next_lookup_s = 0.0
+        self._scene_changed = threading.Event()
+        self._compared_s = 0.0
         self._last_problem = ""
 
     def connect(self) -> None:
-        """Starts the thread."""
+        """Starts the thread and listens for changes that others make."""
+        rospy.Subscriber(ros_names.MONITORED_PLANNING_SCENE, rospy.AnyMsg, self._on_scene_change, queue_size=1)
         self._thread.start()
 
     def close(self) -> None:
@@ -68,6 +81,10 @@ class PlanningScenePublisher:
     def show(self, snapshot: WorldSnapshot) -> None:
         """Hands over the latest state of the world; never waits."""
         self._snapshot = snapshot
+        self._news.set()
+
+    def _on_scene_change(self, _message: rospy.AnyMsg) -> None:
+        self._scene_changed.set()
         self._news.set()
 
     def _run(self) -> None:
@@ -88,9 +105,10 @@ class PlanningScenePublisher:
                     return
 
     def _synchronise(self, snapshot: WorldSnapshot) -> float:
-        """Tells move_group what is new; returns how long to rest afterwards [s]."""
+        """Sends what is new; returns how long to rest afterwards [s]."""
         if not self._server_is_there():
             return _PRESENCE_PERIOD_S
+        self._compare()
         changes = self._changes.towards(snapshot)
         if not changes:
             return _SYNC_PERIOD_S
@@ -104,27 +122,47 @@ class PlanningScenePublisher:
         self._last_problem = ""
         return _SYNC_PERIOD_S
 
+    def _compare(self) -> None:
+        """Reads which objects the scene has, where it changed or was not read for a while."""
+        since_s = time.monotonic() - self._compared_s
+        if since_s < (_COMPARE_PAUSE_S if self._scene_changed.is_set() else _COMPARE_PERIOD_S):
+            return
+        self._scene_changed.clear()
+        scene = rospy.ServiceProxy(ros_names.GET_PLANNING_SCENE, GetPlanningScene)(_OBJECTS).scene
+        self._compared_s = time.monotonic()
+        ids = {conversions.collision_object_id(*key): key for key in self._changes.keys}
+        in_world = {ids[item.id] for item in scene.world.collision_objects if item.id in ids}
+        held = scene.robot_state.attached_collision_objects
+        attached = {ids[item.object.id]: item.link_name for item in held if item.object.id in ids}
+        for key in self._changes.compare(in_world, attached):
+            rospy.logwarn(
+                "planning scene: another node removed '%s', which is in the simulated world; motions are planned "
+                "without it until it moves or is spawned again. Remove all objects to have all of them back",
+                conversions.collision_object_id(*key),
+            )
+
     def _server_is_there(self) -> bool:
-        """Looks for the service twice a second; a server at another address is a new one that knows nothing."""
+        """Asks the master twice a second; a server at another address is a new one that knows nothing."""
         now = time.monotonic()
-        if now >= self._next_look_s:
-            self._next_look_s = now + _PRESENCE_PERIOD_S
+        if now >= self._next_lookup_s:
+            self._next_lookup_s = now + _PRESENCE_PERIOD_S
+            master = rosgraph.Master(rospy.get_name())
             try:
-                uri = rosgraph.Master(rospy.get_name()).lookupService(ros_names.APPLY_PLANNING_SCENE)
+                master.lookupService(ros_names.GET_PLANNING_SCENE)
+                uri = master.lookupService(ros_names.APPLY_PLANNING_SCENE)
             except (rosgraph.MasterException, OSError):
                 uri = ""
-            if uri != self._server_uri:
-                self._changes.forget()
-                if uri:
-                    rospy.loginfo("planning scene: showing the simulated world to move_group at %s", uri)
+            if uri and uri != self._server_uri:
+                self._compared_s = 0.0
+                rospy.loginfo("planning scene: showing the simulated world to move_group at %s", uri)
             self._server_uri = uri
         return bool(self._server_uri)
 
     def _fail(self, problem: str) -> float:
         if problem != self._last_problem:
-            rospy.logwarn("planning scene: %s; everything is sent again", problem)
+            rospy.logwarn("planning scene: %s; the scene is read and the change sent again", problem)
         self._last_problem = problem
-        self._changes.forget()
+        self._compared_s = 0.0
         return _RETRY_PERIOD_S
 
     def _message(self, changes: list[Change]) -> PlanningScene:

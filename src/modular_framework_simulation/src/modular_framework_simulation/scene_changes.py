@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Works out what has to change in a planning scene so that it shows the simulated world.
 
-The receiver is told of new, moved and vanished objects, and of objects that the gripper took or let go. Small movements
-are left out: physics never stands entirely still.
+Sent are new, moved and vanished objects, and objects that the gripper took or let go. Small movements are left out:
+physics never stands entirely still.
+
+Other nodes change the scene too. An object that one of them removed, attached or detached by its name stays like that
+until it moves, is spawned again, or the gripper takes it or lets it go. A scene in which none of the objects is left
+was cleared, or belongs to a receiver that was started again: it gets all of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
 
 from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.poses import Pose
@@ -64,7 +69,7 @@ Change = Put | Move | Remove | Attach | Detach
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """How an object was last shown: its pose is in the world, or in the carrier link if it is carried."""
+    """How an object was last sent: its pose is in the world, or in the carrier link if it is carried."""
 
     instance: int
     pose: Pose
@@ -78,7 +83,7 @@ class _Wanted:
 
 
 class SceneChanges:
-    """Remembers what the receiver was told.
+    """Remembers what was sent, and where the scene really has it.
 
     Args:
         translation_m: Smaller movements are not reported [m].
@@ -90,28 +95,50 @@ class SceneChanges:
         self._rotation_rad = rotation_rad
         self._shown: dict[ObjectKey, _Shown] = {}
         self._pending: dict[ObjectKey, _Shown] = {}
-        self._doubtful: set[ObjectKey] = set()
+        self._in_world: frozenset[ObjectKey] = frozenset()
+        self._attached: dict[ObjectKey, str] = {}
+        self._witnesses: frozenset[ObjectKey] = frozenset()
 
-    def forget(self) -> None:
-        """Takes it that what the receiver knows is uncertain: it was started again, or refused a change.
+    @property
+    def keys(self) -> Set[ObjectKey]:
+        """Objects that were sent; `compare` wants to know of these."""
+        return self._shown.keys()
 
-        It will be told everything; objects that it may still have, but the world no longer has, are removed.
+    def compare(self, in_world: Set[ObjectKey], attached: Mapping[ObjectKey, str]) -> list[ObjectKey]:
+        """Takes in where the scene has the objects.
+
+        Args:
+            in_world: Objects of the world.
+            attached: The others that the scene has, with the links they are attached to.
+
+        Returns:
+            Objects that another node took out, and that stay out for now: each is named once.
         """
-        self._doubtful |= self._shown.keys() | self._pending.keys()
-        self._shown = {}
+        foreign = {key for key, link in self._attached.items() if link != self._shown[key].carrier_link}
+        for key in foreign & in_world:  # another node attached it, and put it down where it likes
+            del self._shown[key]
+        expected = {key for key, shown in self._shown.items() if shown.carrier_link is None and key not in attached}
+        witnesses = expected & self._witnesses or expected
+        if not witnesses & in_world and (witnesses or not attached):  # cleared, or another receiver
+            for key in self._shown.keys() - in_world - attached.keys():
+                del self._shown[key]
+        gone = (self._in_world | self._attached.keys()) & self._shown.keys() - in_world - attached.keys()
+        self._in_world = self._witnesses = frozenset(in_world & self._shown.keys())
+        self._attached = {key: link for key, link in attached.items() if key in self._shown}
+        return sorted(gone)
 
     def towards(self, snapshot: WorldSnapshot) -> list[Change]:
-        """Returns what the receiver has to be told; `confirm` must follow once it was.
+        """Returns what has to be sent; `confirm` must follow once it was taken.
 
         Args:
             snapshot: The world as it is now.
         """
         wanted = _wanted(snapshot)
         self._pending = dict(self._shown)
-        changes: list[Change] = [Remove(key) for key in sorted(self._doubtful - wanted.keys())]
+        changes: list[Change] = []
         for key, shown in self._shown.items():
             if key not in wanted or wanted[key].shown.instance != shown.instance:
-                changes += [Detach(key, shown.carrier_link)] if shown.carrier_link is not None else []
+                changes += [Detach(key, self._attached[key])] if key in self._attached else []
                 changes.append(Remove(key))
                 del self._pending[key]
         for key, want in wanted.items():
@@ -119,21 +146,28 @@ class SceneChanges:
         return changes
 
     def confirm(self) -> None:
-        """Notes that the receiver took the changes of the last `towards`."""
+        """Notes that the scene has the changes of the last `towards`."""
+        changed = {key for key, shown in self._pending.items() if self._shown.get(key) is not shown}
+        kept = self._pending.keys() - changed
+        taken = {key: shown.carrier_link for key in changed if (shown := self._pending[key]).carrier_link is not None}
+        self._in_world = frozenset((self._in_world & kept) | (changed - taken.keys()))
+        self._attached = {key: link for key, link in self._attached.items() if key in kept} | taken
         self._shown = self._pending
-        self._doubtful = set()
 
     def _change_of(self, key: ObjectKey, want: _Wanted) -> list[Change]:
         before, now = self._pending.get(key), want.shown
         if before is not None and before.carrier_link == now.carrier_link and not self._moved(before.pose, now.pose):
             return []
-        self._pending[key] = replace(now)
+        carrier = self._attached.get(key) if before is not None else None
+        if now.carrier_link is None and carrier is not None and before is not None and before.carrier_link is None:
+            return []  # another node attached it, as a pick does: the gripper will take it, or that node puts it down
+        self._pending[key] = now
         if now.carrier_link is not None:
             return [Attach(key, want.link, now.carrier_link, now.pose)]
-        if before is None:
+        if carrier is not None:
+            return [Detach(key, carrier), Put(key, want.link, now.pose)]
+        if before is None or before.carrier_link is not None or key not in self._in_world:
             return [Put(key, want.link, now.pose)]
-        if before.carrier_link is not None:
-            return [Detach(key, before.carrier_link), Put(key, want.link, now.pose)]
         return [Move(key, now.pose)]
 
     def _moved(self, before: Pose, now: Pose) -> bool:
