@@ -42,6 +42,7 @@ BUILT_IN_TYPES: dict[str, str] = {
     "effort_controllers/JointEffortController": f"{_JOINT_COMMAND}:EffortJointEffortController",
     "effort_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:EffortJointGroupPositionController",
     "effort_controllers/JointGroupEffortController": f"{_JOINT_COMMAND}:EffortJointGroupEffortController",
+    "diff_drive_controller/DiffDriveController": f"{_PACKAGE}.diff_drive_controller:DiffDriveController",
 }
 
 

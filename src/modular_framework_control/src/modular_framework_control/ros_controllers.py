@@ -21,6 +21,7 @@ from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 
 from modular_framework_control import conversions
 from modular_framework_control.controller import Controller, ControllerError
+from modular_framework_control.diff_drive_controller import DiffDriveController
 from modular_framework_control.goal_ticket import GoalTicket
 from modular_framework_control.gripper_action_controller import (
     GripperActionController,
@@ -35,6 +36,7 @@ from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
 from modular_framework_control.ros_command_edges import JointCommandEdge
+from modular_framework_control.ros_mobile_base import DiffDriveTopics
 from modular_framework_control.ros_outbox import Outbox
 from modular_framework_control.ros_sensor_edges import SensorEdge
 from modular_framework_control.sensor_controllers import SensorController
@@ -156,6 +158,7 @@ _EDGES: tuple[tuple[type[Controller], Any], ...] = (
     (GripperActionController, GripperEdge),
     (JointCommandController, JointCommandEdge),
     (SensorController, SensorEdge),
+    (DiffDriveController, DiffDriveTopics),
 )
 
 

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets settings be adjusted while a node runs, by dynamic_reconfigure, without the code its generator makes."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import rospy
+
+
+@dataclass(frozen=True, slots=True)
+class Adjustable:
+    """A parameter that may be changed, under its public name and within its public range."""
+
+    name: str
+    lowest: bool | int | float
+    highest: bool | int | float
+    description: str
+
+    @property
+    def kind(self) -> str:
+        """The type in dynamic_reconfigure's words."""
+        return {bool: "bool", int: "int", float: "double"}[type(self.lowest)]
+
+    def accepts(self, value: object) -> bool:
+        """Whether a parameter's value is of the type and within the range."""
+        if isinstance(value, bool) or isinstance(self.lowest, bool):
+            return type(value) is type(self.lowest)
+        return isinstance(value, type(self.lowest) | int) and self.lowest <= value <= self.highest
+
+
+class Reconfiguration:
+    """Serves NAMESPACE/{set_parameters, parameter_descriptions, parameter_updates}."""
+
+    def __init__(self, namespace: str, table: Sequence[Adjustable], holder: Any, attribute: str) -> None:
+        """Takes what is adjusted.
+
+        Args:
+            namespace: absolute, or beginning with "~".
+            table: the settings that may be changed.
+            holder, attribute: where the settings are, a frozen dataclass that is replaced as a whole, so that whoever
+                reads it while it is adjusted sees the old settings or the new ones.
+        """
+        self._namespace, self._table = namespace, tuple(table)
+        self._holder, self._attribute = holder, attribute
+        self._server: Any = None
+
+    def connect(self) -> None:
+        """Starts to serve. A set-up without the Python package dynamic_reconfigure goes without, and says so."""
+        try:
+            from dynamic_reconfigure.server import Server
+        except ImportError as error:
+            rospy.logwarn("%s cannot be adjusted while the node runs: %s; install python3-dynamic-reconfigure",
+                          rospy.resolve_name(self._namespace), error)
+            return
+        settings = getattr(self._holder, self._attribute)
+        defaults = {item.name: getattr(settings, item.name) for item in self._table}
+        for name, value in defaults.items():  # the server reads them, and knows no faulty ones
+            rospy.set_param(f"{self._namespace}/{name}", value)
+        self._server = Server(described(self._table, defaults), self._adjust, self._namespace)
+
+    def close(self) -> None:
+        """Ends to serve; may be called twice."""
+        server, self._server = self._server, None
+        if server is not None:
+            server.set_service.shutdown("its owner was closed")
+            server.descr_topic.unregister()
+            server.update_topic.unregister()
+
+    def _adjust(self, config: Any, _level: int) -> Any:
+        present = getattr(self._holder, self._attribute)
+        for item in self._table:
+            if not math.isfinite(config[item.name]):  # passes every comparison with a bound
+                rospy.logerr("%s/%s: got %s; allowed is %s of %s to %s; %s stays", rospy.resolve_name(self._namespace),
+                             item.name, config[item.name], item.kind, item.lowest, item.highest,
+                             getattr(present, item.name))
+                config[item.name] = getattr(present, item.name)
+        changed = {item.name: config[item.name] for item in self._table
+                   if getattr(present, item.name) != config[item.name]}
+        if changed:
+            setattr(self._holder, self._attribute, replace(present, **changed))
+            rospy.loginfo("%s: %s", self._namespace, ", ".join(f"{name} is now {value}"
+                                                               for name, value in changed.items()))
+        return config
+
+
+def described(parameters: Sequence[Adjustable], defaults: dict[str, Any]) -> SimpleNamespace:
+    """Returns what dynamic_reconfigure's server takes for the module its generator makes of a .cfg file.
+
+    Ranges are widened to what is configured, so that starting the server changes nothing.
+    """
+    lowest = {item.name: min(item.lowest, defaults[item.name]) for item in parameters}
+    highest = {item.name: max(item.highest, defaults[item.name]) for item in parameters}
+    entries = [{"name": item.name, "type": item.kind, "level": 1, "description": item.description,
+                "default": defaults[item.name], "min": lowest[item.name], "max": highest[item.name],
+                "edit_method": ""}
+               for item in parameters]
+    group = {"name": "Default", "type": "", "state": True, "cstate": "true", "id": 0, "parent": 0, "parentname": "",
+             "class": "DEFAULT", "parentclass": "", "field": "default", "upper": "DEFAULT", "lower": "groups",
+             "parameters": entries, "groups": []}
+    return SimpleNamespace(config_description=group, defaults=dict(defaults),
+                           min=lowest, max=highest, level={item.name: 1 for item in parameters})
