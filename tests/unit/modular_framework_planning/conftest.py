@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path += [str(ROOT / "src/modular_framework_planning/src"), str(Path(__file__).parent)]
+sys.path += [str(ROOT / "src/modular_framework_planning/src"), str(ROOT / "src/modular_framework_urdf/src"),
+             str(Path(__file__).parent)]
 
 from modular_framework_planning.errors import ModelError  # noqa: E402
 from modular_framework_planning.robot_model import RobotModel  # noqa: E402

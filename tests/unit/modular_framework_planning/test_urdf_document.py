@@ -2,10 +2,13 @@
 """What a robot looks like is kept for the markers, beside what Pinocchio reads."""
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from modular_framework_planning.errors import ModelError
+from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.shapes import Box, Cylinder, Sphere
 from modular_framework_planning.urdf_document import load_urdf
 
@@ -31,3 +34,46 @@ def test_primitives_and_meshes_of_a_link_are_kept_with_their_poses() -> None:
 def test_a_size_that_is_no_number_is_refused_and_named() -> None:
     with pytest.raises(ModelError, match="link 'a'.*'0.1 wide 0.3'"):
         load_urdf(URDF.replace("0.1 0.2 0.3", "0.1 wide 0.3"))
+
+
+# The second part begins at vertex 4: a reader that counts anew for each material builds another body.
+PARTS = """o first
+v 0 0 0
+v 1 0 0
+v 0 1 0
+usemtl a
+f 1 2 3
+o second
+v 5 0 0
+v 7 0 0
+v 5 0 3
+usemtl b
+f 4 5 6
+"""
+MESH_URDF = """<robot name="r"><link name="base"/><link name="arm"><collision><origin xyz="0 0 1"/>
+<geometry><mesh filename="parts.obj" scale="0.1 0.1 0.1"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 2 0"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_collision_meshes_of_several_materials_are_whole_and_in_place(tmp_path: Path) -> None:
+    (tmp_path / "parts.obj").write_text(PARTS)
+    model = RobotModel(MESH_URDF, '<robot name="r"/>', {}, lambda uri: str(tmp_path / uri))
+    (item,) = model.link_geometries
+    corners = np.array(item.geometry.vertices())
+    expected = 0.1 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [7, 0, 0], [5, 0, 3]])
+    assert np.allclose(np.unique(corners, axis=0), np.unique(expected, axis=0))
+    assert item.geometry.num_tris == 2
+    assert (item.link, item.joint_id) == ("arm", 1) and np.allclose(item.placement.translation, [0, 0, 1])
+
+
+def test_a_collision_mesh_that_cannot_be_read_is_refused_with_link_and_file(tmp_path: Path) -> None:
+    (tmp_path / "parts.obj").write_text("v 0 0 0\n")
+    with pytest.raises(ModelError, match=r"link 'arm' collision: mesh file .*parts\.obj: holds no triangle"):
+        RobotModel(MESH_URDF, '<robot name="r"/>', {}, lambda uri: str(tmp_path / uri))
+
+
+@pytest.mark.parametrize("shape", ["<tetrahedron/>", '<sphere radius="0"/>', '<capsule radius="1" length="-1"/>'])
+def test_an_unknown_or_empty_collision_shape_is_refused_with_its_link(shape: str) -> None:
+    with pytest.raises(ModelError, match="link 'a' collision"):
+        load_urdf(f'<robot name="r"><link name="a"><collision><geometry>{shape}</geometry></collision></link></robot>')

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Shape
 from modular_framework_planning.spatial import Transform
 
 LINK, ATTACHED, WORLD = "robot_link", "robot_attached", "world_object"
@@ -34,7 +35,7 @@ class PlacedGeometry:
     Attributes:
         joint_id: Pinocchio's number of the joint it hangs on, 0 for the world.
         placement: pose in that joint's frame.
-        geometry: Coal's geometry; source: what it was made from (a Shape or a LinkGeometry), which never changes.
+        geometry: Coal's geometry; source: the shape it was made from, which never changes.
         margin: distance it keeps from bodies of the world [m].
     """
 
@@ -42,7 +43,7 @@ class PlacedGeometry:
     joint_id: int
     placement: Transform
     geometry: Any
-    source: Any
+    source: Shape
     margin: float
 
 
@@ -59,7 +60,7 @@ class WatchedPair:
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     """Returns every collision geometry of a scene: links, held objects, then the world."""
     model = scene.model
-    result = [PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.geometry, item,
+    result = [PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.geometry, item.shape,
                              float(margin))
               for item, margin in zip(model.link_geometries, scene.link_margins(), strict=True)]
     for held in scene.attached.values():

@@ -30,7 +30,7 @@ from modular_framework_planning.compiled_distance import (
     SURFACE,
 )
 from modular_framework_planning.compiled_triangles import build_sphere_tree, cut_long_edges
-from modular_framework_planning.shapes import Octree, Shape
+from modular_framework_planning.shapes import Mesh, Octree, Shape
 from modular_framework_planning.spatial import Array, Transform
 
 LONGEST_EDGE, LONGEST_SHARE = 0.02, 0.05  # [m], and as a share of a surface's extent; longer triangles are cut
@@ -84,8 +84,6 @@ _of_shapes: WeakKeyDictionary[Shape, StandIn] = WeakKeyDictionary()
 
 def stand_in(part: PlacedGeometry) -> StandIn:
     """Returns the stand-in of a geometry; that of a shape is made once."""
-    if not isinstance(part.source, Shape):
-        return _make(part.geometry, part.source)
     with _lock:
         found = _of_shapes.get(part.source)
         if found is None:
@@ -98,8 +96,8 @@ def _make(geometry: Any, source: Any) -> StandIn:
         points = np.tile(source.centers, 3)
         return StandIn(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
     match geometry:
-        case coal.BVHModelBase():
-            triangles = _mesh_triangles(geometry)
+        case coal.BVHModelBase() if isinstance(source, Mesh):
+            triangles = np.asarray(source.vertices, dtype=float)[np.asarray(source.triangles)].reshape(-1, 9)
             return StandIn(lambda: triangles, is_closed=_is_closed(triangles))
         case coal.Box():
             x, y, z = (float(value) for value in geometry.halfSide)
@@ -142,13 +140,6 @@ def _surface(triangles: Array) -> Surfaces:
     triangles = cut_long_edges(triangles, max(LONGEST_EDGE, LONGEST_SHARE * extent))
     spheres, boxes, links = build_sphere_tree(triangles)
     return Surfaces(spheres, boxes, links, triangles)
-
-
-def _mesh_triangles(mesh: Any) -> Array:
-    vertices = np.array(mesh.vertices(), dtype=float)
-    corners = np.array([[triangle[0], triangle[1], triangle[2]]
-                        for triangle in (mesh.tri_indices(number) for number in range(mesh.num_tris))])
-    return vertices[corners].reshape(-1, 9)
 
 
 def _is_closed(triangles: Array) -> bool:

@@ -55,7 +55,7 @@ def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
     """Stand-ins of all link geometries; surfaces without a closed form are moved into their joints' frames."""
     result = []
     for item in model.link_geometries:
-        part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.geometry, item, 0.0)
+        part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.geometry, item.shape, 0.0)
         shape = stand_in(part)
         if shape.kind == SURFACE and shape.corners is not None:
             shape = StandIn(partial(moved, shape.corners(), item.placement * shape.offset), is_closed=shape.is_closed)

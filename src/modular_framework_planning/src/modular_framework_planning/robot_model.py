@@ -17,6 +17,7 @@ from modular_framework_planning.joint_limits import (
     JointLimits,
     tighten,
 )
+from modular_framework_planning.shapes import Shape
 from modular_framework_planning.spatial import Array, Transform
 from modular_framework_planning.srdf import GroupSpec, SemanticDescription, parse_srdf
 from modular_framework_planning.urdf_document import CONTINUOUS_BOUND, MeshResolver, load_urdf, package_resolver
@@ -26,13 +27,18 @@ NO_VELOCITY_LIMIT = 1.0e6
 
 @dataclass(frozen=True, slots=True)
 class LinkGeometry:
-    """One collision element of a link: Coal geometry and its pose in the frame of the moving joint."""
+    """One collision element of a link: its shape and the pose in the frame of the moving joint."""
 
     link: str
     joint_id: int
     frame_id: int
     placement: Transform
-    geometry: Any
+    shape: Shape
+
+    @property
+    def geometry(self) -> Any:
+        """The Coal geometry of the shape."""
+        return self.shape.geometry
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +119,12 @@ class RobotModel:
         return result
 
     def _load_geometry(self) -> tuple[LinkGeometry, ...]:
-        model = pin.buildGeomFromUrdfString(self.pin_model, self.document.xml, pin.GeometryType.COLLISION)
-        return tuple(LinkGeometry(self.pin_model.frames[item.parentFrame].name, item.parentJoint, item.parentFrame,
-                                  item.placement.copy(), item.geometry) for item in model.geometryObjects)
+        result = []
+        for link, shapes in self.document.collisions.items():
+            frame = self.pin_model.frames[self.frame_ids[link]]
+            result += [LinkGeometry(link, frame.parentJoint, self.frame_ids[link], frame.placement * pose, shape)
+                       for shape, pose in shapes]
+        return tuple(result)
 
     def chain_joints(self, base_link: str, tip_link: str) -> list[str]:
         """Returns the joints from base to tip, fixed ones included.

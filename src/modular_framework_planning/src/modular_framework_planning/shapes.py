@@ -77,6 +77,20 @@ class Cylinder(Shape):
 
 
 @dataclass(frozen=True, eq=False)
+class Capsule(Shape):
+    """A cylinder along z centred at the origin with half spheres on both ends; the cylinder's height, radius [m]."""
+
+    height: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        _require_positive("capsule", height=self.height, radius=self.radius)
+
+    def _build(self) -> Any:
+        return coal.Capsule(self.radius, self.height)
+
+
+@dataclass(frozen=True, eq=False)
 class Cone(Shape):
     """A cone along z, its axis' middle at the origin, tip up; height and radius [m]."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prepares a URDF for Pinocchio: mesh files are found, continuous joints become unbounded, mimics are noted."""
+"""Prepares a URDF for Pinocchio: shapes are read, continuous joints become unbounded, mimics are noted."""
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from modular_framework_planning.errors import ModelError
-from modular_framework_planning.shapes import Box, Cylinder, Shape, Sphere
+from modular_framework_planning.errors import GeometryError, ModelError
+from modular_framework_planning.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.spatial import Transform
+from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
-VisualShape = tuple[Shape, Transform]  # primitive, pose in the link
+PlacedShape = tuple[Shape, Transform]  # shape, pose in the link
 CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
 MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
 
@@ -32,7 +33,7 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class UrdfDocument:
-    """A URDF ready for Pinocchio and what Pinocchio does not keep."""
+    """A URDF ready for Pinocchio and what Pinocchio does not keep; the links' geometry is not in `xml`."""
 
     xml: str
     robot_name: str
@@ -43,7 +44,8 @@ class UrdfDocument:
     joint_kinds: Mapping[str, str]
     mimics: Mapping[str, Mimic] = field(default_factory=dict)
     visual_meshes: Mapping[str, tuple[VisualMesh, ...]] = field(default_factory=dict)
-    visual_shapes: Mapping[str, tuple[VisualShape, ...]] = field(default_factory=dict)
+    visual_shapes: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
+    collisions: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
 
 
 def directory_resolver(root: Path) -> MeshResolver:
@@ -111,43 +113,69 @@ def _numbers(text: str | None, default: tuple[float, float, float], where: str) 
     return first, second, third
 
 
-def _visuals(link: ET.Element) -> Iterator[tuple[ET.Element, Transform, str]]:
-    """Geometry elements of a link's visuals, their poses in the link and where that is."""
-    where = f"URDF link '{link.get('name')}' visual"
-    for visual in link.findall("visual"):
-        origin = visual.find("origin")
+def _geometries(link: ET.Element, role: str) -> Iterator[tuple[ET.Element, Transform, str]]:
+    """Geometry elements of a link's visuals or collisions, their poses in the link and where that is."""
+    where = f"URDF link '{link.get('name')}' {role}"
+    for element in link.findall(role):
+        origin = element.find("origin")
         xyz = _numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0), where)
         rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0), where)
         pose = pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.array(xyz))
-        for geometry in visual.findall("geometry/*"):
+        for geometry in element.findall("geometry/*"):
             yield geometry, pose, where
 
 
 def _visual_meshes(link: ET.Element) -> Iterator[VisualMesh]:
-    for geometry, pose, where in _visuals(link):
+    for geometry, pose, where in _geometries(link, "visual"):
         if geometry.tag == "mesh":
             yield geometry.get("filename", ""), pose, _numbers(geometry.get("scale"), (1.0, 1.0, 1.0), where)
 
 
-def _visual_shapes(link: ET.Element) -> Iterator[VisualShape]:
-    for geometry, pose, where in _visuals(link):
-        if geometry.tag == "box":
-            yield Box(*_numbers(geometry.get("size"), (1.0, 1.0, 1.0), where)), pose
-        elif geometry.tag == "sphere":
-            yield Sphere(_number(geometry, "radius", 1.0, where)), pose
-        elif geometry.tag == "cylinder":
+def _visual_shapes(link: ET.Element) -> Iterator[PlacedShape]:
+    for geometry, pose, where in _geometries(link, "visual"):
+        shape = None if geometry.tag == "capsule" else _primitive(geometry, where)  # no marker shows a capsule
+        if shape is not None:
+            yield shape, pose
+
+
+def _primitive(geometry: ET.Element, where: str) -> Shape | None:
+    match geometry.tag:
+        case "box":
+            return Box(*_numbers(geometry.get("size"), (1.0, 1.0, 1.0), where))
+        case "sphere":
+            return Sphere(_number(geometry, "radius", 1.0, where))
+        case "cylinder" | "capsule":
             radius, length = _number(geometry, "radius", 1.0, where), _number(geometry, "length", 1.0, where)
-            yield Cylinder(radius=radius, height=length), pose
+            return (Cylinder if geometry.tag == "cylinder" else Capsule)(radius=radius, height=length)
+    return None
 
 
-def _resolve_meshes(root: ET.Element, resolve: MeshResolver) -> None:
-    """Makes collision meshes file paths and takes the visual elements out."""
+def _collisions(link: ET.Element, resolve: MeshResolver) -> Iterator[PlacedShape]:
+    """Shapes of a link; raises ModelError for a mesh that is not there or cannot be read, or an unknown shape."""
+    for geometry, pose, where in _geometries(link, "collision"):
+        if geometry.tag == "mesh":
+            scale = _numbers(geometry.get("scale"), (1.0, 1.0, 1.0), where)
+            try:
+                mesh = read_mesh(resolve(geometry.get("filename", "")), scale)
+            except MeshError as error:
+                raise ModelError(f"{where}: {error}") from error
+            yield Mesh(mesh.vertices, mesh.triangles), pose
+            continue
+        try:
+            shape = _primitive(geometry, where)
+        except GeometryError as error:
+            raise ModelError(f"{where}: {error.reason}") from error
+        if shape is None:
+            raise ModelError(f"{where}: <{geometry.tag}>; allowed are box, capsule, cylinder, sphere and mesh")
+        yield shape, pose
+
+
+def _without_geometry(root: ET.Element) -> str:
+    """Returns the document as Pinocchio gets it: kinematics and inertias."""
     for link in root.findall("link"):
-        for collision in link.findall("collision"):
-            for mesh in collision.iter("mesh"):
-                mesh.set("filename", resolve(mesh.get("filename", "")))
-        for visual in link.findall("visual"):
-            link.remove(visual)
+        for element in (*link.findall("collision"), *link.findall("visual")):
+            link.remove(element)
+    return ET.tostring(root, encoding="unicode")
 
 
 def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocument:
@@ -158,7 +186,7 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
         resolve: turns a mesh URI into the path of an existing file.
 
     Raises:
-        ModelError: not XML, no root link, an unsupported joint type, a mesh that is not there.
+        ModelError: not XML, no root link, an unsupported joint type, a mesh that is not there or cannot be read.
     """
     try:
         root = ET.fromstring(text)
@@ -182,6 +210,6 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
         raise ModelError(f"URDF: {len(roots)} links without a parent joint ({', '.join(roots)}); exactly one is needed")
     meshes = {link.get("name", ""): tuple(_visual_meshes(link)) for link in root.findall("link")}
     shapes = {link.get("name", ""): tuple(_visual_shapes(link)) for link in root.findall("link")}
-    _resolve_meshes(root, resolve)
-    return UrdfDocument(ET.tostring(root, encoding="unicode"), root.get("name", ""), roots[0], links, parents,
-                        children, kinds, mimics, meshes, shapes)
+    collisions = {link.get("name", ""): tuple(_collisions(link, resolve)) for link in root.findall("link")}
+    return UrdfDocument(_without_geometry(root), root.get("name", ""), roots[0], links, parents,
+                        children, kinds, mimics, meshes, shapes, collisions)

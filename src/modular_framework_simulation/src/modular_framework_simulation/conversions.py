@@ -14,9 +14,10 @@ from shape_msgs.msg import MeshTriangle, SolidPrimitive
 from shape_msgs.msg import Plane as PlaneMsg
 
 from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.mesh_files import TriangleMesh, load_mesh
+from modular_framework_simulation.mesh_files import load_mesh
 from modular_framework_simulation.poses import Pose, normalised_quaternion
 from modular_framework_simulation.simulated_body import BodyState, Twist
+from modular_framework_urdf.mesh_reader import TriangleMesh
 
 LARGEST_COORDINATE_M = 1e4
 LARGEST_VELOCITY = 1e3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads mesh files, and cuts them into convex parts for the physics engine.
+"""Gives the meshes of descriptions to the physics engine: as they are, as hulls or cut into convex parts.
 
 The engine computes contacts of convex bodies only, so a mesh that is not convex is decomposed by CoACD. That takes
 seconds, therefore the parts are kept in a cache folder under a name made of the mesh's own content.
@@ -10,17 +10,15 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.sdf_specs import Mesh
+from modular_framework_urdf.mesh_reader import MeshError, TriangleMesh, read_mesh
 
-_CACHE_VERSION = "1"
+_CACHE_VERSION = "2"
 _CONCAVITY_THRESHOLD = 0.03
 """CoACD's measure of how much a part may differ from its hull, relative to the size of the mesh."""
 
@@ -28,37 +26,16 @@ _CONVEX_VOLUME_SHARE = 0.985
 """A mesh that fills this share of its convex hull is treated as convex."""
 
 
-@dataclass(frozen=True, slots=True)
-class TriangleMesh:
-    """Triangles in the frame of the shape.
-
-    Attributes:
-        vertices: shape (n, 3) [m].
-        triangles: Indices of vertices, shape (m, 3), counter-clockwise seen from outside.
-    """
-
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-
-
 def load_mesh(mesh: Mesh) -> TriangleMesh:
-    """Reads a mesh file, exactly as it is, and scales it.
+    """Reads a mesh file, triangle for triangle, and scales it.
 
     Raises:
-        DescriptionError: The file holds no triangles or cannot be read.
+        DescriptionError: The file cannot be read whole or holds no triangles.
     """
-    import trimesh  # slow to load, and a warm cache needs it not at all
-
     try:
-        loaded: Any = trimesh.load(mesh.path, force="mesh")
-    except Exception as error:  # the readers behind trimesh raise whatever they like on a broken file
-        problem = f"cannot be read as a mesh ({error})"
-        raise DescriptionError(str(mesh.path), problem, "allowed: stl, obj, dae") from error
-    vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
-    triangles = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
-    if len(triangles) == 0 or not np.isfinite(vertices).all():
-        raise DescriptionError(str(mesh.path), f"holds {len(triangles)} usable triangles", "expected at least one")
-    return TriangleMesh(vertices * np.asarray(mesh.scale), triangles)
+        return read_mesh(mesh.path, mesh.scale)
+    except MeshError as error:
+        raise DescriptionError(f"mesh file {error.path}", error.found, error.allowed) from error
 
 
 def default_cache_folder() -> Path:

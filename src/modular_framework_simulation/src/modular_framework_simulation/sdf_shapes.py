@@ -11,10 +11,11 @@ from modular_framework_simulation.poses import Pose
 from modular_framework_simulation.sdf_frames import pose_of
 from modular_framework_simulation.sdf_resources import Resources
 from modular_framework_simulation.xml_nodes import XmlNode
+from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
 
 SUPPORTED_VERSIONS = ("1.4", "1.5", "1.6", "1.7")
 _GEOMETRIES = ("box", "cylinder", "sphere", "plane", "mesh")
-_MESH_SUFFIXES = (".stl", ".obj", ".dae")
+_MESH_SUFFIXES = tuple(f".{kind}" for kind in MESH_FORMATS)
 _GREY = (0.7, 0.7, 0.7, 1.0)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_msgs.msg import CollisionObject
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
+from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 from moveit_commander.exception import MoveItCommanderException
 
 
@@ -37,32 +36,20 @@ def plane(name: str, pose: PoseStamped, normal: Sequence[float], offset: float) 
 
 
 def mesh(name: str, pose: PoseStamped, filename: str, scale: Sequence[float]) -> CollisionObject:
-    """The triangles of a mesh file (STL, OBJ, PLY, DAE, ...), scaled along x, y, z.
+    """The triangles of a mesh file (STL, OBJ, PLY, DAE), scaled along x, y, z.
 
     Raises:
-        MoveItCommanderException: the file is not there, cannot be read, or holds no triangle.
+        MoveItCommanderException: the file is not there, cannot be read whole, or holds no triangle.
     """
-    loaded = _load(filename)
-    if not len(getattr(loaded, "faces", ())):
-        raise MoveItCommanderException(f"There are no faces in the mesh {filename}; a file with triangles is needed")
-    shape = Mesh(triangles=[MeshTriangle([int(corner) for corner in face]) for face in loaded.faces])
-    shape.vertices = [Point(*(float(value) * float(factor) for value, factor in zip(vertex, scale, strict=True)))
-                      for vertex in loaded.vertices]
+    try:
+        loaded = read_mesh(str(filename).removeprefix("file://"), tuple(float(factor) for factor in scale))
+    except MeshError as error:
+        raise MoveItCommanderException(str(error)) from error
+    shape = Mesh(triangles=[MeshTriangle(corners) for corners in loaded.triangles.tolist()],
+                 vertices=[Point(*vertex) for vertex in loaded.vertices.tolist()])
     item = _empty(name, pose)
     item.meshes = [shape]
     return item
-
-
-def _load(filename: str) -> Any:
-    import trimesh
-
-    path = Path(str(filename).removeprefix("file://"))
-    if not path.is_file():
-        raise MoveItCommanderException(f"mesh file {path} does not exist; give a path of this machine")
-    try:
-        return trimesh.load(path, force="mesh")
-    except Exception as error:  # noqa: BLE001 - each format's reader raises what it likes
-        raise MoveItCommanderException(f"mesh file {path} cannot be read: {error}; STL, OBJ and PLY can") from error
 
 
 def _empty(name: str, pose: PoseStamped) -> CollisionObject:

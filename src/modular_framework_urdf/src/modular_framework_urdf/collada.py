@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a COLLADA file says besides its vertices: the length of its unit, and how many triangles its scene shows."""
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+_MOST_NODES = 100_000
+_LOOKS = ("library_images", "library_effects", "library_materials")
+
+
+class _NoDocumentType(ET.TreeBuilder):
+    """Refuses a document type: its entities may grow without bound."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise ValueError("it has a DOCTYPE, which COLLADA files do not need; remove it")
+
+
+def parse(content: bytes) -> ET.Element:
+    """Returns the root of a COLLADA file; the tags lose their namespace.
+
+    Raises:
+        ET.ParseError, ValueError: it is no XML, has a DOCTYPE, or is something else than COLLADA.
+    """
+    root: ET.Element = ET.fromstring(content, ET.XMLParser(target=_NoDocumentType()))
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "COLLADA":
+        raise ValueError(f"its root element is <{root.tag}>, not <COLLADA>")
+    return root
+
+
+def unit(root: ET.Element) -> float:
+    """Returns the length of the file's unit [m]; raises ValueError where it is none."""
+    element = root.find("asset/unit")
+    metres = float("1" if element is None else element.get("meter", "1"))
+    if not 0.0 < metres < float("inf"):
+        raise ValueError(f"its <unit> is {metres} m long; a length above 0 is needed")
+    return metres
+
+
+def without_materials(root: ET.Element) -> bytes:
+    """Returns the file without what only its looks need: a reader gives up a part whose texture is missing."""
+    root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
+    for parent in list(root.iter()):
+        for child in [one for one in parent if one.tag == "bind_material" or one.tag in _LOOKS]:
+            parent.remove(child)
+    return bytes(ET.tostring(root))
+
+
+def triangles(root: ET.Element) -> int:
+    """Counts the triangles of every instance that the scene shows."""
+    known = {element.get("id"): element for element in root.iter() if element.get("id")}
+    shown = root.find("scene/instance_visual_scene")
+    nodes = [] if shown is None else list(known[shown.get("url", "")[1:]].findall("node"))
+    geometries: dict[str, int] = {}
+    triangles = visited = 0
+    while nodes:
+        node = nodes.pop()
+        visited += 1
+        if visited > _MOST_NODES:
+            raise ValueError(f"its scene has more than {_MOST_NODES} nodes")
+        nodes += node.findall("node") + [known[one.get("url", "")[1:]] for one in node.findall("instance_node")]
+        for instance in (*node.findall("instance_geometry"), *node.findall("instance_controller")):
+            name = instance.get("url", "")[1:]
+            if name not in geometries:
+                geometries[name] = _geometry(_mesh_of(known, name))
+            triangles += geometries[name]
+    return triangles
+
+
+def _mesh_of(known: dict[str | None, ET.Element], name: str) -> ET.Element:
+    """Returns the geometry a name stands for; that of a controller is the one it deforms."""
+    element = known[name]
+    while element.tag == "controller":
+        inner = element.find("skin") if element.find("skin") is not None else element.find("morph")
+        if inner is None:
+            raise ValueError(f"controller '{name}' names no geometry")
+        element = known[inner.get("source", "")[1:]]
+    return element
+
+
+def _geometry(geometry: ET.Element) -> int:
+    triangles = 0
+    for kind in ("triangles", "tristrips", "trifans", "polylist", "polygons"):
+        for primitive in geometry.findall(f"mesh/{kind}"):
+            stride = 1 + max((int(one.get("offset", "0")) for one in primitive.findall("input")), default=0)
+            corners = [len((one.text or "").split()) // stride for one in primitive.findall(".//p")]
+            if kind == "triangles":
+                triangles += sum(corners) // 3
+            elif kind == "polylist":
+                triangles += sum(int(one) - 2 for one in primitive.findtext("vcount", "").split())
+            else:
+                triangles += sum(one - 2 for one in corners)
+    return triangles

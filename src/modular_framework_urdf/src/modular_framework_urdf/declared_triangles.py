@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Counts the triangles a mesh file declares, by the plain structure of its format and without the reader it checks."""
+from __future__ import annotations
+
+import re
+import struct
+
+FORMATS = ("stl", "obj", "ply")
+_STL_HEADER, _STL_TRIANGLE = 84, 50  # [bytes]
+_FACE = re.compile(rb"^[ \t]*f[ \t]+(.*)$", re.MULTILINE)
+_OBJ_LINE = re.compile(rb"^[ \t]*(v|f)[ \t]+(.*)$", re.MULTILINE)
+_PLY_SIZES = {"char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
+              "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f",
+              "double": "d", "float64": "d"}
+
+
+def declared_triangles(kind: str, content: bytes) -> int:
+    """Returns how many triangles an STL, OBJ or PLY file says it holds; n corners of a polygon count as n - 2 of them.
+
+    Raises:
+        ValueError, IndexError, KeyError, struct.error: the structure is broken before a count can be had.
+    """
+    match kind:
+        case "stl":
+            return _stl(content)
+        case "obj":
+            return sum(len(face.split()) - 2 for face in _FACE.findall(_joined_lines(content)))
+        case "ply":
+            return _ply(content)
+    raise ValueError(f"'{kind}' is not one of {', '.join(FORMATS)}")
+
+
+def _stl(content: bytes) -> int:
+    if len(content) >= _STL_HEADER:
+        count = struct.unpack_from("<I", content, 80)[0]
+        if len(content) == _STL_HEADER + count * _STL_TRIANGLE:
+            return int(count)
+    if not content.lstrip()[:5].lower() == b"solid":
+        raise ValueError(f"{len(content)} bytes hold neither the triangles of a binary header nor text")
+    return len(re.findall(rb"\bfacet\s+normal\b", content, re.IGNORECASE))
+
+
+def _joined_lines(content: bytes) -> bytes:
+    """Joins lines that a backslash continues, and leaves comments out."""
+    return re.sub(rb"#[^\n]*", b"", content.replace(b"\r\n", b"\n").replace(b"\\\n", b" "))
+
+
+def with_absolute_indices(content: bytes) -> bytes:
+    """Returns an OBJ file whose faces name vertices by their number in the file.
+
+    A negative index counts back from the vertices read so far; trimesh counts back from the last one of the file.
+    """
+    if not re.search(rb"^[ \t]*f[^\n]*-", content, re.MULTILINE):
+        return content
+    content, seen = _joined_lines(content), 0
+    lines = []
+    for keyword, rest in _OBJ_LINE.findall(content):
+        if keyword == b"v":
+            seen += 1
+            lines.append(b"v " + rest)
+        else:
+            corners = (int(corner.split(b"/")[0]) for corner in rest.split())
+            lines.append(b"f " + b" ".join(b"%d" % (one if one > 0 else seen + 1 + one) for one in corners))
+    return b"\n".join(lines) + b"\n"
+
+
+def _ply(content: bytes) -> int:
+    """Counts faces; the lengths of their lists are read in the body."""
+    end = content.index(b"end_header")
+    body = content.index(b"\n", end) + 1
+    lines = [line.split() for line in content[:end].decode("ascii").splitlines()]
+    style = next(line[1] for line in lines if line[:1] == ["format"])
+    elements: list[tuple[str, int, list[list[str]]]] = []
+    for line in lines:
+        if line[:1] == ["element"]:
+            elements.append((line[1], int(line[2]), []))
+        elif line[:1] == ["property"]:
+            elements[-1][2].append(line[1:])
+    if style == "ascii":
+        return _ply_text(content[body:].split(), elements)
+    return _ply_binary(content, body, elements, "<" if style == "binary_little_endian" else ">")
+
+
+def _ply_text(words: list[bytes], elements: list[tuple[str, int, list[list[str]]]]) -> int:
+    place = triangles = 0
+    for name, count, properties in elements:
+        for _ in range(count):
+            for one in properties:
+                length = int(words[place]) if one[0] == "list" else 0
+                triangles += length - 2 if name == "face" and one[-1].startswith("vert") else 0
+                place += 1 + length
+    if place > len(words):
+        raise ValueError(f"{len(words)} values where the header declares {place}")
+    return triangles
+
+
+def _ply_binary(content: bytes, place: int, elements: list[tuple[str, int, list[list[str]]]], order: str) -> int:
+    triangles = 0
+    for name, count, properties in elements:
+        if all(one[0] != "list" for one in properties):
+            place += count * struct.calcsize(order + "".join(_PLY_SIZES[one[0]] for one in properties))
+            continue
+        for _ in range(count):
+            for one in properties:
+                if one[0] != "list":
+                    place += struct.calcsize(_PLY_SIZES[one[0]])
+                    continue
+                length = struct.unpack_from(order + _PLY_SIZES[one[1]], content, place)[0]
+                triangles += length - 2 if name == "face" and one[-1].startswith("vert") else 0
+                place += struct.calcsize(_PLY_SIZES[one[1]]) + length * struct.calcsize(_PLY_SIZES[one[2]])
+    if place > len(content):
+        raise ValueError(f"{len(content)} bytes where the header declares {place}")
+    return triangles

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads collision meshes: one reader for planning, simulation and clients, so that all of them see the same body."""
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_urdf import collada
+from modular_framework_urdf.declared_triangles import FORMATS, declared_triangles, with_absolute_indices
+
+ALLOWED = (*FORMATS, "dae")
+Scale = tuple[float, float, float]
+
+
+class MeshError(Exception):
+    """A mesh file cannot be used.
+
+    Args:
+        path: the file; found: what is wrong with it; allowed: what would do, and what to do about it.
+    """
+
+    def __init__(self, path: Path, found: str, allowed: str) -> None:
+        super().__init__(f"mesh file {path}: {found}; {allowed}")
+        self.path, self.found, self.allowed = path, found, allowed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TriangleMesh:
+    """Triangles in the frame of the shape.
+
+    Attributes:
+        vertices: shape (n, 3) [m], no two alike.
+        triangles: indices of vertices, shape (m, 3), counter-clockwise seen from outside.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+
+def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
+    """Reads every triangle of a mesh file.
+
+    Args:
+        path: an STL, OBJ, PLY or COLLADA file.
+        scale: of the description that names the file, along x, y and z; a negative one mirrors.
+
+    Raises:
+        MeshError: the file cannot be read, holds no triangle, or lost triangles while it was read.
+    """
+    path = Path(path)
+    factors = np.array(scale, dtype=float)
+    if factors.shape != (3,) or not np.isfinite(factors).all() or not factors.all():
+        raise MeshError(path, f"scale is {list(scale)}", "allowed: three finite numbers, none of them 0")
+    declared, unit, vertices, triangles = _read(path)
+    if len(triangles) != declared:
+        raise MeshError(path, f"{len(triangles)} of the {declared} triangles it declares could be read",
+                        "all are needed; export the mesh again as plain triangles")
+    if declared == 0:
+        raise MeshError(path, "holds no triangle", "at least one is needed; give a triangle mesh")
+    if not np.isfinite(vertices).all():
+        raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; mend the file")
+    vertices, triangles = _merged(vertices * (unit * factors), triangles)
+    return TriangleMesh(vertices, triangles if np.prod(factors) > 0.0 else np.ascontiguousarray(triangles[:, ::-1]))
+
+
+def _read(path: Path) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64]]:
+    """Returns the number of triangles a file declares, its unit [m], its vertices and triangles."""
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in ALLOWED:
+        raise MeshError(path, f"is a '{path.suffix}' file", f"allowed: {', '.join(ALLOWED)}; convert the mesh")
+    try:
+        content = path.read_bytes()
+        if kind == "dae":
+            root = collada.parse(content)
+            return collada.triangles(root), collada.unit(root), *_load("dae", collada.without_materials(root))
+        declared = declared_triangles(kind, content)
+        return declared, 1.0, *_load(kind, with_absolute_indices(content) if kind == "obj" else content)
+    except OSError as error:
+        raise MeshError(path, f"cannot be read ({error})", "give a mesh file that is there and readable") from error
+    except Exception as error:  # noqa: BLE001 - the readers behind trimesh raise what they like on a broken file
+        raise MeshError(path, f"is no whole {kind.upper()} file ({type(error).__name__}: {error})",
+                        f"allowed: well-formed {', '.join(ALLOWED)}; export the mesh again") from error
+
+
+def _load(kind: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Returns vertices and triangles of all parts, as trimesh reads them and in the file's own unit."""
+    import trimesh  # slow to load
+
+    options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
+    loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, **options)
+    parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
+    corners = [np.asarray(part.vertices, dtype=np.float64)[np.asarray(part.faces, dtype=np.int64)]
+               for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    vertices = np.concatenate([np.zeros((0, 3, 3)), *corners]).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
+
+
+def _merged(vertices: NDArray[np.float64],
+            triangles: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Makes vertices at the same position one vertex."""
+    unique, numbers = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    return np.ascontiguousarray(unique), np.asarray(numbers.reshape(-1)[triangles], dtype=np.int64)
