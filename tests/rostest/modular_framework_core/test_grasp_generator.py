@@ -89,6 +89,25 @@ def test_an_object_that_appears_gives_ranked_grasps_and_a_signal(scene) -> None:
     assert opening == pytest.approx(0.04 + 2 * 0.012, abs=1e-3)
 
 
+def stored() -> tuple[list[str], int]:
+    answer = rospy.ServiceProxy("list_grasps", srv.ListMessages)()
+    return answer.names, answer.anonymous
+
+
+def test_new_grasps_replace_the_ones_that_are_left(scene) -> None:
+    assert generate()[0]
+    assert generate()[0]
+    assert stored() == ([], 3)
+    assert get_grasp().success
+    assert rospy.ServiceProxy("top_down_grasp_generator/refresh", Trigger)().message.startswith("nothing has moved")
+    assert stored() == ([], 2)
+    scene.objects[-1].pose.position.x += 0.03
+    answer = rospy.ServiceProxy("top_down_grasp_generator/refresh", Trigger)()
+    assert answer.success, answer.message
+    assert stored() == ([], 3)
+    assert get_grasp().grasp_message.grasp.pose.pose.position.x == pytest.approx(0.08, abs=1e-6)
+
+
 def test_on_demand_the_reason_tells_what_is_wrong(scene) -> None:
     scene.reach = -1.0
     success, text = generate()
@@ -114,6 +133,12 @@ def test_a_wrong_parameter_is_named_and_the_node_lives_on(scene) -> None:
 
 def test_grasps_can_be_stored_under_names(scene) -> None:
     rospy.set_param("top_down_grasp_generator/name_prefix", "box_")
+    assert generate()[0]
+    assert stored() == (["box_1", "box_2", "box_3"], 0)
+    rospy.set_param("top_down_grasp_generator/max_grasps", 2)
+    assert generate()[0]
+    assert stored() == (["box_1", "box_2"], 0)
+    rospy.set_param("top_down_grasp_generator/max_grasps", 3)
     assert generate()[0]
     proxy = rospy.ServiceProxy("get_grasp", srv.GetStandardisedGrasp)
     assert proxy("box_1").grasp_message.grasp_id == "box_1"

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from modular_framework_core.grasp_generation import ros_top_down_node as node
+from modular_framework_core.grasp_generation import surface_points
 from modular_framework_core.grasp_generation.patience import Patience
+from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 from modular_framework_core.ros_calls import CallError
 
 LIMIT_S = 20.0
 EMPTY = node.NoObjectError("no object of the planning scene is in the crop box")
 BUSY = CallError("service '/get_planning_scene' did not answer within 10.0 s")
-BOX = [SimpleNamespace(name="box__link")]
+BOX = [SceneObject("box__link", surface_points.box((0.04, 0.07, 0.1)))]
 
 
 def test_patience_ends_a_limit_after_the_first_question():
@@ -34,6 +37,7 @@ class Scripted(node.TopDownGraspGenerator):
     def __init__(self, looks: list[object], makes: Callable[[], list[object]]) -> None:
         super().__init__()
         self.looks, self.makes, self.signals = list(looks), makes, []
+        self._stored = SimpleNamespace(replace=lambda grasps, prefix: None)
 
     def _candidates(self, settings):
         look = self.looks.pop(0)
@@ -41,11 +45,8 @@ class Scripted(node.TopDownGraspGenerator):
             raise look
         return look
 
-    def _generate(self, settings):
+    def _generate(self, settings, objects):
         return self.makes()
-
-    def _store(self, grasp, name):
-        pass
 
     def _publish(self, success, text):
         self.signals.append((success, text))
@@ -55,8 +56,9 @@ class Scripted(node.TopDownGraspGenerator):
 def watched(monkeypatch):
     """Lets a generator look at scripted scenes, some seconds of the ROS clock apart; returns what it signalled."""
 
-    def watch(looks, period_s=1.0, makes=lambda: [SimpleNamespace(object_id="box__link")]):
+    def watch(looks, period_s=1.0, makes=lambda: [SimpleNamespace(object_id="box__link")], attached=frozenset()):
         generator = Scripted(looks, makes)
+        generator._attached = set(attached)
         clock = SimpleNamespace(now=50.0)
 
         def sleep(_wall_s: float) -> None:
@@ -114,3 +116,18 @@ def test_what_cannot_be_grasped_is_signalled_at_once(watched):
         raise node.NoGraspError("the gripper opens to 0.100 m")
 
     assert watched([BOX] * 3, makes=makes) == [(False, "the gripper opens to 0.100 m")]
+
+
+def moved(x: float) -> list[SceneObject]:
+    return [SceneObject(box.name, box.surface.moved(np.eye(3), np.array([x, 0.0, 0.0]))) for box in BOX]
+
+
+def test_an_object_that_was_moved_gives_grasps_again_once_it_rests(watched):
+    assert len(watched([BOX] * 4 + [moved(0.02), moved(0.04)] + [moved(0.05)] * 4)) == 2
+    assert len(watched([BOX] * 4 + [moved(0.001)] * 4)) == 1
+
+
+def test_an_object_that_comes_back_to_its_place_is_a_new_one_unless_the_robot_carried_it(watched):
+    assert len(watched([BOX] * 4 + [EMPTY] * 2 + [BOX] * 4)) == 2
+    assert len(watched([BOX] * 4 + [EMPTY] * 2 + [BOX] * 4, attached={"box__link"})) == 1
+    assert len(watched([BOX] * 4 + [EMPTY] * 2 + [moved(0.1)] * 4, attached={"box__link"})) == 2

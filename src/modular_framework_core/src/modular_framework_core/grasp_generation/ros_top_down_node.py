@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from typing import Any
 
 import rospy
 from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents
@@ -13,6 +12,7 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core.arm_commander import ArmCommander, CommanderError
+from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
 from modular_framework_core.grasp_generation.patience import Patience
 from modular_framework_core.grasp_generation.planning_scene_objects import (
@@ -23,11 +23,11 @@ from modular_framework_core.grasp_generation.planning_scene_objects import (
     scene_object,
 )
 from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings, read_settings
+from modular_framework_core.grasp_generation.ros_stored_grasps import StoredGrasps
 from modular_framework_core.grasp_generation.top_down import TopDownGrasp, top_down_grasps
 from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import StandardisedGrasp
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
-from modular_framework_core.srv import AddStandardisedGrasp, AddStandardisedGraspRequest
 
 SIGNAL_TOPIC = "grasp_generated"
 SERVICE_TIMEOUT_S = 10.0
@@ -45,16 +45,26 @@ class NoObjectError(NoGraspError):
 
 
 class TopDownGraspGenerator:
-    """Generates grasps when an object appears in the crop box, or on demand.
+    """Generates grasps when an object appears in the crop box or was moved, or on demand.
+
+    New grasps replace the ones that were generated before. An object that the robot carries is taken for the one that
+    is set down under its name.
 
     Parameters: see :mod:`ros_generator_settings`; they are read again for every generation.
     Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched).
-    Services: ``~generate`` (std_srvs/Trigger). Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``.
+    Services (std_srvs/Trigger):
+        ``~generate``: generates grasps.
+        ``~refresh``: waits until the objects rest, and generates grasps if one was moved since; those that are left of
+            the last generation stay otherwise.
+    Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``,
+        ``clear_anonymous_grasps``.
     """
 
     def __init__(self) -> None:
         """Stores nothing but names; :meth:`connect` talks to the other nodes."""
-        self._seen: set[str] = set()
+        self._generated = GeneratedObjects()
+        self._attached: set[str] = set()
+        self._stored = StoredGrasps()
         self._generating = threading.Lock()
 
     def connect(self, timeout_s: float = START_TIMEOUT_S) -> None:
@@ -66,50 +76,49 @@ class TopDownGraspGenerator:
         self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
         self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
         self._scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
-        self._add_grasp = rospy.ServiceProxy("add_grasp", AddStandardisedGrasp)
         settings = read_settings()
         self._commander = ArmCommander(settings.arm_group)
         try:
             self._commander.connect(timeout_s)
-            for proxy in (self._scene, self._add_grasp):
-                wait_for_service(proxy, timeout_s)
+            wait_for_service(self._scene, timeout_s)
+            self._stored.connect(timeout_s)
             tip = self._commander.group.tip_link
             self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
-        self._service = rospy.Service("~generate", Trigger, self._on_demand)
+        self._services = [rospy.Service("~generate", Trigger, lambda _: self._on_demand(refresh=False)),
+                          rospy.Service("~refresh", Trigger, lambda _: self._on_demand(refresh=True))]
 
     def watch(self) -> None:
-        """Generates once for each object that appears, also when it was there before, until ROS shuts down.
+        """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
 
         What may come right by itself is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
         there yet, a service that does not answer in time on a busy machine.
         """
-        before: set[str] = set()
+        before: list[SceneObject] = []
         patience: Patience | None = Patience()  # None: it is known what became of everything that is there
         scene_was_read = False
         while not rospy.is_shutdown():
             settings = read_settings()
             try:
-                names = {found.name for found in self._candidates(settings)}
-                self._seen &= names
+                objects = self._candidates(settings)
+                self._generated.keep({found.name for found in objects} | self._attached)
                 scene_was_read = True
-                if names - self._seen:
+                if self._generated.stale(objects):
                     patience = patience or Patience()
-                    if names == before:
-                        self._signal_grasps(settings)
-                        self._seen |= names
+                    if at_rest(before, objects):
+                        self._signal_grasps(settings, objects, refresh=True)
                         patience = None
-                before = names
+                before = objects
             except (NoObjectError, CallError, CommanderError) as error:
                 if isinstance(error, NoObjectError):
-                    self._seen.clear()
+                    self._generated.keep(self._attached)
                     if patience and not scene_was_read:
                         patience, scene_was_read = Patience(), True
                 if patience and self._gives_up(error, patience, settings):
-                    self._seen |= before
+                    self._generated.mark(before)
                     patience = None
-                before = set()
+                before = []
             rospy.rostime.wallsleep(SCENE_PERIOD_S)
 
     def _gives_up(self, error: Exception, patience: Patience, settings: GeneratorSettings) -> bool:
@@ -120,30 +129,51 @@ class TopDownGraspGenerator:
         rospy.loginfo_throttle(WAITING_PERIOD_S, f"top_down_grasp_generator: waiting, for {error}.")
         return False
 
-    def _on_demand(self, request: Any) -> TriggerResponse:
+    def _on_demand(self, refresh: bool) -> TriggerResponse:
         try:
-            return TriggerResponse(*self._signal_grasps(read_settings()))
+            settings = read_settings()
+            objects = self._resting(settings) if refresh else self._candidates(settings)
+            return TriggerResponse(*self._signal_grasps(settings, objects, refresh))
         except (NoGraspError, CallError, CommanderError) as error:
             self._publish(False, str(error))
             return TriggerResponse(False, str(error))
 
-    def _signal_grasps(self, settings: GeneratorSettings) -> tuple[bool, str]:
-        """Stores grasps and signals it, or signals that what is there cannot be grasped; returns what was signalled.
+    def _resting(self, settings: GeneratorSettings) -> list[SceneObject]:
+        """Returns the objects to grasp once they rest, or as they are when that takes too long."""
+        before, patience = self._candidates(settings), Patience()
+        while True:
+            rospy.rostime.wallsleep(SCENE_PERIOD_S)
+            objects = self._candidates(settings)
+            if at_rest(before, objects) or patience.is_used_up(rospy.get_time(), settings.scene_timeout_s):
+                return objects
+            before = objects
+
+    def _signal_grasps(self, settings: GeneratorSettings, objects: list[SceneObject],
+                       refresh: bool) -> tuple[bool, str]:
+        """Stores grasps in place of the earlier ones and signals it, or signals that what is there cannot be grasped.
+
+        Args:
+            settings: The parameters.
+            objects: What to grasp.
+            refresh: Whether grasps of objects that have not moved since are left as they are.
+
+        Returns:
+            What was signalled.
 
         Raises:
-            NoObjectError: There is nothing to grasp.
             CallError, CommanderError: Another node does not answer.
         """
-        with self._generating:  # a request by service may come while an object is looked at
+        with self._generating:  # a request by service may come while grasps of a new object are generated
+            if refresh and not self._generated.stale(objects):
+                return True, f"nothing has moved; the grasps of {sorted(found.name for found in objects)} stay"
             try:
-                grasps = self._generate(settings)
-                for number, grasp in enumerate(grasps, start=1):
-                    self._store(grasp, f"{settings.name_prefix}{number}" if settings.name_prefix else "")
+                grasps = self._generate(settings, objects)
+                self._stored.replace(grasps, settings.name_prefix)
                 success, text = True, f"{len(grasps)} grasps of {sorted({g.object_id for g in grasps})} were stored"
-            except NoObjectError:
-                raise
             except NoGraspError as error:
+                self._stored.replace([], settings.name_prefix)
                 success, text = False, str(error)
+            self._generated.mark(objects)
             self._publish(success, text)
             return success, text
 
@@ -152,8 +182,7 @@ class TopDownGraspGenerator:
         self._reason.publish(text)
         self._signal.publish(success)
 
-    def _generate(self, settings: GeneratorSettings) -> list[StandardisedGrasp]:
-        objects = self._candidates(settings)
+    def _generate(self, settings: GeneratorSettings, objects: list[SceneObject]) -> list[StandardisedGrasp]:
         ranked: list[tuple[SceneObject, TopDownGrasp]] = []
         for found in objects:
             support = max(found.bottom, settings.crop.low[2]) if settings.crop.holds(found.centre) else found.bottom
@@ -210,11 +239,6 @@ class TopDownGraspGenerator:
                                       *poses, grasp_quality=grasp.quality, hand_id=settings.hand_id,
                                       object_id=found.name)
 
-    def _store(self, grasp: StandardisedGrasp, name: str) -> None:
-        request = AddStandardisedGraspRequest(grasp_message=grasp, grasp_name=name)
-        if not call_service(self._add_grasp, request, SERVICE_TIMEOUT_S).success:
-            raise NoGraspError(f"service '{self._add_grasp.resolved_name}' refused a grasp")
-
     def _candidates(self, settings: GeneratorSettings) -> list[SceneObject]:
         """Objects to grasp: the named one, or all in the crop box.
 
@@ -238,8 +262,10 @@ class TopDownGraspGenerator:
 
     def _scene_objects(self) -> list[SceneObject]:
         components = PlanningSceneComponents(components=PlanningSceneComponents.WORLD_OBJECT_NAMES |
-                                             PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+                                             PlanningSceneComponents.WORLD_OBJECT_GEOMETRY |
+                                             PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
+        self._attached = {item.object.id for item in answer.scene.robot_state.attached_collision_objects}
         objects = []
         for message in answer.scene.world.collision_objects:
             try:

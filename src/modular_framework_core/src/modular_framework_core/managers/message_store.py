@@ -144,10 +144,11 @@ class MessageStore(Generic[MessageT]):
             del self._named[name]
             self._changed(Action.REMOVED, name)
 
-    def clear(self) -> None:
-        """Removes every message, named and anonymous."""
+    def clear(self, *, named: bool = True) -> None:
+        """Removes every anonymous message and, unless they are to stay, the named ones."""
         with self._lock:
-            self._named.clear()
+            if named:
+                self._named.clear()
             self._anonymous.clear()
             self._changed(Action.CLEARED)
 

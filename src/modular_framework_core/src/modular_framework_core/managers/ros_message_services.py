@@ -88,7 +88,8 @@ class MessageServices:
 
     Services:
         ``add_<suffix>``, ``get_<suffix>``: of the kind's types, for each of its suffixes.
-        ``remove_<suffix>`` (RemoveMessage), ``list_<plural>`` (ListMessages), ``clear_<plural>`` (std_srvs/Trigger).
+        ``remove_<suffix>`` (RemoveMessage), ``list_<plural>`` (ListMessages), ``clear_<plural>`` (std_srvs/Trigger):
+            all messages; ``clear_anonymous_<plural>`` (std_srvs/Trigger): those that wait to be read.
         ``save_<plural>``, ``load_<plural>`` (MessageFile): all messages to a file and from one.
         ``reload_<plural>`` (MessageFile): forgets everything and reads the file of named messages again, or
             another one.
@@ -118,6 +119,7 @@ class MessageServices:
         self._serve(f"remove_{last}", srv.RemoveMessage, self._remove)
         self._serve(f"list_{kind.plural}", srv.ListMessages, self._list)
         self._serve(f"clear_{kind.plural}", Trigger, self._clear)
+        self._serve(f"clear_anonymous_{kind.plural}", Trigger, self._clear_anonymous)
         for verb, work in (("save", self._save), ("load", self._load), ("reload", self._reload)):
             self._serve(f"{verb}_{kind.plural}", srv.MessageFile, work)
 
@@ -163,6 +165,10 @@ class MessageServices:
 
     def _clear(self, request: Any) -> TriggerResponse:
         self.store.clear()
+        return TriggerResponse(success=True)
+
+    def _clear_anonymous(self, request: Any) -> TriggerResponse:
+        self.store.clear(named=False)
         return TriggerResponse(success=True)
 
     def _save(self, request: Any) -> Any:
