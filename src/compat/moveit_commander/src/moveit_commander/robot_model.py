@@ -88,6 +88,15 @@ class Group:
         return self.links[-1] if self.is_chain else ""
 
 
+@dataclass(frozen=True, slots=True)
+class EndEffector:
+    """A group mounted on a link of another group; without such a group `parent_group` is empty."""
+
+    group: str
+    parent_group: str
+    parent_link: str
+
+
 class RobotModel:
     """Answers what the descriptions say; it knows nothing of the robot's present state."""
 
@@ -121,6 +130,7 @@ class RobotModel:
         self.passive = frozenset(item.get("name", "") for item in semantics.findall("passive_joint"))
         self._semantics = semantics
         self.groups = {element.get("name", ""): self._group(element) for element in semantics.findall("group")}
+        self.end_effectors = tuple(self._end_effector(item) for item in semantics.findall("end_effector"))
 
     def group(self, name: str) -> Group:
         """Answers a group; raises RobotModelError with the names there are."""
@@ -176,6 +186,14 @@ class RobotModel:
         effectors += [item for item in known if item.get("parent_link") in links]
         effector = effectors[0].get("name", "") if effectors else ""
         return Group(name, joints, links, is_chain, effector, states)
+
+    def _end_effector(self, element: ET.Element) -> EndEffector:
+        """An end effector; its parent group is the named one or, as in MoveIt, the one with the fewest joints."""
+        name, link = element.get("group", ""), element.get("parent_link", "")
+        possible = [group for group in self.groups.values() if link in group.links and group.name != name]
+        named = [group for group in possible if group.name == element.get("parent_group")]
+        chosen = min(named or possible, key=lambda group: len(group.joints), default=None)
+        return EndEffector(name, chosen.name if chosen else "", link)
 
     def _members(self, element: ET.Element, above: frozenset[str]) -> set[str]:
         """Names of a group's joints, those of its subgroups included."""

@@ -13,17 +13,19 @@ class _Node:
     """What this library added to the process: perhaps the node itself, and connections to close."""
 
     def __init__(self) -> None:
+        self._name = NODE_NAME
         self._arguments: list[str] | None = None
         self._ours = False
         self._closers: list[Callable[[], None]] = []
 
-    def remember(self, arguments: Sequence[str]) -> None:
+    def remember(self, arguments: Sequence[str], name: str) -> None:
+        self._name = name
         self._arguments = [argument for argument in arguments if not argument.startswith("__name:=")]
 
     def ensure(self) -> None:
         """Initialises a node, unless the script has its own already."""
         if not rospy.core.is_initialized():
-            rospy.init_node(NODE_NAME, argv=self._arguments, anonymous=True, disable_signals=True)
+            rospy.init_node(self._name, argv=self._arguments, anonymous=True, disable_signals=True)
             self._ours = True
 
     def on_shutdown(self, close: Callable[[], None]) -> None:
@@ -41,12 +43,12 @@ ensure_node = _node.ensure
 on_shutdown = _node.on_shutdown
 
 
-def roscpp_initialize(args: Sequence[str]) -> None:
-    """Keeps the command line for the node; a script may call rospy.init_node before or after.
+def roscpp_initialize(args: Sequence[str], node_name: str = NODE_NAME) -> None:
+    """Keeps the command line and a name for the node; a script may call rospy.init_node before or after.
 
     The node is made when the first interface is built, if the script has not called rospy.init_node by then.
     """
-    _node.remember(args)
+    _node.remember(args, node_name)
 
 
 def roscpp_shutdown() -> None:

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A planning group with messages as bytes, as MoveIt's binding offers it.
+
+A method that the commander has with the same arguments is the commander's own (`SAME`). The others differ in form only:
+messages are bytes, poses are lists, and a refused target is a False with the reason on the log.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_commander.conversions import list_to_pose, pose_to_list
+from moveit_commander.move_group import MoveGroupCommander
+from moveit_msgs.msg import (
+    Constraints,
+    Grasp,
+    PlaceLocation,
+    RobotState,
+    RobotTrajectory,
+    TrajectoryConstraints,
+)
+from sensor_msgs.msg import JointState
+
+from moveit_ros_planning_interface.serialized import accepted, read, write
+
+SAME = frozenset((
+    "allow_looking", "allow_replanning", "attach_object", "clear_max_cartesian_link_speed", "clear_path_constraints",
+    "clear_pose_target", "clear_pose_targets", "clear_trajectory_constraints", "detach_object", "forget_joint_values",
+    "get_active_joints", "get_current_joint_values", "get_current_rpy", "get_end_effector_link",
+    "get_goal_joint_tolerance", "get_goal_orientation_tolerance", "get_goal_position_tolerance", "get_jacobian_matrix",
+    "get_joint_value_target", "get_joints", "get_known_constraints", "get_name", "get_named_target_values",
+    "get_named_targets", "get_planner_id", "get_planning_frame", "get_planning_pipeline_id", "get_planning_time",
+    "get_pose_reference_frame", "get_random_joint_values", "get_remembered_joint_values", "get_variable_count",
+    "limit_max_cartesian_link_speed", "remember_joint_values", "set_constraints_database", "set_goal_joint_tolerance",
+    "set_goal_orientation_tolerance", "set_goal_position_tolerance", "set_goal_tolerance",
+    "set_max_acceleration_scaling_factor", "set_max_velocity_scaling_factor", "set_num_planning_attempts",
+    "set_planner_id", "set_planning_pipeline_id", "set_planning_time", "set_pose_reference_frame", "set_random_target",
+    "set_start_state_to_current_state", "set_support_surface_name", "stop"))
+
+
+class MoveGroupInterface:
+    """Plans and moves one planning group."""
+
+    def __init__(self, group_name: str, robot_description: str, ns: str = "", wait_for_servers: float = 5.0) -> None:
+        """Connects to move_group; raises RuntimeError if the group is unknown or move_group does not answer.
+
+        Args:
+            group_name: the planning group.
+            robot_description: parameter with the robot's URDF; SRDF and limits are beside it.
+            ns: namespace of move_group's services and of joint_states.
+            wait_for_servers: how long to wait for move_group [s]; 0: for ever.
+        """
+        self._commander = MoveGroupCommander(group_name, robot_description, ns, wait_for_servers)
+
+    def __getattr__(self, name: str) -> Any:
+        """Finds the methods that are the commander's own."""
+        if name in SAME:
+            return getattr(self._commander, name)
+        raise AttributeError(f"MoveGroupInterface has no attribute '{name}'")
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *SAME]
+
+    # ---------------------------------------------------------------- the group and its state
+    def get_variables(self) -> list[str]:
+        """Returns the names of the group's variables, mimic joints included."""
+        return self._commander._group_names()
+
+    def get_interface_description(self) -> bytes:
+        """Returns moveit_msgs/PlannerInterfaceDescription."""
+        return write(self._commander.get_interface_description())
+
+    def set_end_effector_link(self, link_name: str) -> bool:
+        """Chooses the link that poses are meant for."""
+        return accepted(self._commander.set_end_effector_link, link_name)
+
+    def start_state_monitor(self, wait: float = 1.0) -> bool:
+        """Whether every joint's state is received within `wait` [s]."""
+        return accepted(self._commander._state.positions, (), wait)
+
+    def get_current_state(self) -> bytes:
+        """Returns moveit_msgs/RobotState."""
+        return write(self._commander.get_current_state())
+
+    def get_current_state_bounded(self) -> dict[str, float]:
+        """Returns the present joint positions by name, each within its bounds [rad or m]."""
+        state = self._commander.get_current_state_bounded().joint_state
+        return dict(zip(state.name, state.position, strict=True))
+
+    def enforce_bounds(self, state: bytes) -> bytes:
+        """Returns a moveit_msgs/RobotState with each joint within its bounds."""
+        return write(self._commander.enforce_bounds(read(RobotState, state)))
+
+    def get_current_pose(self, end_effector_link: str = "") -> list[float]:
+        """Returns [x, y, z, qx, qy, qz, qw] of a link in the planning frame [m]."""
+        return pose_to_list(self._commander.get_current_pose(end_effector_link).pose)
+
+    def get_random_pose(self, end_effector_link: str = "") -> list[float]:
+        """Returns [x, y, z, qx, qy, qz, qw] of a link at random joint values [m]."""
+        return pose_to_list(self._commander.get_random_pose(end_effector_link).pose)
+
+    # ---------------------------------------------------------------- targets
+    def set_joint_value_target(self, target: Iterable[float] | Mapping[str, float] | str,
+                               value: float | Sequence[float] | None = None) -> bool:
+        """Sets a joint target: values of all variables, values by name, or a joint's name and its value."""
+        return accepted(self._commander.set_joint_value_target, target, value)
+
+    def set_joint_value_target_from_pose(self, pose: bytes, link: str, approximate: bool) -> bool:
+        """Sets the joint values that bring a link to a geometry_msgs/Pose."""
+        return accepted(self._commander.set_joint_value_target, read(Pose, pose), link, approximate)
+
+    def set_joint_value_target_from_pose_stamped(self, pose: bytes, link: str, approximate: bool) -> bool:
+        """Sets the joint values that bring a link to a geometry_msgs/PoseStamped."""
+        return accepted(self._commander.set_joint_value_target, read(PoseStamped, pose), link, approximate)
+
+    def set_joint_value_target_from_joint_state_message(self, state: bytes) -> bool:
+        """Sets the joint target of a sensor_msgs/JointState."""
+        return accepted(self._commander.set_joint_value_target, read(JointState, state))
+
+    def set_named_target(self, name: str) -> bool:
+        """Sets a joint target by its name."""
+        return accepted(self._commander.set_named_target, name)
+
+    def set_pose_target(self, pose: Sequence[float], end_effector_link: str = "") -> bool:
+        """Sets a pose target: x, y, z and roll, pitch, yaw or a quaternion xyzw [m, rad]."""
+        return accepted(self._commander.set_pose_target, pose, end_effector_link)
+
+    def set_pose_targets(self, poses: Sequence[Sequence[float]], end_effector_link: str = "") -> bool:
+        """Sets pose targets, any of which may be reached."""
+        return accepted(self._commander.set_pose_targets, poses, end_effector_link)
+
+    def set_position_target(self, x: float, y: float, z: float, end_effector_link: str = "") -> bool:
+        """Sets a position target [m]."""
+        return accepted(self._commander.set_position_target, [x, y, z], end_effector_link)
+
+    def set_rpy_target(self, roll: float, pitch: float, yaw: float, end_effector_link: str = "") -> bool:
+        """Sets an orientation target [rad]."""
+        return accepted(self._commander.set_rpy_target, [roll, pitch, yaw], end_effector_link)
+
+    def set_orientation_target(self, x: float, y: float, z: float, w: float, end_effector_link: str = "") -> bool:
+        """Sets an orientation target, a quaternion."""
+        return accepted(self._commander.set_orientation_target, [x, y, z, w], end_effector_link)
+
+    # ---------------------------------------------------------------- settings
+    def set_start_state(self, state: bytes) -> None:
+        """Lets plans start at a moveit_msgs/RobotState."""
+        self._commander.set_start_state(read(RobotState, state))
+
+    def set_workspace(self, *corners: float) -> None:
+        """Bounds the workspace: min x, y, z, max x, y, z [m]."""
+        self._commander.set_workspace(corners)
+
+    def set_path_constraints(self, name: str) -> bool:
+        """Sets path constraints by their name in the database."""
+        return accepted(self._commander.set_path_constraints, name)
+
+    def set_path_constraints_from_msg(self, constraints: bytes) -> None:
+        """Sets path constraints by a moveit_msgs/Constraints."""
+        self._commander.set_path_constraints(read(Constraints, constraints))
+
+    def get_path_constraints(self) -> bytes:
+        """Returns moveit_msgs/Constraints."""
+        return write(self._commander.get_path_constraints())
+
+    def set_trajectory_constraints_from_msg(self, constraints: bytes) -> None:
+        """Sets trajectory constraints by a moveit_msgs/TrajectoryConstraints."""
+        self._commander.set_trajectory_constraints(read(TrajectoryConstraints, constraints))
+
+    def get_trajectory_constraints(self) -> bytes:
+        """Returns moveit_msgs/TrajectoryConstraints."""
+        return write(self._commander.get_trajectory_constraints())
+
+    # ---------------------------------------------------------------- plans and motions
+    def construct_motion_plan_request(self) -> bytes:
+        """Returns moveit_msgs/MotionPlanRequest."""
+        return write(self._commander.construct_motion_plan_request())
+
+    def plan(self) -> tuple[bytes, bytes, float]:
+        """Returns moveit_msgs/MoveItErrorCodes, moveit_msgs/RobotTrajectory and the planning time [s]."""
+        _, trajectory, planning_time_s, code = self._commander.plan()
+        return write(code), write(trajectory), planning_time_s
+
+    def move(self) -> bool:
+        """Plans, moves and returns whether the group is there."""
+        return self._commander.go(wait=True)
+
+    def async_move(self) -> bool:
+        """Sends the goal to plan and move."""
+        return self._commander.go(wait=False)
+
+    def execute(self, trajectory: bytes) -> bool:
+        """Moves along a moveit_msgs/RobotTrajectory and returns whether the group is there."""
+        return self._commander.execute(read(RobotTrajectory, trajectory), wait=True)
+
+    def async_execute(self, trajectory: bytes) -> bool:
+        """Sends the goal to move along a moveit_msgs/RobotTrajectory."""
+        return self._commander.execute(read(RobotTrajectory, trajectory), wait=False)
+
+    def compute_cartesian_path(self, waypoints: Sequence[Sequence[float]], eef_step: float, avoid_collisions: bool,
+                               path_constraints: bytes | None = None) -> tuple[bytes, float]:
+        """Follows straight lines; returns moveit_msgs/RobotTrajectory and the share that was found, in [0, 1]."""
+        constraints = None if path_constraints is None else read(Constraints, path_constraints)
+        path, share = self._commander.compute_cartesian_path(waypoints, eef_step, avoid_collisions=avoid_collisions,
+                                                             path_constraints=constraints)
+        return write(path), share
+
+    def retime_trajectory(self, state: bytes, trajectory: bytes, velocity_scaling_factor: float,
+                          acceleration_scaling_factor: float, algorithm: str) -> bytes:
+        """Returns the moveit_msgs/RobotTrajectory with new times."""
+        return write(self._commander.retime_trajectory(read(RobotState, state), read(RobotTrajectory, trajectory),
+                                                       velocity_scaling_factor, acceleration_scaling_factor, algorithm))
+
+    # ---------------------------------------------------------------- objects
+    def pick(self, object_name: str, grasps: bytes | Sequence[bytes] | bool = (), plan_only: bool = False) -> int:
+        """Picks an object by one of some moveit_msgs/Grasp; returns the error code.
+
+        Args:
+            object_name: the object's id.
+            grasps: one grasp or several; a bool stands for `plan_only`, and grasps are planned then.
+            plan_only: whether nothing moves.
+        """
+        if isinstance(grasps, bool):
+            return self._commander.pick(object_name, [], grasps)
+        given = [grasps] if isinstance(grasps, bytes) else grasps
+        return self._commander.pick(object_name, [read(Grasp, grasp) for grasp in given], plan_only)
+
+    def place(self, object_name: str, location: bytes | Sequence[float] | bool = False,
+              plan_only: bool = False) -> bool:
+        """Places an object.
+
+        Args:
+            object_name: the object's id.
+            location: a moveit_msgs/PlaceLocation, or a pose as a list in the pose reference frame [m]; a bool stands
+                for `plan_only`, and the object is placed anywhere then.
+            plan_only: whether nothing moves.
+        """
+        if isinstance(location, bool):
+            return self._commander.place(object_name, None, location)
+        if isinstance(location, bytes):
+            return self._commander.place(object_name, read(PlaceLocation, location), plan_only)
+        return self._commander.place(object_name, list_to_pose(location), plan_only)
+
+    def place_poses_list(self, object_name: str, poses: Sequence[bytes], plan_only: bool = False) -> bool:
+        """Places an object at one of some geometry_msgs/PoseStamped."""
+        return self._commander.place(object_name, [read(PoseStamped, pose) for pose in poses], plan_only)
+
+    def place_locations_list(self, object_name: str, locations: Sequence[bytes], plan_only: bool = False) -> bool:
+        """Places an object at one of some moveit_msgs/PlaceLocation."""
+        return self._commander.place(object_name, [read(PlaceLocation, place) for place in locations], plan_only)
