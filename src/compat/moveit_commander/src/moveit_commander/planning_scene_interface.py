@@ -40,11 +40,11 @@ class PlanningSceneInterface:
         ensure_node()
         self._servers = Servers(ns)
         self._synchronous = synchronous
-        self._objects: Any = None
-        self._attachments: Any = None
+        self._pub_co: Any = None
+        self._pub_aco: Any = None
         if not synchronous:
-            self._objects = rospy.Publisher(ns_join(ns, "collision_object"), CollisionObject, queue_size=100)
-            self._attachments = rospy.Publisher(ns_join(ns, "attached_collision_object"), AttachedCollisionObject,
+            self._pub_co = rospy.Publisher(ns_join(ns, "collision_object"), CollisionObject, queue_size=100)
+            self._pub_aco = rospy.Publisher(ns_join(ns, "attached_collision_object"), AttachedCollisionObject,
                                                 queue_size=100)
 
     def add_object(self, collision_object: CollisionObject) -> None:
@@ -201,7 +201,7 @@ class PlanningSceneInterface:
     def _submit(self, item: CollisionObject | AttachedCollisionObject) -> None:
         attached = isinstance(item, AttachedCollisionObject)
         if not self._synchronous:
-            (self._attachments if attached else self._objects).publish(item)
+            (self._pub_aco if attached else self._pub_co).publish(item)
             return
         scene = PlanningScene(is_diff=True)
         scene.robot_state.is_diff = True
