@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import rospy
-
 from moveit_commander import conversions
 from moveit_commander.exception import MoveItCommanderException
 
