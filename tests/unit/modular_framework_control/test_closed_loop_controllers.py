@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,7 +20,7 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
-from modular_framework_control.pid import Pid, read_pid
+from modular_framework_control.pid import Pid, PidGains, read_pid
 from modular_framework_control.plugins import CONTROLLER_BASE, Plugin, PluginIndex
 from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
 from modular_framework_control.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectoryTicket
@@ -197,7 +198,7 @@ def test_a_joint_controller_takes_one_joint(make_loop: Callable[..., Any]) -> No
 
 
 def test_the_integral_is_bounded_and_forgotten() -> None:
-    pid = Pid(1.0, i=2.0, d=0.5, i_min=-0.3, i_max=0.3)
+    pid = Pid(PidGains(1.0, i=2.0, d=0.5, i_clamp_min=-0.3, i_clamp_max=0.3))
     assert pid.command(0.1, 0.2, 0.5) == pytest.approx(0.1 + 0.1 + 0.1)
     assert pid.command(10.0, 0.0, 1.0) == pytest.approx(10.0 + 0.3)
     assert pid.command(math.nan, 0.0, 1.0) == 0.0
@@ -205,10 +206,24 @@ def test_the_integral_is_bounded_and_forgotten() -> None:
     assert pid.command(0.0, 0.0, 1.0) == 0.0
 
 
+def test_gains_that_change_make_no_jump_of_what_was_added_up() -> None:
+    pid = Pid(PidGains(0.0, i=1.0, i_clamp_min=-5.0, i_clamp_max=5.0))
+    for _ in range(100):
+        pid.command(1.0, 0.0, 1.0)      # wound up to 100, of which 5 are used
+    pid.gains = PidGains(0.0, i=0.5, i_clamp_min=-50.0, i_clamp_max=50.0)
+    assert pid.command(0.0, 0.0, 1.0) == 5.0
+    pid.gains = PidGains(0.0, i=0.0, i_clamp_min=-50.0, i_clamp_max=50.0)
+    pid.command(1.0, 0.0, 100.0)
+    pid.gains = PidGains(0.0, i=10.0, i_clamp_min=-50.0, i_clamp_max=50.0)
+    assert pid.command(0.0, 0.0, 1.0) == 0.0, "what was added up while the integral was off is not used"
+    pid.gains = replace(pid.gains, i_clamp_max=2.0)
+    assert pid.command(1.0, 0.0, 1.0) == 2.0
+
+
 @pytest.mark.parametrize("gain", [2.0, -2.0])
 def test_against_windup_the_sum_stops_at_the_bound(gain: float) -> None:
     def recovered(antiwindup: bool) -> float:
-        pid = Pid(0.0, i=gain, i_min=-1.0, i_max=1.0, antiwindup=antiwindup)
+        pid = Pid(PidGains(0.0, i=gain, i_clamp_min=-1.0, i_clamp_max=1.0, antiwindup=antiwindup))
         for _ in range(50):
             pid.command(1.0, 0.0, 1.0)
         return pid.command(-0.25, 0.0, 1.0)
@@ -219,7 +234,7 @@ def test_against_windup_the_sum_stops_at_the_bound(gain: float) -> None:
 
 def test_gains_are_read_with_their_bounds() -> None:
     pid = read_pid(MappingNodeHandle({"p": 1, "i": 2.0, "i_clamp": 3.0, "i_clamp_min": -1.0}))
-    assert (pid.p, pid.i, pid.d, pid.i_min, pid.i_max, pid.antiwindup) == (1.0, 2.0, 0.0, -1.0, 3.0, False)
+    assert pid.gains == PidGains(1.0, 2.0, 0.0, -1.0, 3.0, False)
     with pytest.raises(ParameterError, match="/g/p is not set"):
         read_pid(MappingNodeHandle({}, "/g"))
 

@@ -22,7 +22,7 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
-        self._pids = [read_pid(controller_nh.child(f"gains/{name}")) for name in self.joint_names]
+        self.pids = {f"gains/{name}": read_pid(controller_nh.child(f"gains/{name}")) for name in self.joint_names}
         forward = controller_nh.child("velocity_ff")
         self._velocity_ff = [read_number(forward, name, 0.0, None) for name in self.joint_names]
         return True
@@ -31,14 +31,14 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
         self._command_rest()
 
     def _command_rest(self) -> None:
-        for handle, pid in zip(self._handles, self._pids, strict=True):
+        for handle, pid in zip(self._handles, self.pids.values(), strict=True):
             pid.reset()
             handle.command = 0.0
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
         for handle, pid, forward, velocity, position_error, velocity_error in zip(
-                self._handles, self._pids, self._velocity_ff, desired[VELOCITY].tolist(), error[POSITION].tolist(),
-                error[VELOCITY].tolist(), strict=True):
+                self._handles, self.pids.values(), self._velocity_ff, desired[VELOCITY].tolist(),
+                error[POSITION].tolist(), error[VELOCITY].tolist(), strict=True):
             handle.command = forward * velocity + pid.command(position_error, velocity_error, period_s)
 
 

@@ -8,10 +8,13 @@ knows is the time it is given there, so that it behaves alike under simulated an
 """
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from modular_framework_control.hardware_interface import HardwareInterface
 from modular_framework_control.node_handle import NodeHandle
+from modular_framework_control.pid import Pid
 from modular_framework_control.robot_hw import RobotHW
 
 
@@ -26,10 +29,13 @@ class Controller:
         interface_class: the hardware interface this controller works on.
         robot_hw: the hardware, set before `init`, for who needs another interface besides; what is asked of any of its
             interfaces in `init` is claimed for this controller.
+        pids: set by `init` of those that have gains, by the namespace, below the controller's name, in which the gains
+            are found and can be adjusted while the controller runs.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]]
     robot_hw: RobotHW = RobotHW()
+    pids: Mapping[str, Pid] = MappingProxyType({})
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         """Get the joint handles and read the parameters.

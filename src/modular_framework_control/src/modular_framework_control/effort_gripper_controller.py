@@ -22,7 +22,9 @@ class EffortGripperActionController(GripperActionController):
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
-        self._pid = read_pid(controller_nh.child(f"gains/{self._handle.name}"))
+        gains = f"gains/{self._handle.name}"
+        self._pid = read_pid(controller_nh.child(gains))
+        self.pids = {gains: self._pid}
         return True
 
     def starting(self, time_s: float) -> None:

@@ -19,7 +19,7 @@ from modular_framework_control.hardware_interface import (
 )
 from modular_framework_control.joint_limits import JointLimits, limits_from_urdf
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names
-from modular_framework_control.pid import Pid, read_pid
+from modular_framework_control.pid import PidGains, read_pid
 
 CYCLES_A_REPORT = 10
 
@@ -36,7 +36,7 @@ class JointControlSnapshot:
         process_value_dot: how fast that changes; 0 where it is not measured.
         error: what the gains made the command of.
         command: to the joint.
-        pid: the gains.
+        gains: what the command was made with.
     """
 
     time_s: float
@@ -46,7 +46,7 @@ class JointControlSnapshot:
     process_value_dot: float
     error: float
     command: float
-    pid: Pid
+    gains: PidGains
 
 
 class JointCommandController(Controller):
@@ -191,7 +191,8 @@ class GainsController(_Zeroing):
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
         where = ["pid"] if self.single else [f"{name}/pid" for name in self.joint_names]
-        self._pids: list[Pid] = [read_pid(controller_nh.child(name)) for name in where]
+        self.pids = {name: read_pid(controller_nh.child(name)) for name in where}
+        self._pids = list(self.pids.values())
         return True
 
     def update(self, time_s: float, period_s: float) -> None:
@@ -200,7 +201,7 @@ class GainsController(_Zeroing):
         if self.single and self.on_state is not None and self._cycles % CYCLES_A_REPORT == 0:
             value, rate = self._measured()
             self.on_state(JointControlSnapshot(time_s, period_s, self._wanted[0], value, rate, self._error,
-                                               self._handles[0].command, self._pids[0]))
+                                               self._handles[0].command, self._pids[0].gains))
 
     def _measured(self) -> tuple[float, float]:
         """What is controlled of the first joint, and how fast it changes."""

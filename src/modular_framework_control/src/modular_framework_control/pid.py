@@ -3,29 +3,47 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+
+
+@dataclass(frozen=True, slots=True)
+class PidGains:
+    """Gains under the names of control_toolbox.
+
+    Attributes:
+        p: command per error.
+        i: command per error and second.
+        d: command per rate of the error.
+        i_clamp_min: smallest command of the integral's part, at most 0.
+        i_clamp_max: largest command of the integral's part, at least 0.
+        antiwindup: stop to add up where the bound is reached, instead of bounding only what comes out.
+    """
+
+    p: float
+    i: float = 0.0
+    d: float = 0.0
+    i_clamp_min: float = 0.0
+    i_clamp_max: float = 0.0
+    antiwindup: bool = False
 
 
 class Pid:
     """Proportional, integral and derivative gain, with a bound on the integral's part of the command.
 
     Args:
-        p: command per error.
-        i: command per error and second.
-        d: command per rate of the error.
-        i_min: smallest command of the integral's part, at most 0.
-        i_max: largest command of the integral's part, at least 0.
-        antiwindup: stop to add up where the bound is reached, instead of bounding only what comes out.
+        gains: what it begins with.
+
+    Attributes:
+        gains: what it goes by; may be replaced, from any thread, at any time. The integral's part of the command goes
+            on from where it is.
     """
 
-    __slots__ = ("p", "i", "d", "i_min", "i_max", "antiwindup", "_sum")
+    __slots__ = ("gains", "_gains", "_sum")
 
-    def __init__(self, p: float, i: float = 0.0, d: float = 0.0, i_min: float = 0.0, i_max: float = 0.0,
-                 antiwindup: bool = False) -> None:
-        self.p, self.i, self.d = p, i, d
-        self.i_min, self.i_max = i_min, i_max
-        self.antiwindup = antiwindup
+    def __init__(self, gains: PidGains) -> None:
+        self.gains = self._gains = gains
         self._sum = 0.0
 
     def reset(self) -> None:
@@ -43,14 +61,27 @@ class Pid:
         Returns:
             p * error + i * (sum of error * period), bounded, + d * error_rate; 0 for an error that is no number.
         """
+        if self.gains is not self._gains:
+            self._change_gains()
+        gains = self._gains
         if not (math.isfinite(error) and math.isfinite(error_rate)):
             return 0.0
         total = self._sum + error * max(0.0, period_s)
-        if self.antiwindup and self.i != 0.0:
-            ends = sorted((self.i_min / self.i, self.i_max / self.i))
+        if gains.antiwindup and gains.i != 0.0:
+            ends = sorted((gains.i_clamp_min / gains.i, gains.i_clamp_max / gains.i))
             total = min(max(total, ends[0]), ends[1])
         self._sum = total
-        return self.p * error + min(max(self.i * total, self.i_min), self.i_max) + self.d * error_rate
+        return gains.p * error + _integral_part(gains, total) + gains.d * error_rate
+
+    def _change_gains(self) -> None:
+        """Take the new gains over; a sum that the old ones left unused does not become a command."""
+        part = _integral_part(self._gains, self._sum)
+        self._gains = self.gains
+        self._sum = part / self._gains.i if self._gains.i != 0.0 else 0.0
+
+
+def _integral_part(gains: PidGains, total: float) -> float:
+    return min(max(gains.i * total, gains.i_clamp_min), gains.i_clamp_max)
 
 
 def read_pid(gains_nh: NodeHandle) -> Pid:
@@ -67,4 +98,4 @@ def read_pid(gains_nh: NodeHandle) -> Pid:
     clamp = abs(read_number(gains_nh, "i_clamp", 0.0, None))
     i_min = -abs(read_number(gains_nh, "i_clamp_min", -clamp, None))
     i_max = abs(read_number(gains_nh, "i_clamp_max", clamp, None))
-    return Pid(p, i, d, i_min, i_max, read_bool(gains_nh, "antiwindup", False))
+    return Pid(PidGains(p, i, d, i_min, i_max, read_bool(gains_nh, "antiwindup", False)))

@@ -51,10 +51,11 @@ class JointCommandEdge:
 
 def joint_control_to_msg(snapshot: JointControlSnapshot, ahead_s: float) -> JointControllerState:
     """What a controller of one joint did; its stamp is `ahead_s` [s] ahead of the loop's time."""
-    pid = snapshot.pid
+    gains = snapshot.gains
     message = JointControllerState(
         set_point=snapshot.set_point, process_value=snapshot.process_value,
         process_value_dot=snapshot.process_value_dot, error=snapshot.error, time_step=snapshot.period_s,
-        command=snapshot.command, p=pid.p, i=pid.i, d=pid.d, i_clamp=pid.i_max, antiwindup=pid.antiwindup)
+        command=snapshot.command, p=gains.p, i=gains.i, d=gains.d, i_clamp=gains.i_clamp_max,
+        antiwindup=gains.antiwindup)
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     return message

@@ -38,6 +38,7 @@ from modular_framework_control.ros_action_server import ControllerActionServer, 
 from modular_framework_control.ros_command_edges import JointCommandEdge
 from modular_framework_control.ros_mobile_base import DiffDriveTopics
 from modular_framework_control.ros_outbox import Outbox
+from modular_framework_control.ros_reconfiguration import Adjustable, Reconfiguration
 from modular_framework_control.ros_sensor_edges import SensorEdge
 from modular_framework_control.sensor_controllers import SensorController
 from modular_framework_control.trajectory_goal import (
@@ -47,6 +48,14 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
+
+PID_GAINS = (
+    Adjustable("p", -1e5, 1e5, "command per error"),
+    Adjustable("i", -1e5, 1e5, "command per error and second"),
+    Adjustable("d", -1e3, 1e3, "command per rate of the error"),
+    Adjustable("i_clamp_min", -1e5, 0.0, "smallest part of the integral in the command"),
+    Adjustable("i_clamp_max", 0.0, 1e5, "largest part of the integral in the command"),
+    Adjustable("antiwindup", False, True, "stop to add up errors at the bounds of the integral"))
 
 
 class JointStateEdge:
@@ -164,10 +173,10 @@ _EDGES: tuple[tuple[type[Controller], Any], ...] = (
 
 def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox,
                loop_time: LoopTime) -> Callable[[], None]:
-    """Open the topics, actions and services of a controller.
+    """Open the topics, actions and services of a controller, and dynamic_reconfigure of its gains.
 
     Args:
-        controller: an initialised controller; one of a class unknown here gets none.
+        controller: an initialised controller; one of a class unknown here gets the latter only.
         namespace: absolute namespace of the robot.
         name: name of the controller.
         outbox: thread that talks to ROS for the control loop.
@@ -176,8 +185,13 @@ def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox
     Returns:
         What closes them.
     """
-    for controller_class, edge_class in _EDGES:
-        if isinstance(controller, controller_class):
-            close: Callable[[], None] = edge_class(controller, namespace, name, outbox, loop_time).close
-            return close
-    return lambda: None
+    with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+        for controller_class, edge_class in _EDGES:
+            if isinstance(controller, controller_class):
+                opened.callback(edge_class(controller, namespace, name, outbox, loop_time).close)
+                break
+        for below, pid in controller.pids.items():
+            gains = Reconfiguration(join_names(namespace, f"{name}/{below}"), PID_GAINS, pid, "gains")
+            opened.callback(gains.close)
+            gains.connect()
+        return opened.pop_all().close

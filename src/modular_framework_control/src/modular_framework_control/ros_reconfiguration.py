@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import rospy
+from dynamic_reconfigure.server import Server
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,19 @@ class Adjustable:
         return isinstance(value, type(self.lowest) | int) and self.lowest <= value <= self.highest
 
 
+class _Server(Server):
+    """A server that refuses values that are not finite: public servers take NaN, and the bound instead of infinity."""
+
+    def _clamp(self, config: Any) -> None:
+        for name, present in self.type.defaults.items():
+            present = self.config.get(name, present)
+            if not math.isfinite(config[name]):
+                rospy.logerr("%s%s: got %s; allowed is %s to %s; %s stays", rospy.resolve_name(self.ns) + "/", name,
+                             config[name], self.type.min[name], self.type.max[name], present)
+                config[name] = present
+        super()._clamp(config)
+
+
 class Reconfiguration:
     """Serves NAMESPACE/{set_parameters, parameter_descriptions, parameter_updates}."""
 
@@ -46,21 +60,15 @@ class Reconfiguration:
         """
         self._namespace, self._table = namespace, tuple(table)
         self._holder, self._attribute = holder, attribute
-        self._server: Any = None
+        self._server: _Server | None = None
 
     def connect(self) -> None:
-        """Starts to serve. A set-up without the Python package dynamic_reconfigure goes without, and says so."""
-        try:
-            from dynamic_reconfigure.server import Server
-        except ImportError as error:
-            rospy.logwarn("%s cannot be adjusted while the node runs: %s; install python3-dynamic-reconfigure",
-                          rospy.resolve_name(self._namespace), error)
-            return
+        """Starts to serve."""
         settings = getattr(self._holder, self._attribute)
         defaults = {item.name: getattr(settings, item.name) for item in self._table}
         for name, value in defaults.items():  # the server reads them, and knows no faulty ones
             rospy.set_param(f"{self._namespace}/{name}", value)
-        self._server = Server(described(self._table, defaults), self._adjust, self._namespace)
+        self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
 
     def close(self) -> None:
         """Ends to serve; may be called twice."""
@@ -72,12 +80,6 @@ class Reconfiguration:
 
     def _adjust(self, config: Any, _level: int) -> Any:
         present = getattr(self._holder, self._attribute)
-        for item in self._table:
-            if not math.isfinite(config[item.name]):  # passes every comparison with a bound
-                rospy.logerr("%s/%s: got %s; allowed is %s of %s to %s; %s stays", rospy.resolve_name(self._namespace),
-                             item.name, config[item.name], item.kind, item.lowest, item.highest,
-                             getattr(present, item.name))
-                config[item.name] = getattr(present, item.name)
         changed = {item.name: config[item.name] for item in self._table
                    if getattr(present, item.name) != config[item.name]}
         if changed:
