@@ -5,6 +5,7 @@ The `RobotHW` makes one handle per thing and keeps it; reading and writing it is
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 Vector = tuple[float, float, float]
@@ -97,6 +98,30 @@ class PosVelAccJointHandle(PosVelJointHandle):
     def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
         super().__init__(state, command, supports_max_effort)
         self.command_acceleration = 0.0
+
+
+class ActuatorHandle:
+    """One actuator, beyond the transmission that moves a joint; see `RobotTransmissions`.
+
+    Attributes:
+        name: as in the <transmission> of the robot description.
+        position: measured [rad] or [m]; the `RobotHW` writes it in `read()`, as velocity and effort.
+        velocity: measured [rad/s] or [m/s].
+        effort: measured [Nm] or [N].
+        command_position: what the joints' position commands make of it [rad] or [m]; NaN while there is none.
+        command_velocity: likewise of velocity commands [rad/s] or [m/s].
+        command_effort: likewise of effort commands [Nm] or [N].
+    """
+
+    __slots__ = ("name", "position", "velocity", "effort", "command_position", "command_velocity", "command_effort")
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.position = self.velocity = self.effort = 0.0
+        self.command_position = self.command_velocity = self.command_effort = math.nan
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, position={self.position:.6g})"
 
 
 class SpeedScalingHandle:

@@ -15,6 +15,7 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
 from modular_framework_control.node_handle import NodeHandle, ParameterError, read_bool, read_number
+from modular_framework_control.urdf_xml import parse_description
 
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
@@ -86,10 +87,7 @@ def soft_limits_from_urdf(robot_description: str) -> dict[str, SoftJointLimits]:
 
 
 def _movable_joints(robot_description: str) -> dict[str, ElementTree.Element]:
-    try:
-        root = ElementTree.fromstring(robot_description)
-    except ElementTree.ParseError as error:
-        raise ParameterError(f"robot_description: not well-formed XML ({error})") from error
+    root = parse_description(robot_description)
     return {joint.get("name", ""): joint for joint in root.findall("joint")
             if joint.get("type") in ("revolute", "prismatic", "continuous")}
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_control.urdf_xml import parse_description
 
 Array = npt.NDArray[np.float64]
 
@@ -31,10 +32,7 @@ class WheelGeometry:
         if not isinstance(description, str):
             raise ParameterError(f"{self._where} is not set, and {wanted_for} is looked up there; load the robot "
                                  f"description, or set {wanted_for} in the controller's parameters")
-        try:
-            root = ElementTree.fromstring(description)
-        except ElementTree.ParseError as error:
-            raise ParameterError(f"{self._where}: not well-formed XML ({error}); {self._remedy}") from error
+        root = parse_description(description, self._where)
         self._joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
         self._links = {link.get("name", ""): link for link in root.findall("link")}
 
