@@ -126,7 +126,7 @@ def place_of(pose: PoseStamped) -> list[float]:
 
 # ---------------------------------------------------------------- the robot
 def test_the_robot(robot: RobotCommander) -> None:
-    assert robot.get_robot_name() == "panda" and robot.get_planning_frame() == "world"
+    assert robot.get_robot_name() == "panda" and robot.get_planning_frame() == "panda_link0"
     assert robot.get_root_link() == "panda_link0"
     assert robot.get_group_names() == ["hand", "panda_arm", "panda_arm_hand"] and robot.has_group("hand")
     assert robot.get_active_joint_names("panda_arm") == [f"panda_joint{number}" for number in range(1, 8)]
@@ -149,7 +149,8 @@ def test_a_joint_and_a_link(robot: RobotCommander) -> None:
 
 # ---------------------------------------------------------------- a group: what it knows and is told
 def test_what_a_group_knows(arm: MoveGroupCommander) -> None:
-    assert arm.get_name() == "panda_arm" and arm.get_planning_frame() == "world" and arm.get_variable_count() == 7
+    assert arm.get_name() == "panda_arm" and arm.get_planning_frame() == "panda_link0"
+    assert arm.get_variable_count() == 7
     assert arm.get_active_joints() == [f"panda_joint{number}" for number in range(1, 8)]
     assert set(arm.get_active_joints()) <= set(arm.get_joints())
     assert arm.has_end_effector_link() and arm.get_end_effector_link() == "panda_link8"
@@ -164,7 +165,7 @@ def test_what_a_group_knows(arm: MoveGroupCommander) -> None:
     assert arm.get_current_rpy()[0] == pytest.approx(math.pi, abs=1e-2) or arm.get_current_rpy()[0] < -3.1
     assert arm.get_current_state_bounded().joint_state.name == arm.get_current_state().joint_state.name
     assert arm.enforce_bounds(arm.get_current_state()).joint_state.name
-    assert len(arm.get_random_joint_values()) == 7 and arm.get_random_pose().header.frame_id == "world"
+    assert len(arm.get_random_joint_values()) == 7 and arm.get_random_pose().header.frame_id == "panda_link0"
     assert np.array(arm.get_jacobian_matrix(READY)).shape == (6, 7)
     assert arm.get_known_constraints() == []
 

@@ -42,10 +42,10 @@ def test_joints_come_depth_first_from_the_root(model: RobotModel) -> None:
     assert model.planning_frame == model.root_link == "base"
 
 
-def test_a_virtual_joint_gives_the_planning_frame() -> None:
+def test_the_root_link_is_the_planning_frame_below_a_virtual_joint_too() -> None:
     virtual = '<virtual_joint name="floor" type="fixed" parent_frame="map" child_link="base"/>'
     model = RobotModel(URDF, SRDF.replace("VIRTUAL", virtual))
-    assert model.planning_frame == "map" and next(iter(model.joints)) == "floor"
+    assert model.planning_frame == "base" and next(iter(model.joints)) == "floor"
 
 
 def test_groups_are_chains_links_and_other_groups(model: RobotModel) -> None:

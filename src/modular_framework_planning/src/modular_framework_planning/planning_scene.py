@@ -235,7 +235,7 @@ class PlanningScene:
         from pinocchio import SE3
 
         frame = frame.removeprefix("/")
-        if frame in ("", self.model.planning_frame, self.model.document.root_link):
+        if frame in ("", self.model.planning_frame):
             return SE3.Identity()
         if self.model.has_link(frame):
             return self.model.link_transforms(self.positions if positions is None else positions)[frame]
@@ -245,7 +245,7 @@ class PlanningScene:
         if found is None:
             found = self.fixed_frames.get(frame)  # last: what finds objects may call a frame of tf as the object
         if found is None:
-            known = [self.model.planning_frame, *self.model.frame_ids, *self._body_frames(), *self.fixed_frames]
+            known = [*self.model.frame_ids, *self._body_frames(), *self.fixed_frames]
             raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)
         return found
 

@@ -99,12 +99,11 @@ class RobotModel:
         self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
 
     def _planning_frame(self) -> str:
+        """The root link, as in MoveIt: where a fixed virtual joint's parent frame is, tf says, as of every frame."""
         for joint in self.semantics.virtual_joints:
-            if joint.child_link == self.document.root_link:
-                if joint.kind != "fixed":
-                    raise ModelError(f"SRDF virtual_joint '{joint.name}': type '{joint.kind}'; only 'fixed' is "
-                                     "supported, a moving base needs its own joints in the URDF")
-                return joint.parent_frame
+            if joint.child_link == self.document.root_link and joint.kind != "fixed":
+                raise ModelError(f"SRDF virtual_joint '{joint.name}': type '{joint.kind}'; only 'fixed' is "
+                                 "supported, a moving base needs its own joints in the URDF")
         return self.document.root_link
 
     def _joint_limits(self, entries: Mapping[str, Any]) -> dict[str, JointLimits]:

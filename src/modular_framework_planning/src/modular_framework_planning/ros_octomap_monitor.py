@@ -163,7 +163,7 @@ class OctomapMonitor:
 
     def _pose_in_planning_frame(self, frame: str, stamp: rospy.Time, positions: Array) -> Transform:
         frame, model = frame.removeprefix("/"), self._monitor.model
-        if frame in ("", model.planning_frame, model.document.root_link):
+        if not frame:
             return pin.SE3.Identity()
         if model.has_link(frame):
             return model.link_transforms(positions)[frame]

@@ -35,10 +35,9 @@ class TfFrames:
             return self._known
         heard = set(self._buffer._getFrameStrings())  # tf2's Python interface has no other list of frames
         model, known = self._model, self._known
-        base = model.planning_frame if model.planning_frame in heard else model.document.root_link
         fresh = {}
-        for name in heard - {base, model.planning_frame, *model.frame_ids}:
-            place, old = self._place(base, name), known.get(name)
+        for name in heard - model.frame_ids.keys():
+            place, old = self._place(model.planning_frame, name), known.get(name)
             if place is not None:
                 fresh[name] = old if old is not None and old.isApprox(place, SAME) else place
         if any(known.get(name) is not place for name, place in fresh.items()):

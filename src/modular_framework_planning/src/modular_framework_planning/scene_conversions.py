@@ -188,7 +188,7 @@ def fixed_frames_from(scene: PlanningScene, transforms: Sequence[Any]) -> dict[s
     for item in transforms:
         t, q = item.transform.translation, item.transform.rotation
         pose = make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"fixed frame '{item.child_frame_id}'")
-        if not scene.model.has_link(item.child_frame_id) and item.child_frame_id != scene.model.planning_frame:
+        if not scene.model.has_link(item.child_frame_id):
             frames[item.child_frame_id] = scene.frame_transform(item.header.frame_id) * pose
     return frames
 

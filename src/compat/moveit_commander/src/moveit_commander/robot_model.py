@@ -122,7 +122,7 @@ class RobotModel:
             raise RobotModelError(f"URDF '{self.name}': {len(roots)} links have no parent joint; exactly one may")
         self.root_link = roots[0]
         root_joint = _root_joint(semantics, self.root_link)
-        self.planning_frame = root_joint.parent or self.root_link
+        self.planning_frame = self.root_link  # as in MoveIt, also below a fixed virtual joint
         ordered = [root_joint, *_depth_first(tree.values(), self.root_link)]
         self.joints = {joint.name: joint for joint in ordered}
         self.links = tuple(joint.child for joint in ordered)
