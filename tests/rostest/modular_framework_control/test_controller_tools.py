@@ -2,6 +2,7 @@
 """The command-line tools for controllers, run as a user runs them."""
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import time
@@ -22,7 +23,7 @@ LAUNCH = """
     states: {type: joint_state_controller/JointStateController}
     arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}
     jog: {type: position_controllers/JointPositionController, joint: shoulder}
-    controller_groups: {follow: [states, arm], teach: [states, jog]}
+    controller_groups: {follow: [states, arm], teach: [states, jog], clash: [jog, arm]}
   </rosparam>
   <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
     <rosparam>{joints: [shoulder, elbow]}</rosparam>
@@ -32,8 +33,12 @@ LAUNCH = """
 
 
 @pytest.fixture(scope="module")
-def tool(ros_launch: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
-    session = ros_launch(LAUNCH)
+def session(ros_launch: Callable[..., Any]) -> Any:
+    return ros_launch(LAUNCH)
+
+
+@pytest.fixture(scope="module")
+def tool(session: Any) -> Iterator[Callable[..., Any]]:
     started: list[subprocess.Popen[str]] = []
 
     def start(name: str, *arguments: str) -> subprocess.Popen[str]:
@@ -79,6 +84,34 @@ def test_the_spawner_waits_spawns_and_cleans_up_at_its_end(tool: Callable[..., A
     assert states() == {}
 
 
+def kill_node(session: Any, name: str) -> None:
+    subprocess.run(["rosnode", "kill", name], env=session.env, check=True, timeout=60.0)
+
+
+@pytest.mark.parametrize("how", ["SIGTERM", "rosnode kill"])
+def test_spawner_and_unspawner_clean_up_however_they_are_ended(tool: Callable[..., Any], session: Any,
+                                                               how: str) -> None:
+    def end(process: subprocess.Popen[str], name: str) -> str:
+        if how == "SIGTERM":
+            process.send_signal(signal.SIGTERM)
+        else:
+            kill_node(session, name)
+        code, output = run(process)
+        assert code == 0 and "waited" not in output, output
+        return output
+
+    spawner = tool("spawner", "states", "arm", "__name:=my_spawner")
+    wait_until({"states": "running", "arm": "running"})
+    unspawner = tool("unspawner", "arm", "__name:=my_unspawner")
+    wait_until({"states": "running", "arm": "stopped"})
+    end(unspawner, "/my_unspawner")
+    assert states() == {"states": "running", "arm": "running"}
+    output = end(spawner, "/my_spawner")
+    assert states() == {}
+    for text in ("Shutting down spawner. Stopping and unloading controllers...", "Succeeded in unloading states"):
+        assert text in output, output
+
+
 def test_an_unspawner_keeps_controllers_stopped_and_starts_them_at_its_end(tool: Callable[..., Any]) -> None:
     unspawner = tool("unspawner", "arm")
     spawner = tool("spawner", "arm", "states")
@@ -111,26 +144,33 @@ def test_a_spawner_starts_what_it_can_and_tells_what_it_cannot(tool: Callable[..
 
 def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
     assert run(tool("controller_manager", "list")) == (0, "No controllers are loaded in mechanism control\n")
-    assert run(tool("controller_manager", "spawn", "states")) == (0, "Loaded states\nStarted ['states'] successfully\n")
+    assert run(tool("controller_manager", "spawn", "states")) == (
+        0, "Loaded 'states'\nStarted ['states'] successfully\n")
     code, output = run(tool("controller_manager", "list"))
     assert (code, output) == (0, "'states' - 'hardware_interface::JointStateInterface' ( running )\n")
     assert "position_controllers/JointTrajectoryController" in run(tool("controller_manager", "list-types"))[1]
     assert run(tool("controller_manager", "reload-libraries", "--restore"))[0] == 0
     assert states() == {"states": "running"}
     assert run(tool("controller_manager", "kl", "states")) == (0, "Stopped ['states'] successfully\n"
-                                                               "Unloaded states successfully\n")
+                                                               "Unloaded 'states' successfully\n")
     assert states() == {}
 
 
 def test_groups_are_listed_started_and_exchanged(tool: Callable[..., Any]) -> None:
-    assert run(tool("controller_group", "list")) == (0, "Number of groups: 2\n  follow\n      states\n      arm\n"
-                                                        "  teach\n      states\n      jog\n")
-    assert run(tool("controller_group", "spawn", "follow"))[0] == 0
+    assert run(tool("controller_group", "list")) == (
+        0, "Number of groups: 3\n  clash\n      jog\n      arm\n  follow\n      states\n      arm\n"
+           "  teach\n      states\n      jog\n")
+    assert run(tool("controller_group", "spawn", "follow")) == (
+        0, "Loaded 'states'\nLoaded 'arm'\nStarted ['states'] successfully\nStarted ['arm'] successfully\n")
     assert states() == {"states": "running", "arm": "running"}
-    assert run(tool("controller_group", "switch", "teach")) == (0, "started: jog; stopped: arm\n")
+    assert run(tool("controller_group", "switch", "teach")) == (0, "Loaded 'jog'\nStarted ['jog'] successfully\n"
+                                                                "Stopped ['arm'] successfully\n")
+    assert states() == {"states": "running", "arm": "stopped", "jog": "running"}
+    code, output = run(tool("controller_group", "switch", "clash"))
+    assert code == 0 and "Error when starting ['arm'] and stopping ['states']\n" in output
     assert states() == {"states": "running", "arm": "stopped", "jog": "running"}
     code, output = run(tool("controller_group", "switch", "absent"))
-    assert code == 1 and "known groups: follow, teach" in output
+    assert code == 1 and "known groups: clash, follow, teach" in output
 
 
 def test_statistics_of_the_controllers_are_published(tool: Callable[..., Any]) -> None:
@@ -154,7 +194,7 @@ def test_a_spawner_that_waits_for_its_manager_can_be_ended(tool: Callable[..., A
         process.wait(1.0)
     process.send_signal(signal.SIGINT)
     code, output = run(process)
-    assert code == 1 and "told to end while waiting" in output
+    assert code == 1 and "ended while waiting for service /elsewhere" in output
 
 
 def test_a_spawner_has_patience_with_a_simulation_whose_clock_has_not_begun(tool: Callable[..., Any]) -> None:
@@ -172,7 +212,8 @@ def test_a_spawner_has_patience_with_a_simulation_whose_clock_has_not_begun(tool
         clock.unregister()
     finally:
         rospy.delete_param("/use_sim_time")
-    assert code == 1 and "waited 1 s for service" in output
+    waited = re.search(r"waited (\d+) s for service /elsewhere/controller_manager/list_controllers in vain", output)
+    assert code == 1 and waited is not None and int(waited[1]) >= 3, "what is said is how long it really waited"
 
 
 def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import rospy
 
+from modular_framework_control import ros_controller_manager_interface as interface
 from modular_framework_control.ros_controller_manager_client import (
     ControllerManagerClient,
     ControllerManagerClientError,
@@ -82,11 +83,14 @@ def _bring_up(groups: Groups, group: str, client: ControllerManagerClient, switc
     states = {entry.name: entry.state for entry in client.list_controllers()}
     plan = plan_group(groups, group, states)
     for name in plan.load:
-        client.load(name)
-    stop = plan.stop if switch else ()
-    if plan.start or stop:
-        client.switch(plan.start, stop)
-    print(f"started: {', '.join(plan.start) or 'none'}; stopped: {', '.join(stop) or 'none'}")
+        if not interface.load_controller(name, client):
+            raise ControllerManagerClientError(f"{'Cancel group switching' if switch else 'Group not spawned'}: "
+                                               f"controller '{name}' of group '{group}' was not loaded")
+    if switch:
+        interface.start_stop_controllers(plan.start, plan.stop, client)
+        return
+    for name in plan.start:
+        interface.start_controller(name, client)
 
 
 def controller_group_main() -> int:

@@ -21,11 +21,13 @@ from controller_manager_msgs.srv import (
 
 from modular_framework_control.node_handle import join_names
 
-LAST_CALLS_TIMEOUT_S = 2.0
-
 
 class ControllerManagerClientError(Exception):
     """The controller manager is not there, does not answer, or refused."""
+
+
+class RefusedError(ControllerManagerClientError):
+    """The controller manager has answered that it does not do what it was asked for."""
 
 
 class ControllerManagerClient:
@@ -33,7 +35,7 @@ class ControllerManagerClient:
 
     Args:
         namespace: namespace of the robot; "" for that of the node.
-        timeout_s: how long to wait for a service [s of real time]; infinite waits for ever.
+        timeout_s: how long to wait for a service [s of real time]; infinite waits for ever, 0 not at all.
         ended: set when nobody waits any more.
         await_clock: whether the time counts only from when the simulated clock, if it is to be used, has begun.
     """
@@ -46,8 +48,8 @@ class ControllerManagerClient:
         self._await_clock = await_clock
 
     def last_calls(self) -> ControllerManagerClient:
-        """A client for what is to be done at the end; it waits for a service that has gone for a short while only."""
-        return ControllerManagerClient(self.namespace, LAST_CALLS_TIMEOUT_S)
+        """A client for what is to be done at the end; it does not wait for a service that has gone."""
+        return ControllerManagerClient(self.namespace, timeout_s=0.0)
 
     def load(self, name: str) -> None:
         """Load a controller."""
@@ -81,25 +83,34 @@ class ControllerManagerClient:
 
     def _ask(self, service: str, kind: Any, failure: str, *arguments: Any) -> None:
         if not self._call(service, kind, *arguments).ok:
-            raise ControllerManagerClientError(f"{failure}; the log of the controller manager says why")
+            raise RefusedError(f"{failure}; the log of the controller manager says why")
 
     def _call(self, service: str, kind: Any, *arguments: Any) -> Any:
         name = join_names(self.namespace, f"controller_manager/{service}")
         proxy = rospy.ServiceProxy(name, kind)
-        deadline = time.monotonic() + self._timeout_s
+        if self._timeout_s > 0.0:
+            self._wait_for(proxy, name)
+        try:
+            return proxy(*arguments)
+        except rospy.ServiceException as error:
+            raise ControllerManagerClientError(f"service {name} failed: {error}") from error
+
+    def _wait_for(self, proxy: rospy.ServiceProxy, name: str) -> None:
+        begun_s = deadline_s = time.monotonic()
+        deadline_s += self._timeout_s
         while True:
             try:
                 proxy.wait_for_service(timeout=0.2)
-                return proxy(*arguments)
-            except rospy.ServiceException as error:
-                raise ControllerManagerClientError(f"service {name} failed: {error}") from error
+                return
             except rospy.ROSException as error:
-                if self._ended.is_set():
-                    raise ControllerManagerClientError(f"told to end while waiting for service {name}") from error
-                if self._await_clock and _simulation_is_starting() and not rospy.is_shutdown():
-                    deadline = time.monotonic() + self._timeout_s
-                elif time.monotonic() > deadline or rospy.is_shutdown():
-                    raise ControllerManagerClientError(f"waited {self._timeout_s:.0f} s for service {name} in vain; is "
+                now_s = time.monotonic()
+                if self._ended.is_set() or rospy.is_shutdown():
+                    raise ControllerManagerClientError(f"ended while waiting for service {name}, after "
+                                                       f"{now_s - begun_s:.0f} s") from error
+                if self._await_clock and _simulation_is_starting():
+                    deadline_s = now_s + self._timeout_s
+                elif now_s > deadline_s:
+                    raise ControllerManagerClientError(f"waited {now_s - begun_s:.0f} s for service {name} in vain; is "
                                                        "the simulation or the hardware's node running?") from error
 
 

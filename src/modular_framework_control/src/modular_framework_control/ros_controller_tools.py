@@ -16,11 +16,13 @@ import yaml
 from controller_manager_msgs.srv import SwitchControllerRequest
 from std_msgs.msg import Bool
 
+from modular_framework_control import ros_controller_manager_interface as interface
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_controller_manager_client import (
     ControllerManagerClient,
     ControllerManagerClientError,
 )
+from modular_framework_control.ros_shutdown import hold_shutdown
 
 INHIBIT_PERIOD_S = 1.0
 
@@ -73,6 +75,7 @@ def _run(parser: argparse.ArgumentParser, name: str,
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     rospy.init_node(name, anonymous=True, disable_signals=True)
+    finished = hold_shutdown(ended)
     timeout_s = math.inf if arguments.no_timeout or arguments.timeout <= 0.0 else arguments.timeout
     try:
         arguments.files = [Path(argument) for argument in arguments.controllers if Path(argument).is_file()]
@@ -83,6 +86,7 @@ def _run(parser: argparse.ArgumentParser, name: str,
         rospy.logerr("%s", error)
         return 1
     finally:
+        finished.set()
         rospy.signal_shutdown("done")
     return 0
 
@@ -132,7 +136,7 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
                 rospy.loginfo("Started controllers: %s", ", ".join(loaded))
             else:
                 failed += loaded
-        _wait_for_end(ended)
+        ended.wait()
     finally:
         _clean_up(client.last_calls(), loaded)
     if failed:
@@ -160,11 +164,16 @@ def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
     """Stop and unload what was loaded; a manager that has gone meanwhile needs no cleaning."""
     if not loaded:
         return
+    rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
     try:
         states = {entry.name: entry.state for entry in client.list_controllers()}
+        rospy.loginfo("Stopping all controllers...")
         client.switch([], [name for name in loaded if states.get(name) == "running"])
+        rospy.loginfo("Unloading all loaded controllers...")
         for name in reversed(loaded):
+            rospy.loginfo("Trying to unload %s", name)
             client.unload(name)
+            rospy.loginfo("Succeeded in unloading %s", name)
     except ControllerManagerClientError as error:
         rospy.logwarn("controllers not unloaded: %s", error)
 
@@ -172,7 +181,7 @@ def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
 def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
     inhibited: dict[str, None] = {}
     try:
-        while not ended.is_set() and not rospy.is_shutdown():
+        while not ended.is_set():
             running = [entry.name for entry in client.list_controllers()
                        if entry.name in arguments.controllers and entry.state == "running"]
             if running:
@@ -183,11 +192,6 @@ def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, end
     finally:
         if inhibited:
             client.last_calls().switch(list(inhibited), [], SwitchControllerRequest.BEST_EFFORT)
-
-
-def _wait_for_end(ended: threading.Event) -> None:
-    while not ended.wait(0.2) and not rospy.is_shutdown():
-        pass
 
 
 def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> None:
@@ -204,14 +208,12 @@ def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> 
 
 
 _SHORT_COMMANDS = {"lc": "list", "lt": "list-types", "sp": "spawn", "kl": "kill"}
-_Step = tuple[Callable[[ControllerManagerClient, str], None], str, str]
-_LOAD: _Step = (lambda client, name: client.load(name), "Loaded {}", "loading {}")
-_UNLOAD: _Step = (lambda client, name: client.unload(name), "Unloaded {} successfully", "unloading {}")
-_START: _Step = (lambda client, name: client.switch([name], []), "Started ['{}'] successfully", "starting ['{}']")
-_STOP: _Step = (lambda client, name: client.switch([], [name]), "Stopped ['{}'] successfully", "stopping ['{}']")
+_Step = Callable[[str, ControllerManagerClient], bool]
 _PER_CONTROLLER: dict[str, tuple[_Step, ...]] = {
-    "load": (_LOAD,), "unload": (_UNLOAD,), "start": (_START,), "stop": (_STOP,), "spawn": (_LOAD, _START),
-    "kill": (_STOP, _UNLOAD)}
+    "load": (interface.load_controller,), "unload": (interface.unload_controller,),
+    "start": (interface.start_controller,), "stop": (interface.stop_controller,),
+    "spawn": (interface.load_controller, interface.start_controller),
+    "kill": (interface.stop_controller, interface.unload_controller)}
 
 
 def _command(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
@@ -219,39 +221,13 @@ def _command(client: ControllerManagerClient, arguments: argparse.Namespace, end
     if arguments.command in _PER_CONTROLLER:
         if not arguments.controllers:
             raise ControllerManagerClientError(f"{arguments.command}: name at least one controller")
-        for action, done, failing in _PER_CONTROLLER[arguments.command]:
-            for name in arguments.controllers:
-                try:
-                    action(client, name)
-                except ControllerManagerClientError:
-                    print(f"Error when {failing.format(name)}")
-                    raise
-                print(done.format(name))
+        done = [step(name, client) for step in _PER_CONTROLLER[arguments.command] for name in arguments.controllers]
+        if not all(done):
+            raise ControllerManagerClientError(f"{arguments.command}: not done for all of: "
+                                               f"{', '.join(arguments.controllers)}")
     elif arguments.command == "list":
-        _list(client)
+        interface.list_controllers(client)
     elif arguments.command == "list-types":
-        print("\n".join(client.list_controller_types()))
-    else:
-        _reload(client, arguments.restore)
-
-
-def _list(client: ControllerManagerClient) -> None:
-    states = client.list_controllers()
-    if not states:
-        print("No controllers are loaded in mechanism control")
-    for state in states:
-        interfaces = "+".join(dict.fromkeys(claim.hardware_interface for claim in state.claimed_resources))
-        print(f"'{state.name}' - '{interfaces}' ( {state.state} )")
-
-
-def _reload(client: ControllerManagerClient, restore: bool) -> None:
-    print("Restore:", restore)
-    before = client.list_controllers()
-    client.reload_libraries(force_kill=True)
-    print("Successfully reloaded libraries")
-    if not restore:
-        return
-    for state in before:
-        client.load(state.name)
-    client.switch([state.name for state in before if state.state == "running"], [])
-    print("Controllers restored to original state")
+        interface.list_controller_types(client)
+    elif not interface.reload_libraries(True, arguments.restore, client):
+        raise ControllerManagerClientError("reload-libraries: not done")

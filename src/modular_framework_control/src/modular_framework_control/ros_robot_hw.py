@@ -27,6 +27,7 @@ from modular_framework_control.ros_controller_manager import RosControllerManage
 from modular_framework_control.ros_hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
 from modular_framework_control.ros_loop_report import LoopReport
 from modular_framework_control.ros_node_handle import RosNodeHandle
+from modular_framework_control.ros_shutdown import hold_shutdown
 
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
@@ -261,6 +262,7 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
     rospy.init_node("robot_hw", disable_signals=True)
+    finished = hold_shutdown(ended)
     node: RobotHwNode | None = None
     try:
         node = RobotHwNode(ended)
@@ -273,4 +275,5 @@ def main() -> int:
     finally:
         if node is not None:
             node.close()
+        finished.set()
         rospy.signal_shutdown("the control loop has ended")

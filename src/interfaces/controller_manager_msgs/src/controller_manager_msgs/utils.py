@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds controller managers, and among their controllers those with a name, type, state, interface or resources.
+
+The functions and classes are those of the public module of this name, which graphical tools and user scripts import.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import rosgraph
+import rospy
+import rosservice
+
+from controller_manager_msgs.msg import ControllerState
+from controller_manager_msgs.srv import ListControllers
+
+LIST_SERVICE = "list_controllers"
+MANAGER_SERVICES = {
+    LIST_SERVICE: "controller_manager_msgs/ListControllers",
+    "list_controller_types": "controller_manager_msgs/ListControllerTypes",
+    "load_controller": "controller_manager_msgs/LoadController",
+    "unload_controller": "controller_manager_msgs/UnloadController",
+    "switch_controller": "controller_manager_msgs/SwitchController",
+    "reload_controller_libraries": "controller_manager_msgs/ReloadControllerLibraries",
+}
+"""Type of each service that a controller manager has, by the service's name in the manager's namespace."""
+
+
+def get_controller_managers(namespace: str = "/", initial_guess: Sequence[str] | None = None) -> list[str]:
+    """Namespaces of the controller managers that run, sorted.
+
+    Args:
+        namespace: where to look for them.
+        initial_guess: result of an earlier call; of the namespaces in it only the presence of one service is checked,
+            which spares the master most questions.
+    """
+    known = set(initial_guess or ())
+    return sorted(candidate for candidate in _namespaces_that_list_controllers(namespace)
+                  if candidate in known or is_controller_manager(candidate))
+
+
+def is_controller_manager(namespace: str) -> bool:
+    """Whether `namespace` has all services of a controller manager, each of the right type."""
+    return all(rosservice.get_service_type(f"{namespace.rstrip('/')}/{name}") == service_type
+               for name, service_type in MANAGER_SERVICES.items())
+
+
+def _namespaces_that_list_controllers(namespace: str) -> set[str]:
+    try:
+        services = rosservice.get_service_list(namespace=namespace)
+    except rosservice.ROSServiceIOException:   # no master: nothing runs
+        return set()
+    return {service[:-len(LIST_SERVICE)].rstrip("/") or "/" for service in services
+            if service.rpartition("/")[2] == LIST_SERVICE}
+
+
+class ControllerManagerLister:
+    """Called without arguments, it gives the namespaces of the controller managers that run below one namespace.
+
+    It remembers its last answer, so that repeated calls are cheap.
+
+    Args:
+        namespace: where to look for them.
+    """
+
+    def __init__(self, namespace: str = "/") -> None:
+        self._namespace = namespace
+        self._last: list[str] = []
+
+    def __call__(self) -> list[str]:
+        self._last = get_controller_managers(self._namespace, self._last)
+        return list(self._last)
+
+
+class ControllerLister:
+    """Called without arguments, it gives the loaded controllers of one manager; none when the manager does not answer.
+
+    Args:
+        namespace: namespace of the controller manager.
+    """
+
+    def __init__(self, namespace: str = "/controller_manager") -> None:
+        self._service_name = f"{namespace.rstrip('/')}/{LIST_SERVICE}"
+        self._service: Any = None
+
+    def __call__(self) -> list[ControllerState]:
+        for _ in range(2):   # the kept connection ends with the manager, and a new manager may be there
+            try:
+                if self._service is None:
+                    self._service = rospy.ServiceProxy(self._service_name, ListControllers, persistent=True)
+                controllers: list[ControllerState] = self._service().controller
+                return controllers
+            except (rospy.ServiceException, rospy.ROSException, OSError):
+                self.close()
+        return []
+
+    def close(self) -> None:
+        """Close the connection; the next call opens another one."""
+        service, self._service = self._service, None
+        if service is not None:
+            service.close()
+
+
+def filter_by_name(ctrl_list: Iterable[ControllerState], ctrl_name: str,
+                   match_substring: bool = False) -> list[ControllerState]:
+    """The controllers of that name, or with it in their name."""
+    return _filter(ctrl_list, lambda controller: _matches(controller.name, ctrl_name, match_substring))
+
+
+def filter_by_type(ctrl_list: Iterable[ControllerState], ctrl_type: str,
+                   match_substring: bool = False) -> list[ControllerState]:
+    """The controllers of that type, or with it in their type."""
+    return _filter(ctrl_list, lambda controller: _matches(controller.type, ctrl_type, match_substring))
+
+
+def filter_by_state(ctrl_list: Iterable[ControllerState], ctrl_state: str,
+                    match_substring: bool = False) -> list[ControllerState]:
+    """The controllers in that state, or with it in the name of their state."""
+    return _filter(ctrl_list, lambda controller: _matches(controller.state, ctrl_state, match_substring))
+
+
+def filter_by_hardware_interface(ctrl_list: Iterable[ControllerState], hardware_interface: str,
+                                 match_substring: bool = False) -> list[ControllerState]:
+    """The controllers that claim resources of that hardware interface, or of one with it in its name."""
+    return _filter(ctrl_list, lambda controller: any(
+        _matches(claim.hardware_interface, hardware_interface, match_substring)
+        for claim in controller.claimed_resources))
+
+
+def filter_by_resources(ctrl_list: Iterable[ControllerState], resources: Iterable[str],
+                        hardware_interface: str | None = None, match_any: bool = False) -> list[ControllerState]:
+    """The controllers that claim these resources through one hardware interface.
+
+    Args:
+        ctrl_list: the controllers.
+        resources: names of joints or other resources.
+        hardware_interface: the interface; any one when None.
+        match_any: whether one of the resources is enough; otherwise all of them must be claimed.
+    """
+    wanted = set(resources)
+
+    def claims(controller: ControllerState) -> bool:
+        claimed = [set(claim.resources) for claim in controller.claimed_resources
+                   if hardware_interface in (None, claim.hardware_interface)]
+        return any(wanted & names if match_any else wanted <= names for names in claimed)
+
+    return _filter(ctrl_list, claims)
+
+
+def _matches(value: str, wanted: str, match_substring: bool) -> bool:
+    return wanted in value if match_substring else wanted == value
+
+
+def _filter(controllers: Iterable[ControllerState],
+            fits: Callable[[ControllerState], bool]) -> list[ControllerState]:
+    return [controller for controller in controllers if fits(controller)]
+
+
+def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
+    """Names below `namespace` whose parameters have a `type` of their own, as those of controllers do; sorted."""
+    prefix = f"{namespace.rstrip('/')}/"
+    names = rosgraph.Master(rospy.get_name()).getParamNames()
+    below = [name[len(prefix):].split("/") for name in names if name.startswith(prefix)]
+    return sorted(parts[0] for parts in below if len(parts) == 2 and parts[1] == "type")
