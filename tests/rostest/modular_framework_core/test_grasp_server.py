@@ -158,9 +158,18 @@ def test_fingers_that_stall_where_they_began_have_grasped_nothing(gripper: FakeG
     before = gripper.published
     while gripper.published < before + 10:  # until joint states tell of this position
         time.sleep(0.02)
-    state, flags, text, _ = send(client, GraspCommand.GRASP_STATE, grasp())
+    state, flags, text, _ = send(client, GraspCommand.GRASP_STATE, grasp(torques=(0.01,)))
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
     assert "the fingers have not moved" in text
+
+
+def test_fingers_that_stall_where_they_began_hold_something_with_a_torque_that_moved_them_before(
+        gripper: FakeGripper, client) -> None:
+    gripper.position, gripper.obstacle = 0.0, float("inf")
+    assert send(client, GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED
+    gripper.obstacle = gripper.position
+    state, flags, text, _ = send(client, GraspCommand.GRASP_STATE, grasp())
+    assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
 
 
 def test_fingers_that_close_on_nothing_have_grasped_nothing(gripper: FakeGripper, client) -> None:

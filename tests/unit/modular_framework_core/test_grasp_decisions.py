@@ -12,12 +12,12 @@ from modular_framework_core.grasp_server import (
     effort_limits,
     judge,
     posture_targets,
-    proved,
     refuse_no_effort,
     torque_intensities,
     torque_share,
 )
 from modular_framework_core.robot_groups import RobotModelError, read_group, read_joints
+from modular_framework_core.stall_evidence import Attempt, StallEvidence
 
 URDF = """<robot name="r"><link name="base"/><link name="l1"/><link name="l2"/>
 <link name="palm"/><link name="f1"/><link name="f2"/>
@@ -120,28 +120,51 @@ def test_torque_intensities_are_told_by_joint_and_none_are_none() -> None:
 STALL = Outcome({"f": 0.4}, True, "so said the controller")
 
 
-@pytest.mark.parametrize(("outcome", "begun", "held"), [
-    (STALL, 0.38, None), (Outcome({"f": 0.4}, True, pressing=True), 0.4, None),
-    (STALL, 0.4, Outcome({"f": 0.41}, True))])
+def close(begun: dict[str, float], effort: float | None = 0.5) -> Attempt:
+    return Attempt(begun, {"f": 1.94}, {} if effort is None else {"f": effort})
+
+
+def held_at(position: float) -> StallEvidence:
+    evidence = StallEvidence(0.05)
+    assert evidence.judge(Outcome({"f": position}, True, pressing=True), close({"f": position})).stalled
+    return evidence
+
+
+@pytest.mark.parametrize(("outcome", "begun", "evidence"), [
+    (STALL, 0.38, StallEvidence(0.05)), (Outcome({"f": 0.4}, True, pressing=True), 0.4, StallEvidence(0.05)),
+    (STALL, 0.4, held_at(0.41))])
 def test_fingers_that_moved_or_press_or_go_on_holding_were_stopped_by_something(outcome: Outcome, begun: float,
-                                                                                 held: Outcome | None) -> None:
-    assert proved(outcome, {"f": begun}, {"f": 1.94}, 0.05, held) is outcome
+                                                                                 evidence: StallEvidence) -> None:
+    assert evidence.judge(outcome, close({"f": begun})) is outcome
 
 
-@pytest.mark.parametrize(("begun", "held"), [
-    ({"f": 0.4}, None), ({"f": 0.395}, None), ({"f": 0.8}, None), ({}, None), ({"f": 0.4}, Outcome({"f": 0.6}, True)),
-    ({}, Outcome({"f": 0.4}, True))])
-def test_fingers_that_never_moved_hold_nothing(begun: dict[str, float], held: Outcome | None) -> None:
-    outcome = proved(STALL, begun, {"f": 1.94}, 0.05, held)
+@pytest.mark.parametrize(("begun", "evidence"), [
+    ({"f": 0.4}, StallEvidence(0.05)), ({"f": 0.395}, StallEvidence(0.05)), ({"f": 0.8}, StallEvidence(0.05)),
+    ({}, StallEvidence(0.05)), ({"f": 0.4}, held_at(0.6)), ({}, held_at(0.4))])
+def test_fingers_that_never_moved_hold_nothing(begun: dict[str, float], evidence: StallEvidence) -> None:
+    outcome = evidence.judge(STALL, close(begun))
     verdict = judge(Stage.GRASP, {"f": 1.94}, outcome, CLOSED, 0.05)
     assert not verdict.reached
     assert "have not moved" in verdict.reason and "so said the controller" in verdict.reason
 
 
+@pytest.mark.parametrize(("earlier", "effort", "stopped"), [
+    (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.5, True), (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), None, True),
+    (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.4, False),   # less than what moved them
+    (Attempt({"f": 0.0}, {"f": 0.4}, {}), 0.5, False),           # moved by whatever the controller gave
+    (Attempt({"f": 0.9}, {"f": 0.4}, {"f": 0.5}), 0.5, False),   # moved the other way
+    (Attempt({"f": 0.399}, {"f": 0.4}, {"f": 0.5}), 0.5, False)])
+def test_fingers_that_touch_an_object_from_the_beginning_grasp_it_with_a_torque_that_moved_them(
+        earlier: Attempt, effort: float | None, stopped: bool) -> None:
+    evidence = StallEvidence(0.05)
+    evidence.judge(Outcome({"f": 0.4}, False), earlier)
+    assert evidence.judge(STALL, close({"f": 0.4}, effort)).stalled is stopped
+
+
 def test_of_several_joints_one_that_is_short_of_its_target_must_have_moved() -> None:
     outcome, targets = Outcome({"f": 0.4, "h": 1.0}, True), {"f": 1.9, "h": 1.0}
-    assert not proved(outcome, {"f": 0.4, "h": 0.0}, targets, 0.05, None).stalled
-    assert proved(outcome, {"f": 0.1, "h": 1.0}, targets, 0.05, None).stalled
+    for begun, stopped in (({"f": 0.4, "h": 0.0}, False), ({"f": 0.1, "h": 1.0}, True)):
+        assert StallEvidence(0.05).judge(outcome, Attempt(begun, targets, {})).stalled is stopped
 
 
 @pytest.mark.parametrize(("stage", "target", "position", "stalled", "reached", "why"), [

@@ -25,7 +25,8 @@ CATALOGUE = StateCatalogue([STATES, EXAMPLES])
 NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_")]
 EXPECTED = {"wait_for_signal", "select", "plan", "move", "grasp", "allow_manipulator_collisions", "execute_trajectory",
             "cartesian_move", "gripper", "call_service", "call_action", "wait", "wait_for_message", "counter",
-            "reinitialise_managers", "store", "load", "spawn_object", "delete_object", "set_planner", "log_metric"}
+            "reinitialise_managers", "store", "load", "spawn_object", "delete_object", "set_planner", "log_metric",
+            "release"}
 
 
 def test_all_promised_states_are_there() -> None:

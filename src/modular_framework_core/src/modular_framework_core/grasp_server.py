@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 from modular_framework_core.robot_groups import Group, RobotModelError
 
 CLOSED_STATE = "closed"
-MOVED_SHARE = 0.2
-"""Fingers have moved when they came farther than this share of the tolerance."""
 
 
 class GraspCommandError(ValueError):
@@ -184,36 +182,6 @@ def refuse_no_effort(name: str, effort: float) -> None:
     if effort == 0.0:
         raise GraspCommandError(f"joint '{name}' is to move with no torque, allowed is more than 0 (max_torque x its "
                                 "torque intensity, which is 0 or too small); give the grasp more of either")
-
-
-def proved(outcome: Outcome, begun: Mapping[str, float], targets: Mapping[str, float], tolerance: float,
-           held: Outcome | None) -> Outcome:
-    """Takes a stall for one only when it was no lack of torque that kept the fingers from moving.
-
-    Args:
-        outcome: What the controller says.
-        begun: {joint: position} before the motion.
-        targets: {joint: position} commanded.
-        tolerance: Greatest distance that counts as reached [rad or m]; it has to be a small share of the joints'
-            ranges, since neither how far they came nor whether they are shut can be told within it.
-        held: The stall before this motion, which fingers that still stand there need not prove anew.
-
-    Returns:
-        The outcome; not stalled, and with the reason, when no joint that is short of its target has moved toward it,
-        presses, or goes on holding.
-    """
-    if not outcome.stalled or outcome.pressing:
-        return outcome
-    if held is not None and all(abs(held.positions.get(name, math.inf) - begun.get(name, math.inf)) <= tolerance
-                                for name in targets):
-        return outcome
-    came = [math.copysign(1.0, target - outcome.positions[name]) * (outcome.positions[name] - begun[name])
-            for name, target in targets.items() if name in begun and name in outcome.positions
-            and abs(target - outcome.positions[name]) > tolerance]
-    if max(came, default=0.0) > MOVED_SHARE * tolerance:
-        return outcome
-    return replace(outcome, stalled=False, text="the fingers have not moved, so nothing shows that something stopped "
-                   f"them; give them more torque, or begin farther open{'; ' + outcome.text if outcome.text else ''}")
 
 
 def closed_positions(group: Group) -> dict[str, float]:

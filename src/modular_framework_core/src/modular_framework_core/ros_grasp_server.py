@@ -17,7 +17,6 @@ from modular_framework_core.grasp_server import (
     effort_limits,
     judge,
     posture_targets,
-    proved,
     torque_intensities,
     torque_share,
 )
@@ -25,6 +24,7 @@ from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback,
 from modular_framework_core.robot_groups import Group, RobotModelError, read_group
 from modular_framework_core.ros_calls import CallError, wait_until
 from modular_framework_core.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
+from modular_framework_core.stall_evidence import Attempt, StallEvidence
 
 FEEDBACK_PERIOD_S = 0.1
 MODEL_TIMEOUT_S = 60.0
@@ -56,7 +56,7 @@ class GraspServer:
         self._lock = threading.Lock()
         self._motion_lock = threading.Lock()
         self._stops: dict[str, threading.Event] = {}
-        self._held: Outcome | None = None
+        self._evidence = StallEvidence(self._tolerance)
 
     def connect(self, action_name: str) -> None:
         """Connects the manipulator and offers the action."""
@@ -120,9 +120,8 @@ class GraspServer:
         efforts = effort_limits(targets, intensities, self._group, share, stage)
         motion = Motion(targets, efforts, self._timeout_s, stop.is_set)
         begun = self._manipulator.joint_state(targets)
-        outcome = proved(self._move(handle, motion), dict(zip(begun.name, begun.position, strict=True)), targets,
-                         self._tolerance, self._held)
-        self._held = outcome if outcome.stalled else None
+        attempt = Attempt(dict(zip(begun.name, begun.position, strict=True)), targets, efforts)
+        outcome = self._evidence.judge(self._move(handle, motion), attempt)
         return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)
 
     def _move(self, handle: Any, motion: Motion) -> Outcome:

@@ -9,7 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import rospkg
 from scipy.spatial import ConvexHull, QhullError
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.robot_description import mesh_path
+from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 
 Array = npt.NDArray[np.float64]
 
@@ -126,16 +131,12 @@ def _around_sphere(radius: float) -> Array:
 
 
 def _mesh_vertices(shape: ElementTree.Element) -> Array:
-    import rospkg
-
-    from modular_framework_simulation.errors import DescriptionError
-    from modular_framework_simulation.mesh_files import load_mesh
-    from modular_framework_simulation.robot_description import mesh_path
-    from modular_framework_simulation.sdf_specs import Mesh
-
-    uri = shape.get("filename", "")
+    uri, text = shape.get("filename", ""), shape.get("scale", "1 1 1")
     try:
-        x, y, z = _numbers(shape, "scale", "1 1 1")
-        return load_mesh(Mesh(mesh_path("a finger", uri, rospkg.RosPack().get_path), (x, y, z))).vertices
-    except DescriptionError as error:
+        x, y, z = (float(value) for value in text.split())
+    except ValueError as error:
+        raise ShapeError(f"is the mesh '{uri}' with the scale '{text}', allowed are three numbers") from error
+    try:
+        return read_mesh(mesh_path("a finger", uri, rospkg.RosPack().get_path), (x, y, z)).vertices
+    except (DescriptionError, MeshError) as error:
         raise ShapeError(f"is the mesh '{uri}', which cannot be used: {error}") from error

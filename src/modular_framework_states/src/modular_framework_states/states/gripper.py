@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import rospy
-
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.option_limits import Finite, Positive, Share
-from modular_framework_core.robot_groups import RobotModelError, read_group
-from modular_framework_states.grasp_goals import GraspGoalError, send
+from modular_framework_core.robot_groups import RobotModelError
+from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
+from modular_framework_states.manipulator_postures import posture_grasp, posture_positions
 
 
 class Gripper(FrameworkState):
@@ -37,37 +35,17 @@ class Gripper(FrameworkState):
         if bool(posture) == bool(positions):
             raise ValueError("Gripper: give either posture or positions")
         self._posture, self._positions = posture, dict(positions or {})
-        self._stage = "grasp" if grip else "pregrasp"
+        self._stage: Stage = "grasp" if grip else "pregrasp"
         self._torque, self._timeout_s = float(torque), float(timeout)
 
     def execute(self, userdata: Any) -> str:
         """Moves the fingers."""
         wanted = self._posture or ", ".join(f"{joint} {position}" for joint, position in self._positions.items())
         try:
-            positions = self._positions or self._positions_of_posture()
-            grasp = _grasp_with(positions, self._torque)
+            positions = self._positions or posture_positions(self._posture)
+            grasp = posture_grasp(positions, self._torque)
             send(userdata.manipulator_controller_client, self._stage, grasp, userdata.max_torque, self._timeout_s,
                  self.preempt_requested)
         except (RobotModelError, GraspGoalError) as error:
             return self.fail(f"gripper to {wanted}: {error}")
         return self.succeed()
-
-    def _positions_of_posture(self) -> dict[str, float]:
-        values = {name: str(rospy.get_param(name, "")) for name in
-                  ("manipulator_group_name", "robot_description", "robot_description_semantic")}
-        missing = [rospy.resolve_name(name) for name, value in values.items() if not value]
-        if missing:
-            raise RobotModelError(f"the parameters {', '.join(missing)} are not set; load the robot first")
-        group = read_group(values["robot_description"], values["robot_description_semantic"],
-                           values["manipulator_group_name"])
-        if self._posture not in group.states:
-            raise RobotModelError(f"group '{group.name}' has no state '{self._posture}'; it has "
-                                  f"{', '.join(group.states) or 'none'}")
-        return group.states[self._posture]
-
-
-def _grasp_with(positions: Mapping[str, float], torque: float) -> Any:
-    """Makes a grasp message whose stages all have one posture."""
-    pose = generate_pose_stamped_message("world", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-    values = list(positions.values())
-    return get_standardised_grasp(list(positions), values, values, values, [torque] * len(values), pose, pose, pose)

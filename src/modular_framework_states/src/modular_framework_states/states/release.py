@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lets a task let go of what the manipulator holds."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_limits import Positive
+from modular_framework_core.robot_groups import RobotModelError
+from modular_framework_core.ros_calls import CallError, wait_until
+from modular_framework_states.grasp_goals import GraspGoalError, send
+from modular_framework_states.held_objects import detach, held_objects
+from modular_framework_states.manipulator_postures import posture_grasp, posture_positions
+
+SIMULATION_PARAMETER = "simulation"
+SCENE_PERIOD_S = 0.1
+
+
+class Release(FrameworkState):
+    """Opens the manipulator wide and lets go; positive once the fingers are open and nothing is attached to it.
+
+    The simulation detaches an object in the planning scene when the fingers have left it, which is waited for. Without
+    a simulation nobody sees that, so the object is detached here.
+
+    Args:
+        posture: Name of a state of the manipulator's planning group, as wide as it opens.
+        timeout: Longest wait for the end of the motion, and again for the simulation to let go [s].
+        outcomes: First positive, last negative.
+        input_keys: Userdata that is read.
+        output_keys: Userdata that is written.
+        io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
+    """
+
+    def __init__(self, posture: str = "open", timeout: Positive = 30.0,
+                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
+                 output_keys: Sequence[str] = (),
+                 io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        self._posture, self._timeout_s = posture, float(timeout)
+
+    def execute(self, userdata: Any) -> str:
+        """Opens the fingers and detaches what they held."""
+        try:
+            grasp = posture_grasp(posture_positions(self._posture), 1.0)
+            send(userdata.manipulator_controller_client, "pregrasp", grasp, userdata.max_torque, self._timeout_s,
+                 self.preempt_requested)
+            if rospy.get_param(SIMULATION_PARAMETER, False) is True:
+                wait_until(lambda: self.preempt_requested() or not held_objects(), self._timeout_s, SCENE_PERIOD_S)
+            elif held := held_objects():
+                detach(held)
+            if self.preempt_requested():
+                return self.stopped()
+            left = held_objects()
+        except (RobotModelError, GraspGoalError, CallError) as error:
+            return self.fail(f"release by the posture '{self._posture}': {error}")
+        if left:
+            return self.fail(f"the fingers are open ('{self._posture}'), but the planning scene still has "
+                             f"{', '.join(left)} attached to {', '.join(sorted(set(left.values())))} after "
+                             f"{self._timeout_s:g} s; look what keeps it between the fingers")
+        return self.succeed()
