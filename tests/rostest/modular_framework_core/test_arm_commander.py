@@ -61,6 +61,24 @@ def test_settings_and_targets_arrive_in_the_request(commander) -> None:
     assert [(c.joint_name, c.position) for c in request.goal_constraints[0].joint_constraints] == [("jx", 0.4)]
 
 
+def test_another_group_is_planned_for_with_settings_of_its_own(commander) -> None:
+    commander.set_num_planning_attempts(3)
+    hand = commander.of_group("hand")
+    assert hand is commander.of_group("hand") and commander.of_group("") is commander.of_group("arm") is commander
+    hand.set_planning_time(9.0)
+    assert hand.plan_to_joint_value_target({"f": 0.4}).success
+    request = commander.fake.requests[-1]
+    assert (request.group_name, request.num_planning_attempts, request.allowed_planning_time) == ("hand", 3, 9.0)
+    assert [item.joint_name for item in request.goal_constraints[0].joint_constraints] == ["f"]
+    assert commander.plan_to_joint_value_target({"jx": 0.4}).success
+    assert commander.fake.requests[-1].allowed_planning_time != 9.0
+    assert "group 'hand' is no chain" in hand.plan_to_pose_target(pose(0.3)).reason
+    assert "group 'hand' is no chain" in hand.solve_ik(pose(0.3)).reason
+    assert set(commander.positions_of(["jx", "f", "nobody"])) == {"jx", "f"}
+    with pytest.raises(CommanderError, match="no planning group 'leg'"):
+        commander.of_group("leg")
+
+
 def test_a_pose_target_is_a_goal_for_the_tip_and_the_next_call_starts_afresh(commander) -> None:
     assert commander.plan_to_pose_target(pose(0.3), custom_start_state={"jx": 0.2})
     goal = commander.fake.requests[-1].goal_constraints[0]

@@ -13,9 +13,9 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import GripperCommandAction, GripperCommandResult
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, SetBoolResponse
 
 import smach
@@ -126,6 +126,58 @@ def test_call_service_finds_the_type_and_is_positive_only_when_the_answer_is() -
     service.shutdown()
 
 
+def test_fields_of_requests_come_from_userdata_and_fields_of_the_answer_go_there() -> None:
+    asked: list[PoseStamped] = []
+
+    def answer(request):
+        asked.append(request.pose_stamped)
+        return srv.AddPoseStampedResponse(True)
+
+    service = rospy.Service("place_it", srv.AddPoseStamped, answer)
+    pose = PoseStamped(header=Header(frame_id="table"), pose=Pose(Point(0.1, 0.2, 0.3), Quaternion(w=1.0)))
+    request = {"pose_stamped": {"header": {"frame_id": "world"}, "pose": "userdata.where.pose"},
+               "pose_name": "userdata.who"}
+    ask = CallService("place_it", request, input_keys=("where", "who"), keep={"placed": "success"},
+                      output_keys=("placed",))
+    outcome, userdata = run(ask, where=pose, who="me")
+    assert (outcome, userdata.placed, asked[0].header.frame_id, asked[0].pose) == ("success", True, "world", pose.pose)
+    for values, reason in (({"where": pose.pose, "who": "me"}, "'pose': there is no 'pose'; there are: position, "),
+                           ({"where": pose, "who": 3}, "do not fit modular_framework_core/AddPoseStampedRequest"),
+                           ({"where": None, "who": "me"}, "userdata 'where' is empty; let a state before write it"),
+                           ({"who": "me"}, "'userdata.where.pose' refers to userdata that is not there")):
+        assert run(ask, **values)[0] == "fail"
+        assert reason in ask.reason, ask.reason
+    service.shutdown()
+
+
+def test_a_field_of_the_answer_decides_about_the_outcome_where_it_is_named() -> None:
+    codes = iter((0, 1, 2, 7, 0))
+    service = rospy.Service("detect", srv.MessageFile, lambda request: srv.MessageFileResponse(
+        success=False, message="looked", count=next(codes)))
+    outcomes = ("found", "nothing", "fail")
+    state = CallService("detect", outcome_field="count", outcomes=outcomes)
+    assert [ended(state) for _ in range(4)] == ["found", "nothing", "fail", "fail"]
+    assert "count is 7, which stands for no outcome; allowed are a truth value, 0 to 2, or one of found" in state.reason
+    codes = iter((10, 20, 21, 3))
+    state = CallService("detect", outcome_field="count", outcomes=outcomes, keep={"said": "message"},
+                        output_keys=("said",), outcome_values={"found": 10, "nothing": [20, 21]})
+    assert [ended(state) for _ in range(4)] == ["found", "nothing", "nothing", "fail"]
+    assert "count is 3, which is none of outcome_values" in state.reason
+    service.shutdown()
+    for wrong in ({"outcome_values": {"found": 1}}, {"outcome_field": "a", "outcome_values": {"fond": 1}},
+                  {"keep": {"said": "message"}}):
+        with pytest.raises(ValueError, match="outcome_field; name the field|outcome_values names|keep writes"):
+            CallService("detect", outcomes=outcomes, **wrong)
+
+
+def ended(state: smach.State) -> str:
+    """Runs a state in a machine with its outcomes."""
+    machine = smach.StateMachine(outcomes=list(state.get_registered_outcomes()))
+    with machine:
+        smach.StateMachine.add("ONLY", state)
+    return machine.execute()
+
+
 class Gripper:
     """An action server that closes, or refuses, or never ends."""
 
@@ -160,6 +212,19 @@ def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:
         assert run(state)[0] == "fail"
         assert reason in state.reason, state.reason
     assert gripper.preempted.wait(30.0)
+    values = {"outcome_field": "reached_goal", "outcomes": ("there", "short", "fail"), "input_keys": ("width",),
+              "keep": {"at": "position"}, "output_keys": ("at",), "outcome_values": {"there": True, "short": False}}
+    state = CallAction("hand", {"command": {"position": "userdata.width"}}, **values)
+    machine = smach.StateMachine(outcomes=["there", "short", "fail"])
+    with machine:
+        smach.StateMachine.add("ONLY", state)
+    results = []
+    for width in (0.5, -1.0):
+        machine.userdata.width = width
+        results.append((machine.execute(), machine.userdata.at))
+    assert results == [("there", 0.5), ("short", 0.0)]
+    assert ended(CallAction("hand", {"command": {"position": -1.0}}, outcome_field="reached_goal",
+                            outcome_values={"there": False}, outcomes=("there", "fail"))) == "fail"
     assert GoalStatus.ABORTED == 4
 
 
@@ -199,8 +264,10 @@ def test_set_planner_changes_what_is_given_and_refuses_unknown_planners() -> Non
         set_planning_time=lambda value: calls.append(("time", value)),
         set_num_planning_attempts=lambda value: calls.append(("attempts", value)),
         set_max_velocity_scaling_factor=lambda value: calls.append(("speed", value)))
+    commander.of_group = lambda name: calls.append(("group", name)) or commander
     assert run(SetPlanner("pilz/LIN", speed_factor=0.1), arm_commander=commander)[0] == "success"
-    assert calls == [("id", "pilz/LIN"), ("speed", 0.1)]
+    assert run(SetPlanner("RRTConnect", group="hand"), arm_commander=commander)[0] == "success"
+    assert calls == [("group", ""), ("id", "pilz/LIN"), ("speed", 0.1), ("group", "hand"), ("id", "RRTConnect")]
     state = SetPlanner("RRTConect")
     assert run(state, arm_commander=commander)[0] == "fail"
     assert "there is no planner 'RRTConect'; move_group has RRTConnect, pilz/LIN" in state.reason

@@ -48,6 +48,13 @@ class Arm:
                          rospy.Service("compute_fk", GetPositionFK, self._fk),
                          rospy.Service("compute_cartesian_path", GetCartesianPath, self._line)]
 
+    def positions_of(self, joints) -> dict[str, float]:
+        return {name: value for name, value in self.current_joints().items() if name in joints}
+
+    def of_group(self, name: str):
+        self.groups = [*getattr(self, "groups", []), name]
+        return self
+
     def current_joints(self) -> dict[str, float]:
         return {"j": self.position}
 

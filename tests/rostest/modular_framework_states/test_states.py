@@ -47,6 +47,13 @@ class FakeArm:
         self.stopped = False
         self.plans: list[tuple[dict[str, float], dict[str, float] | None]] = []
 
+    def positions_of(self, joints) -> dict[str, float]:
+        return {name: value for name, value in self.current_joints().items() if name in joints}
+
+    def of_group(self, name: str):
+        self.groups = [*getattr(self, "groups", []), name]
+        return self
+
     def current_joints(self) -> dict[str, float]:
         return {"j": self.position, "f": 1.9}
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from modular_framework_core.task_constructor import generator, located_yaml
-from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.task_constructor.faults import FaultList, TaskFault
+from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder
 from modular_framework_core.task_constructor.task_spec import TaskSpec
@@ -49,6 +50,63 @@ from modular_framework_core.framework_state import FrameworkState
 class UseArm(FrameworkState):
     def __init__(self, outcomes=("success", "fail"), io_keys=("arm_commander",)):
         super().__init__(outcomes, (), (), io_keys)
+
+    def execute(self, userdata):
+        return self.succeed() if userdata.arm_commander.stop() else self.fail("it goes on")
+''',
+    "choose": '''
+from typing import Annotated, Literal
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_uses import Key, Named
+
+
+class Choose(FrameworkState):
+    def __init__(self, message_type: Annotated[Literal["pose", "grasp", "pregrasp"], Key("output", "selected_{}")],
+                 message_names: Annotated[list[str] | None, Named("option:message_type")] = None,
+                 outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+''',
+    "go": '''
+from typing import Annotated
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_uses import Named
+
+
+class Go(FrameworkState):
+    def __init__(self, target_type: str = "",
+                 target_name: Annotated[str, Named("option:target_type", userdata=True)] = "",
+                 posture: Annotated[str, Named("posture")] = "", group: Annotated[str, Named("group")] = "",
+                 makes: Annotated[str, Named("plan", made=True)] = "", runs: Annotated[str, Named("plan")] = "",
+                 outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+''',
+    "ask": '''
+from typing import Annotated, Any
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_uses import Fields, OutcomeNames, OutputKeys
+
+
+class Ask(FrameworkState):
+    def __init__(self, request: Annotated[dict[str, Any] | None, Fields()] = None,
+                 keep: Annotated[dict[str, str] | None, OutputKeys()] = None,
+                 outcome_values: Annotated[dict[str, Any] | None, OutcomeNames()] = None,
+                 outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+''',
+    "recall": '''
+import smach
+
+
+class Recall(smach.State):
+    def __init__(self, outcomes=("success", "fail"), input_keys=()):
+        smach.State.__init__(self, outcomes=outcomes, input_keys=input_keys)
+
+    def execute(self, userdata):
+        count = userdata.count
+        return "success" if count else "fail"
 ''',
     "remember": '''
 import smach
@@ -67,6 +125,12 @@ class Remember(smach.State):
     "broken_file": "class BrokenFile(:\n",
     "wrong_class": "class Wrongclass:\n    pass\n",
 }
+
+KNOWN = KnownNames(
+    {"pose": frozenset({"above", "below"}), "joint_state": frozenset({"home"}),
+     "posture": frozenset({"open", "closed"}), "group": frozenset({"arm", "hand"})},
+    {"pose": "config/named_poses.yaml", "joint_state": "config/named_joint_states.yaml",
+     "posture": "group 'hand' of robot.srdf", "group": "robot.srdf"})
 
 GOOD_TASK = """\
 name: tiny
@@ -98,12 +162,15 @@ class World:
     def __init__(self, folder: Path, *templates: Path) -> None:
         self.folder = folder
         self.states = StateCatalogue([write_states(folder)])
+        self.known = KNOWN
         self.template_folders = [*templates, TEMPLATES]
         self.templates = TemplateCatalogue(self.template_folders)
 
     def build(self, text: str, file: str = "t.yaml") -> TaskSpec:
         """Check a task; ``file`` is what its file is called in messages."""
-        return TaskBuilder(self.states, self.templates).build(located_yaml.loads(text, file), file)
+        faults = FaultList()
+        document = located_yaml.loads(text, file, faults)
+        return TaskBuilder(self.states, self.templates, faults, self.known).build(document, file)
 
     def faults(self, text: str, file: str = "t.yaml") -> list[str]:
         """Return the messages about a task, one a fault; none for a valid one."""

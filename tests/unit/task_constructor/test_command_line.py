@@ -2,12 +2,16 @@
 """The command state_machine_generator: the original's four arguments, and --check."""
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 from task_folders import GOOD_TASK, TEMPLATES, write_states
 
 from modular_framework_core.task_constructor.pipeline import directories_from, main
+
+ONE_STATE = ("name: t\nsource: framework_state_machine\noutcomes: [done, gave_up]\nstates:\n"
+             "  - A: {%s, transitions: {success: done, fail: gave_up}}\n")
 
 
 @pytest.fixture()
@@ -54,6 +58,80 @@ def test_a_path_that_is_not_there_gives_1_and_is_named(
     assert "/nowhere/gone" in capsys.readouterr().err
 
 
+def test_states_of_ones_own_are_found_beside_the_frameworks_and_a_folder_without_any_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "open_door.py").write_text(
+        "from modular_framework_core.framework_state import FrameworkState\n\n\n"
+        'class OpenDoor(FrameworkState):\n    """Opens the door."""\n\n    def execute(self, userdata):\n'
+        "        return self.succeed()\n")
+    assert main(["--explain", "open_door", str(tmp_path)]) == 0
+    assert "Opens the door." in capsys.readouterr().out
+    assert main(["--explain", "open_door", "", str(tmp_path)]) == 0
+    capsys.readouterr()
+    assert main(["--schema", str(tmp_path)]) == 0
+    assert {"state_open_door", "state_plan"} <= set(json.loads(capsys.readouterr().out)["definitions"])
+    script = tmp_path / "t.yaml"
+    script.write_text(ONE_STATE % "source: open_door")
+    assert main(["--check", str(script), str(tmp_path)]) == 0
+    (tmp_path / "empty").mkdir()
+    script.write_text(ONE_STATE % "source: move")
+    assert main(["--check", str(script), str(tmp_path / "empty")]) == 0
+    assert f"states directory {tmp_path}/empty has no state" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("state", "reason"), [
+    ("source: plan, target_state_type: joint_state, target_state_name: stabilty_pose",
+     "did you mean 'stability_pose'?"),
+    ("source: plan, target_state_type: pose, target_state_name: nowhere", "the pose 'nowhere' is unknown"),
+    ("source: plan, group: arn, target_state_type: joint_state, target_state_name: initial_pose",
+     "planning group 'arn' is unknown"),
+    ("source: cartesian_move, pose_name: nowhere", "the pose 'nowhere' is unknown"),
+    ("source: execute_trajectory, trajectory_name: exmple_trajectory", "did you mean 'example_trajectory'?"),
+    ("source: gripper, posture: opened", "the posture 'opened' is unknown; allowed: "),
+    ("source: select, message_type: pose, message_names: [nowhere], output_keys: [selected_pose]",
+     "'nowhere' is unknown"),
+    ("source: select, message_type: grasp", "'grasp' writes the userdata key 'selected_grasp'"),
+    ("source: move, plan_name: to_nowhere", "the plan 'to_nowhere' is unknown; there is none; let a state make it"),
+    ("source: plan, target_state_type: grasp, target_state_name: userdata", "takes the userdata key 'selected_grasp'"),
+    ("source: allow_manipulator_collisions, allow: true, collision_type: object-collision, objects: userdata",
+     "takes the userdata key 'selected_grasp'"),
+    ("source: grasp, grasp_type: grasp, io_keys: [max_torque]",
+     "takes the userdata key 'manipulator_controller_client'"),
+    ("source: log_metric, name_of_metric: a, from_key: force", "takes the userdata key 'force'"),
+    ("source: call_service, service_name: s, request: {data: userdata.force}", "takes the userdata key 'force'"),
+    ("source: call_action, action_name: a, keep: {pose: result}", "writes the userdata key 'pose'"),
+    ("source: wait_for_message, topic_name: t, expect: {data: userdata.force}", "takes the userdata key 'force'"),
+])
+def test_names_that_are_nowhere_and_keys_that_are_not_declared_are_found_without_running(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], state: str, reason: str
+) -> None:
+    script = tmp_path / "t.yaml"
+    script.write_text(ONE_STATE % state)
+    assert main(["--check", str(script)]) == 1
+    message = capsys.readouterr().err
+    assert reason in message and message.startswith("1 fault in the task:\n"), message
+
+
+def test_names_that_another_node_adds_are_named_in_the_task_and_other_configurations_are_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script = tmp_path / "t.yaml"
+    moves = ONE_STATE % "source: move, plan_name: homing"
+    script.write_text(f"external_names: {{plan: [homing]}}\n{moves}")
+    assert main(["--check", str(script)]) == 0
+    (tmp_path / "named_joint_states.yaml").write_text("mine: {a: 1.0}\n")
+    script.write_text(ONE_STATE % "source: plan, target_state_type: joint_state, target_state_name: mine")
+    assert main(["--check", str(script)]) == 1
+    assert main(["--check", "--config", str(tmp_path), str(script)]) == 0
+    (tmp_path / "named_joint_states.yaml").write_text("- mine\n")
+    assert main(["--check", "--config", str(tmp_path), str(script)]) == 1
+    assert f"{tmp_path}/named_joint_states.yaml must be a mapping of names" in capsys.readouterr().err
+    adds = "  - B: {source: call_service, service_name: add_plan, transitions: {success: A, fail: gave_up}}\n"
+    script.write_text(f"initial_state: B\n{moves}{adds}")
+    assert main(["--check", str(script)]) == 0, capsys.readouterr().err
+
+
 def test_several_directories_are_separated_by_colons() -> None:
     assert directories_from("/a:/b:") == [Path("/a"), Path("/b")]
     assert directories_from("") == []
@@ -65,6 +143,6 @@ def test_the_frameworks_own_folders_are_taken_when_none_are_named(
     script = tmp_path / "t.yaml"
     script.write_text(
         "name: t\nsource: framework_state_machine\noutcomes: [done, gave_up]\nstates:\n"
-        "  - A: {source: move, plan_name: p, transitions: {success: done, fail: gave_up}}\n"
+        "  - A: {source: move, transitions: {success: done, fail: gave_up}}\n"
     )
     assert main(["--check", str(script)]) == 0, capsys.readouterr().err

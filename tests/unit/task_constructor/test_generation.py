@@ -87,11 +87,44 @@ def test_the_keys_of_a_nested_machine_are_handed_to_its_container(world: World, 
     inner = "A: {source: move}" if template.startswith("concurrent") else \
         "A: {source: move, transitions: {success: success, fail: fail}}"
     produced = "      outcome_map: {success: {A: success}}\n" if template.startswith("concurrent") else ""
-    task = f"{HEADER}  - M:\n      source: {template}\n{produced}      states:\n        - {inner}\n"
+    before = "  - Writes: {source: go, output_keys: [a, b], transitions: {success: M, fail: fail}}\n"
+    task = f"{HEADER}{before}  - M:\n      source: {template}\n{produced}      states:\n        - {inner}\n"
     text = world.generate(f"{task}      input_keys: [a, b]\n      output_keys: [c]\n")
     arguments = "            input_keys=['a', 'b'],\n            output_keys=['c'],\n"
     assert f"\n{arguments}        )\n" in text
     assert world.generate(task) == text.replace(arguments, "")
+
+
+def test_a_remapping_gives_the_names_of_userdata_around_and_initial_state_where_to_begin(world: World) -> None:
+    (world.folder / "own_states" / "add_one.py").write_text("""
+import smach
+
+
+class AddOne(smach.State):
+    def __init__(self, outcomes=("success", "fail"), input_keys=("number",), output_keys=("sum",)):
+        smach.State.__init__(self, outcomes=outcomes, input_keys=input_keys, output_keys=output_keys)
+
+    def execute(self, userdata):
+        userdata.sum = userdata.number + 1
+        return "success"
+""")
+    world.states = StateCatalogue([world.folder / "own_states"])
+    add = "source: add_one, transitions: {success: %s, fail: fail}, remapping: {number: %s, sum: %s}"
+    text = (f"{HEADER.replace('states:', 'initial_state: Begin')}states:\n"
+            f"  - One: {{{add % ('M', 'start', 'middle')}}}\n  - M:\n      source: state_machine\n"
+            "      input_keys: [before]\n      output_keys: [after]\n      remapping: {before: middle, after: end}\n"
+            f"      states:\n        - Two: {{{add % ('success', 'before', 'after')}}}\n"
+            "  - Begin: {source: go, output_keys: [start], transitions: {success: One, fail: fail}}\n")
+    made = machine(world, text)
+    made.get_children()["Begin"].execute = lambda userdata: setattr(userdata, "start", 40) or "success"
+    assert made.execute() == "success"
+    assert (made.userdata.middle, made.userdata.end) == (41, 42)
+
+
+def test_values_below_anchors_are_written_once_and_merged_where_they_are_referred_to(world: World) -> None:
+    task = world.build("anchors:\n  move: &fast {speed: 0.9, plan_name: p}\n" + HEADER +
+                       "  - A: {<<: *fast, source: plan, target: x, plan_name: q}\n")
+    assert task.root.states[0].options == {"speed": 0.9, "plan_name": "q", "target": "x"}
 
 
 def test_a_state_that_cannot_be_made_is_told_with_its_place_in_the_task(world: World, tmp_path: Path) -> None:

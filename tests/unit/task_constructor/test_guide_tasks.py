@@ -9,7 +9,7 @@ import pytest
 from task_folders import TEMPLATES
 
 from modular_framework_core.task_constructor import loading, located_yaml, task_graph
-from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.task_constructor.faults import FaultList, TaskFault
 from modular_framework_core.task_constructor.pipeline import check_task, construct_task
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder
@@ -28,8 +28,9 @@ IN_ORDER = sorted([*(GUIDE_TASKS / f"{name}.yaml" for name in (
 
 
 def build(text: str) -> TaskSpec:
-    builder = TaskBuilder(StateCatalogue([STATES]), TemplateCatalogue([TEMPLATES]))
-    return builder.build(located_yaml.loads(text, "t.yaml"), "t.yaml")
+    faults = FaultList()
+    builder = TaskBuilder(StateCatalogue([STATES]), TemplateCatalogue([TEMPLATES]), faults)
+    return builder.build(located_yaml.loads(text, "t.yaml", faults), "t.yaml")
 
 
 def faults(text: str) -> str:
@@ -113,7 +114,7 @@ def test_transitions_that_name_other_outcomes_than_declared_are_corrected() -> N
 def test_a_label_given_twice_is_corrected() -> None:
     message = faults(MOCK_TRAJECTORY.replace("- PlanInitPose:", "- PlanStabPose:"))
     assert "t.yaml:25:11: the label 'PlanStabPose' is given twice; first in line 18" in message
-    assert "outcome_map: state 'PlanInitPose' is unknown; allowed: PlanStabPose; did you mean" in message
+    assert "outcome_map: state 'PlanInitPose' is unknown; allowed: PlanStabPose" in message
 
 
 def test_a_misspelt_outcome_is_corrected() -> None:

@@ -9,7 +9,7 @@ import json
 import threading
 import uuid
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -101,6 +101,8 @@ class ArmCommander:
         self._joints_lock = threading.Lock()
         self._positions: dict[str, float] = {}
         self._reports: OrderedDict[str, dict[str, object]] = OrderedDict()
+        self._others: dict[str, ArmCommander] = {}
+        self._others_lock = threading.Lock()
 
     def connect(self, timeout_s: float = 60.0) -> None:
         """Reads the robot model and waits for move_group; does nothing when connected already.
@@ -141,6 +143,30 @@ class ArmCommander:
         if self._group is None:
             raise CommanderError(f"Arm commander of group '{self.group_name}' is not connected.")
         return self._group
+
+    def of_group(self, name: str) -> ArmCommander:
+        """Returns the commander of another planning group.
+
+        It begins with the settings this one has when it is asked for first, and keeps its own from then on.
+
+        Args:
+            name: Planning group; empty for this commander.
+
+        Raises:
+            CommanderError: There is no such group, or something needed is missing.
+        """
+        if not name or name == self.group_name:
+            return self
+        with self._others_lock:
+            other = self._others.get(name)
+            if other is None:
+                other = ArmCommander(name)
+                other._velocity_scaling, other._attempts = self._velocity_scaling, self._attempts
+                other._pipeline_id, other._planner_id = self._pipeline_id, self._planner_id
+                other._planning_time_s = self._planning_time_s
+                other.connect()
+                self._others[name] = other
+        return other
 
     def set_max_velocity_scaling_factor(self, factor: float) -> None:
         """Sets the share of the joints' velocity and acceleration limits to use, in (0, 1].
@@ -202,6 +228,11 @@ class ArmCommander:
         with self._joints_lock:
             return {name: self._positions[name] for name in names}
 
+    def positions_of(self, joints: Iterable[str]) -> dict[str, float]:
+        """Returns the latest positions of some joints of the robot [rad or m]; joints without one are left out."""
+        with self._joints_lock:
+            return {name: self._positions[name] for name in joints if name in self._positions}
+
     def plan_to_pose_target(self, pose: PoseStamped, custom_start_state: StartState = None) -> PlanResult:
         """Plans to a pose of the group's tip link.
 
@@ -212,6 +243,8 @@ class ArmCommander:
         Returns:
             The plan, or the reason why there is none.
         """
+        if self._no_tip():
+            return _no_plan(MoveItErrorCodes.INVALID_GROUP_NAME, self._no_tip())
         return self._plan(lambda name: pose_goal(pose, self.group.tip_link, name), custom_start_state)
 
     def plan_to_joint_value_target(self, joints: Mapping[str, float] | JointState,
@@ -247,6 +280,8 @@ class ArmCommander:
         Returns:
             The solution nearest to the seed, or the reason why there is none.
         """
+        if self._no_tip():
+            return IkResult({}, MoveItErrorCodes.INVALID_GROUP_NAME, self._no_tip())
         try:
             result = self._ik(pose, seed, avoid_collisions=True)
             if result:
@@ -372,9 +407,14 @@ class ArmCommander:
             if not text:
                 raise RobotModelError(f"parameter '{rospy.resolve_name(name)}' is not set; load the robot first")
         group = read_group(str(urdf), str(srdf), self.group_name)
-        if not group.joints or not group.tip_link:
-            raise RobotModelError(f"group '{self.group_name}' is no chain with active joints; choose one that is")
+        if not group.joints:
+            raise RobotModelError(f"group '{self.group_name}' has no active joint; choose one that has")
         return group
+
+    def _no_tip(self) -> str:
+        """Says that the group has no tip link; nothing when it has one."""
+        return "" if self.group.tip_link else (f"group '{self.group_name}' is no chain, so no link of it can be "
+                                               "brought to a pose; choose a group that is, or a target of joints")
 
     def _missing_joints(self, group: Group) -> tuple[str, ...]:
         with self._joints_lock:

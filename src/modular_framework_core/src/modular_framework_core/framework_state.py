@@ -101,6 +101,19 @@ class FrameworkState(smach.State):
         smach.logwarn(f"{type(self).__name__}: {reason}")
         return self.outcomes[-1]
 
+    def end(self, outcome: str, reason: str) -> str:
+        """Return an outcome that is neither plain success nor plain failure; the last outcome counts as a failure.
+
+        Args:
+            outcome: one of the state's outcomes.
+            reason: why this one.
+        """
+        if outcome == self.outcomes[-1]:
+            return self.fail(reason)
+        self.reason = ""
+        smach.loginfo(f"{type(self).__name__}: {outcome}: {reason}")
+        return outcome
+
     def stop_requested(self) -> bool:
         """Return whether this state, or the whole task, has been asked to stop."""
         return bool(self.preempt_requested()) or smach.is_shutdown()

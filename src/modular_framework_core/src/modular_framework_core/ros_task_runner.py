@@ -7,7 +7,10 @@ Parameters (used where there is no argument):
     ``~state_machine_to_load``: path of an existing state machine, or its name in the folder of generated ones; when it
         is not empty, nothing is generated.
     ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
-    ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list).
+    ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list); the
+        framework's own are found after them.
+    ``~config_directory``: folder whose files have the names of messages a task may use; empty: these are not checked.
+    ``/robot_description_semantic``: has the postures and planning groups it may use.
     ``/run_id``: written by roslaunch; tells when the launch began.
     ``~record_directory``: where the record of the run is written (default:
         ``$ROS_HOME/modular_framework/task_records``).
@@ -36,6 +39,8 @@ import smach
 from modular_framework_core.ros_task_introspection import shown
 from modular_framework_core.task_constructor import default_folders, generator, loading, pipeline
 from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
 
@@ -264,10 +269,13 @@ def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:
 
 def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
     try:
-        states = _directories("states_directory", default_folders.states_folder)
-        templates = _directories("templates_directory", default_folders.templates_folder)
-        task, path = pipeline.construct_task(script, states, templates, generator.default_output_directory())
-    except (TaskFault, generator.GenerationError, OSError) as error:
+        states = default_folders.states_folders(_directories("states_directory"))
+        templates = default_folders.templates_folders(_directories("templates_directory"))
+        for folder in StateCatalogue(states).empty_directories:
+            rospy.logwarn(pipeline.no_states_in(folder))
+        output = generator.default_output_directory()
+        task, path = pipeline.construct_task(script, states, templates, output, _known_names())
+    except (TaskFault, generator.GenerationError, OSError, ValueError) as error:
         raise TaskNotRun(str(error)) from error
     rospy.loginfo(f"state machine of task '{task.name}' written to {path}")
     expected = str(rospy.get_param("~generated_state_machine_name", "") or path.name)
@@ -276,8 +284,15 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
     return _prepare_machine(path)
 
 
-def _directories(parameter: str, default: Callable[[], Path]) -> list[Path]:
-    """Return the directories of a parameter; the framework's own when it is empty."""
+def _known_names() -> KnownNames:
+    """Return the names that the configuration files of the launch and the robot have."""
+    config = str(rospy.get_param("~config_directory", "") or "")
+    names = names_of_config(Path(config)) if config else KnownNames()
+    srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
+    return names.with_robot(srdf, "the parameter /robot_description_semantic") if srdf else names
+
+
+def _directories(parameter: str) -> list[Path]:
+    """Return the directories of a parameter."""
     value = rospy.get_param(f"~{parameter}", "")
-    given = [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))
-    return given or [default()]
+    return [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))

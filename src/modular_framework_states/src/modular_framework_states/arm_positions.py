@@ -34,10 +34,10 @@ def run_to_end(state: FrameworkState, commander: Any, motion: Any, goal_toleranc
         return state.fail(f"{what} was not executed to its end: {result.reason}")
     trajectory = motion.joint_trajectory
     last = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
-    if state.wait_until(lambda: worst_joint(commander.current_joints(), last)[1] <= goal_tolerance, SETTLE_TIME_S):
+    if state.wait_until(lambda: worst_joint(commander.positions_of(last), last)[1] <= goal_tolerance, SETTLE_TIME_S):
         return state.succeed()
     if state.preempt_requested():
         return state.stopped()
-    joint, distance = worst_joint(commander.current_joints(), last)
+    joint, distance = worst_joint(commander.positions_of(last), last)
     return state.fail(f"{what} was executed, but joint '{joint}' is {distance:.4f} away from its last point, allowed "
                       f"is {goal_tolerance}")

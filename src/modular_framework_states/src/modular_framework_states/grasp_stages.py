@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-GRASP_STAGES = ("pregrasp", "grasp", "postgrasp")
+from modular_framework_core.option_uses import GRASP_STAGES
+
 
 class StageError(RuntimeError):
     """A stage of a grasp has no joint positions; the text says which stage and why."""

@@ -9,7 +9,6 @@ from moveit_msgs.msg import RobotTrajectory
 
 from modular_framework_core import srv
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
-from modular_framework_states.grasp_stages import GRASP_STAGES
 
 SERVICE_TIMEOUT_S = 10.0
 
@@ -28,11 +27,6 @@ Kind = Literal["joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp
 
 class ManagerError(RuntimeError):
     """A manager cannot be reached or has no such message; the text says which and what to do."""
-
-
-def kind_of(message_type: str) -> str:
-    """Returns the kind of message behind a type word: every stage of a grasp is kept in a grasp message."""
-    return "grasp" if message_type in GRASP_STAGES else message_type
 
 
 def fetch(kind: str, name: str) -> Any:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from pathlib import Path
 
 import rospkg
 
 STATES_PACKAGE = "modular_framework_states.states"
 TEMPLATES_PACKAGE = "modular_framework_core"
+API_PACKAGE = "modular_framework_api"
+LAUNCH_FILE = "start_framework.launch"
 
 
 def framework_home() -> Path:
@@ -33,6 +37,44 @@ def states_folder() -> Path:
             "directory"
         )
     return Path(next(iter(found.submodule_search_locations)))
+
+
+def states_folders(own: Sequence[Path]) -> list[Path]:
+    """Return folders of one's own, and the framework's after them."""
+    return [*own, *([] if states_folder() in own else [states_folder()])]
+
+
+def templates_folders(own: Sequence[Path]) -> list[Path]:
+    """Return folders of one's own, and the framework's after them."""
+    return [*own, *([] if templates_folder() in own else [templates_folder()])]
+
+
+def config_folder() -> Path | None:
+    """Return the configuration folder of the API package; None when that package is not there."""
+    folder = _package(API_PACKAGE)
+    return None if folder is None else folder / "config"
+
+
+def srdf_file(package: str = "") -> Path | None:
+    """Return the SRDF of a MoveIt configuration package; by default that of the API package's launch file.
+
+    None when a package is not there, or has no SRDF, or several and does not say which.
+    """
+    api = _package(API_PACKAGE)
+    launch = None if api is None else api / "launch" / LAUNCH_FILE
+    if not package and launch is not None and launch.is_file():
+        args = ElementTree.parse(launch).getroot().findall("arg")
+        package = next((item.get("default", "") for item in args if item.get("name") == "moveit_config_package"), "")
+    folder = _package(package) if package else None
+    found = [] if folder is None else sorted(folder.glob("config/*.srdf"))
+    return found[0] if len(found) == 1 else None
+
+
+def _package(name: str) -> Path | None:
+    try:
+        return Path(rospkg.RosPack().get_path(name))
+    except rospkg.ResourceNotFound:
+        return None
 
 
 def templates_folder() -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 
@@ -53,6 +53,8 @@ class FaultList:
     def __init__(self) -> None:
         self._faults: list[Fault] = []
         self._settled: set[Place] = set()
+        self.harmless = 0
+        """How many of the faults leave known which states and userdata the task has."""
 
     def add(self, place: Place, message: str) -> None:
         """Note a fault, unless a fault noted with ``add_cause`` at the same place explains it."""
@@ -64,9 +66,21 @@ class FaultList:
         self.add(place, message)
         self._settled.add(place)
 
-    def add_unknown(self, place: Place, what: str, found: str, allowed: Iterable[str]) -> None:
-        """Note a name that is none of those allowed, with the nearest one where there is one near."""
-        self.add(place, f"{what} '{found}' is unknown; {listing(allowed)}{nearest(found, allowed)}")
+    def add_unknown(
+        self, place: Place, what: str, found: str, allowed: Iterable[str], given: Container[str] = ()
+    ) -> None:
+        """Note a name that is none of those allowed, with the nearest one where there is one near.
+
+        Args:
+            place: where the name is.
+            what: what it names.
+            found: the name.
+            allowed: the names that are allowed.
+            given: names that stand beside it already, and cannot be what was meant.
+        """
+        names = list(dict.fromkeys(allowed))
+        free = [name for name in names if name not in given]
+        self.add(place, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, free)}")
 
     def __len__(self) -> int:
         return len(self._faults)

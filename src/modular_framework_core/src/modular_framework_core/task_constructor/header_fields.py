@@ -46,10 +46,12 @@ def label(name: str, place: Place, faults: FaultList) -> None:
         faults.add(place, f"the label '{name}' must be letters, digits, _ and -, and start with a letter")
 
 
-def names(node: Node, what: str, faults: FaultList, *, may_be_empty: bool = False) -> tuple[str, ...] | None:
+def names(
+    node: Node, what: str, faults: FaultList, *, may_be_empty: bool = False, example: str = "[success, fail]"
+) -> tuple[str, ...] | None:
     """Return a list of different names."""
     if not isinstance(node, Sequence):
-        faults.add(node.place, f"{what} must be a list such as [success, fail], found {kind_of(node)}")
+        faults.add(node.place, f"{what} must be a list such as {example}, found {kind_of(node)}")
         return None
     if not node.items and not may_be_empty:
         faults.add(node.place, f"{what} is an empty list; it needs at least one name")
@@ -66,10 +68,12 @@ def names(node: Node, what: str, faults: FaultList, *, may_be_empty: bool = Fals
     return tuple(found)
 
 
-def name_map(node: Node, what: str, faults: FaultList) -> dict[str, Scalar] | None:
+def name_map(
+    node: Node, what: str, faults: FaultList, *, example: str = "{success: NextState}"
+) -> dict[str, Scalar] | None:
     """Return a mapping from name to name, with the place of each value."""
     if not isinstance(node, Mapping):
-        faults.add(node.place, f"{what} must be a mapping such as {{success: NextState}}, found {kind_of(node)}")
+        faults.add(node.place, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
         return None
     result: dict[str, Scalar] = {}
     for key, value in node.entries.items():

@@ -90,25 +90,29 @@ def kind_of(node: Node) -> str:
             return f"the number {node.plain()}"
 
 
-def load(path: Path) -> Node:
+def load(path: Path, faults: FaultList) -> Node:
     """Read a YAML file.
 
+    Args:
+        path: the file.
+        faults: where faults of single values are noted that leave the rest readable: a key given twice, a key that is
+            no text, a tag other than those of text, number, truth value, nothing, list and mapping.
+
     Raises:
-        TaskFault: the file cannot be read, is empty, is no valid YAML, repeats a key, is nested too deeply, or has a
-            tag other than those of text, number, truth value, nothing, list and mapping.
+        TaskFault: the file cannot be read, is empty, is no valid YAML, or is nested too deeply.
     """
     start = Place(str(path), 1, 1)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise TaskFault([Fault(start, f"the file cannot be read: {error}")]) from error
-    return loads(text, str(path))
+    return loads(text, str(path), faults)
 
 
-def loads(text: str, file: str) -> Node:
-    """Read YAML from text; ``file`` is the name used in messages. Raises as ``load`` does."""
+def loads(text: str, file: str, faults: FaultList) -> Node:
+    """Read YAML from text; ``file`` is the name used in messages. Notes faults and raises as ``load`` does."""
     try:
-        return _Reader(text, file).read()
+        return _Reader(text, file, faults).read()
     except yaml.MarkedYAMLError as error:
         raise TaskFault([_syntax_fault(error, text, file)]) from error
     except yaml.reader.ReaderError as error:
@@ -139,17 +143,17 @@ def _place_of(text: str, file: str, position: int) -> Place:
 class _Reader:
     """Builds the tree from the parser's events, which come one by one however deep the file is nested."""
 
-    def __init__(self, text: str, file: str) -> None:
+    def __init__(self, text: str, file: str, faults: FaultList) -> None:
         self._events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
         self._file = file
-        self._faults = FaultList()
+        self._faults = faults
         self._count = 0
         self._depth = 0
         self._anchors: dict[str, tuple[Node, int]] = {}
         self._open: set[str] = set()
 
     def read(self) -> Node:
-        """Return the one document of the file; raise ``TaskFault`` with all that is wrong with its values."""
+        """Return the one document of the file."""
         root: Node | None = None
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
@@ -157,7 +161,6 @@ class _Reader:
                     raise TaskFault([Fault(self._place(event), "the file has a second document; a task is one "
                                                                "document, remove the '---'")])
                 root = self._node(next(self._events))
-        self._faults.raise_if_any()
         if root is None:
             raise TaskFault([Fault(Place(self._file, 1, 1),
                                    "the file is empty; a task needs name, source, outcomes and states")])
@@ -240,7 +243,8 @@ class _Reader:
             if is_merge:
                 merged += self._merged(value)
             elif key in entries:
-                self._faults.add(key_place, f"the key '{key}' is given twice; first in line {keys[key].line}")
+                self._faults.add(key_place, f"the key '{key}' is given twice; first in line {keys[key].line}; remove "
+                                            "one of them")
             elif key is not None:
                 entries[key], keys[key] = value, key_place
         for other in merged:

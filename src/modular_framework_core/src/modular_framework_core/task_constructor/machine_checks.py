@@ -2,18 +2,12 @@
 """Checks how the states of a machine are linked: transitions, outcome maps, reachability, userdata."""
 from __future__ import annotations
 
-import difflib
-from collections import Counter
 from collections.abc import Container, Iterable
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 
-from modular_framework_core.task_constructor.faults import FaultList, Place, closest, listing, nearest
+from modular_framework_core.task_constructor.faults import FaultList, Place, closest
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
-from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
-
-MISSPELT = 0.75
-"""An io key that only one state uses counts as misspelt when it is this similar to a key of a template (0 to 1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +30,15 @@ class ChildLinks:
 
 
 def check_sequential(
-    children: list[ChildLinks], labels: list[str], outcomes: tuple[str, ...] | None, place: Place, faults: FaultList
+    children: list[ChildLinks], labels: list[str], first: list[str], outcomes: tuple[str, ...] | None, place: Place,
+    faults: FaultList
 ) -> None:
     """Check the transitions of the children of a state machine.
 
     Args:
         children: the children that could be read.
         labels: the labels of all children as written, those that could not be read or that repeat one included.
+        first: the label the machine begins with, in a list; empty when there is none.
         outcomes: outcomes of the machine; None when they could not be read, which leaves targets unchecked.
         place: where the outcomes are declared.
         faults: where faults are noted.
@@ -52,7 +48,8 @@ def check_sequential(
         transitions = child.transitions or {}
         for outcome, target in transitions.items():
             if child.outcomes is not None and outcome not in child.outcomes:
-                faults.add_unknown(child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes)
+                faults.add_unknown(child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes,
+                                   given=transitions)
             if outcomes is not None and target.value not in targets:
                 what = f"state '{child.label}': transition target"
                 faults.add_unknown(target.place, what, str(target.value), targets)
@@ -66,11 +63,12 @@ def check_sequential(
                 f"add it to transitions, leading to one of: {', '.join(targets)}",
             )
     if outcomes is not None and labels:
-        _check_ways(children, labels, outcomes, place, faults)
+        _check_ways(children, labels, first, outcomes, place, faults)
 
 
 def _check_ways(
-    children: list[ChildLinks], labels: list[str], outcomes: tuple[str, ...], place: Place, faults: FaultList
+    children: list[ChildLinks], labels: list[str], first: list[str], outcomes: tuple[str, ...], place: Place,
+    faults: FaultList
 ) -> None:
     """Note states no transition leads to, states that lead to no outcome, and outcomes nothing leads to.
 
@@ -82,7 +80,7 @@ def _check_ways(
     for child in children:
         if labels.count(child.label) == 1:
             leads_to[child.label] = _targets(child, outcomes, anywhere)
-    reached = _closure(leads_to, labels[:1])
+    reached = _closure(leads_to, first)
     backwards: dict[str, set[str]] = {}
     for label, targets in leads_to.items():
         for target in targets:
@@ -90,7 +88,8 @@ def _check_ways(
     with_way_out = _closure(backwards, outcomes)
     for child in children:
         if child.label not in reached:
-            faults.add(child.place, f"state '{child.label}' is never reached: no transition leads to it")
+            faults.add(child.place, f"state '{child.label}' is never reached: no transition leads to it; lead one "
+                                    "to it, or remove it")
         elif child.label not in with_way_out:
             circle = ", ".join(sorted(_closure(leads_to, [child.label])))
             faults.add(child.place, f"state '{child.label}' has no way out: from it the machine only gets to {circle}, "
@@ -160,7 +159,7 @@ def check_outcome_map(
     result: dict[str, dict[str, str]] = {}
     for outcome, conditions in node.entries.items():
         if outcome not in outcomes:
-            faults.add_unknown(node.keys[outcome], "outcome_map: outcome", outcome, outcomes)
+            faults.add_unknown(node.keys[outcome], "outcome_map: outcome", outcome, outcomes, given=node.entries)
         if not isinstance(conditions, Mapping):
             faults.add(
                 conditions.place,
@@ -172,86 +171,11 @@ def check_outcome_map(
             value = wanted.plain()
             child = by_label.get(label)
             if child is None:
-                faults.add_unknown(conditions.keys[label], "outcome_map: state", label, by_label)
+                faults.add_unknown(conditions.keys[label], "outcome_map: state", label, by_label,
+                                   given=conditions.entries)
             elif not isinstance(value, str):
                 faults.add(wanted.place, f"outcome_map: outcome of '{label}' must be a name, found {kind_of(wanted)}")
             elif child.outcomes is not None and value not in child.outcomes:
                 faults.add_unknown(wanted.place, f"outcome_map: outcome of '{label}'", value, child.outcomes)
             result[outcome][label] = str(value)
     return result
-
-
-def check_userdata(root: MachineSpec, provided_by: dict[str, str], faults: FaultList) -> None:
-    """Check that every userdata key a state needs is provided in its machine.
-
-    Args:
-        root: the outermost machine.
-        provided_by: key -> name of the template that provides it, over all templates known.
-        faults: where faults are noted.
-    """
-    for machine in root.machines():
-        if machine is root or not machine.shares_userdata:
-            _check_scope(machine, machine is root, provided_by, faults)
-
-
-def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str], faults: FaultList) -> None:
-    if machine.template.userdata is None:
-        return
-    members = list(_members(machine))
-    available = {*machine.template.userdata, *machine.input_keys}
-    exchanged: Counter[str] = Counter()
-    for state in members:
-        for key in ("output_keys", "io_keys"):
-            known = _keys(state, key)
-            if known is None:
-                return
-            (available if key == "output_keys" else exchanged).update(known)
-    for child in _nested(machine):
-        available.update(child.output_keys)
-    for key, users in exchanged.items():
-        misspelt = users == 1 and difflib.get_close_matches(key, list(provided_by), n=1, cutoff=MISSPELT)
-        if key not in provided_by and not misspelt:
-            available.add(key)
-    for state in members:
-        needed = dict.fromkeys([*(_keys(state, "input_keys") or ()), *(_keys(state, "io_keys") or ())])
-        for key in needed:
-            if key not in available:
-                faults.add(state.place, _missing_key(machine, is_root, state, key, available, provided_by))
-
-
-def _missing_key(
-    machine: MachineSpec, is_root: bool, state: StateSpec, key: str, available: Iterable[str],
-    provided_by: dict[str, str],
-) -> str:
-    text = (
-        f"state '{state.label}' needs the userdata key '{key}', which the machine '{machine.label}' does not have; "
-        f"{listing(sorted(available), 'it has none')}{nearest(key, sorted(available))}"
-    )
-    if not is_root:
-        return f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the keys around it"
-    if key in provided_by:
-        return f"{text}; the template {provided_by[key]} provides it"
-    return text
-
-
-def _members(machine: MachineSpec) -> Iterable[StateSpec]:
-    """Yield the states that work on the userdata of this machine."""
-    for child in machine.states:
-        if isinstance(child, StateSpec):
-            yield child
-        elif child.shares_userdata:
-            yield from _members(child)
-
-
-def _nested(machine: MachineSpec) -> Iterable[MachineSpec]:
-    for child in machine.states:
-        if isinstance(child, MachineSpec):
-            yield child
-            if child.shares_userdata:
-                yield from _nested(child)
-
-
-def _keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
-    """Return the userdata keys a state declares, as written or by default; None when they are not known."""
-    given = state.options.get(key)
-    return tuple(given) if isinstance(given, (list, tuple)) else state.source.default_names(key)

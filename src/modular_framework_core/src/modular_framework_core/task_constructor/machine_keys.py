@@ -10,6 +10,8 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateS
 
 SHARED_USERDATA = "self.userdata"
 NAMES = {"type": "array", "items": {"type": "string"}, "uniqueItems": True}
+UNREAD = ("params", "states", "anchors")
+"""Keys whose references are not resolved with the header's: they are read later, or not at all."""
 OUTCOMES = {**NAMES, "minItems": 1}
 NAME_MAP = {"type": "object", "additionalProperties": {"type": "string"}}
 
@@ -48,6 +50,8 @@ _KEYS = (
     MachineKey("transitions", "a mapping {outcome: label, or outcome of the machine around}", "Where to go on after "
                "each outcome; none is needed for an outcome that the machine around has too.",
                or_reference(NAME_MAP), at_root=""),
+    MachineKey("initial_state", "a label", "State that the machine begins with; the first one if left out.",
+               or_reference({"type": "string"})),
     MachineKey("default_outcome", "a name", "Outcome when no entry of the outcome map is met; the last one if left "
                "out.", {"type": "string"}),
     MachineKey("outcome_map", "a mapping {outcome: {label: outcome of that state}}", "Which outcomes of the states, "
@@ -59,6 +63,13 @@ _KEYS = (
                or_reference(NAMES), at_root=""),
     MachineKey("output_keys", "a list of names", "Userdata copied to the machine around when this one ends.",
                or_reference(NAMES), at_root=""),
+    MachineKey("remapping", "a mapping {key in this machine: key in the machine around}", "Other names for its input "
+               "and output keys in the machine around.", or_reference(NAME_MAP), at_root=""),
+    MachineKey("anchors", "any value", "Values to refer to by YAML anchors (&name, *name, <<: *name); not read "
+               "otherwise.", {}, nested=""),
+    MachineKey("external_names", "a mapping {kind of message: list of names}", "Messages that other nodes put into the "
+               "managers while the task runs: joint_state, trajectory, pose, robot_pose, plan, grasp.",
+               {"type": "object", "additionalProperties": NAMES}, nested=""),
     MachineKey("params", "a mapping {key: any value}", "Values that everything below may use as params.<key>.",
                {"type": "object"}),
     MachineKey("states", "a list of '- Label: {source: ...}'", "The states and nested machines; the first one begins, "
@@ -68,16 +79,16 @@ _KEYS = (
 
 def machine_keys(template: TemplateSource) -> list[MachineKey]:
     """Return the keys of machines with a template, in the order they are usually written."""
-    absent = set() if template.concurrent else {"default_outcome", "outcome_map"}
+    absent = {"initial_state"} if template.concurrent else {"default_outcome", "outcome_map"}
     absent |= set() if template.takes_keys else {"input_keys", "output_keys"}
     own = [MachineKey(name, "any value", f"Of this template, which reads it as options.{name}.", {})
            for name in sorted(template.options)]
     return [*(key for key in _KEYS if key.name not in absent), *own]
 
 
-def required_keys(*, is_root: bool) -> list[str]:
-    """Return the names of the keys that no machine can do without."""
-    return [key.name for key in _KEYS if (key.at_root if is_root else key.nested) == "required"]
+def required_keys(*, is_root: bool) -> list[MachineKey]:
+    """Return the keys that no machine can do without."""
+    return [key for key in _KEYS if (key.at_root if is_root else key.nested) == "required"]
 
 
 def root_keys() -> list[str]:

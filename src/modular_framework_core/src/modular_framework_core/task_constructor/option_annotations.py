@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
+from collections.abc import Iterator
 from collections.abc import Mapping as MappingABC
 from dataclasses import replace
 from typing import Any
 
 from modular_framework_core.option_limits import Length, Limits
+from modular_framework_core.option_uses import KINDS, Use
 from modular_framework_core.task_constructor.option_types import (
     PLAIN,
     AnyOf,
@@ -39,6 +41,35 @@ def from_hint(hint: Any) -> OptionType:
     """Return the type an annotation stands for that Python has evaluated: read from how Python writes it."""
     text = hint.__name__ if inspect.isclass(hint) and not hasattr(hint, "__origin__") else repr(hint)
     return _Reader({}).read(ast.Constant(text))
+
+
+def uses_in(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> tuple[Use, ...]:
+    """Return what an annotation says about the use of an option; arguments as ``from_annotation``."""
+    return tuple(dict.fromkeys(_uses(annotation, aliases, frozenset())))
+
+
+def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], seen: frozenset[str]) -> Iterator[Use]:
+    match node:
+        case ast.Name(id=name) if name in aliases and name not in seen:
+            yield from _uses(aliases[name], aliases, seen | {name})
+        case ast.BinOp(left=left, right=right):
+            yield from _uses(left, aliases, seen)
+            yield from _uses(right, aliases, seen)
+        case ast.Subscript(value=ast.Name(id="Annotated"), slice=ast.Tuple(elts=[inner, *said])):
+            yield from _uses(inner, aliases, seen)
+            for item in said:
+                yield from _uses(item, aliases, seen)
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords) if name in KINDS:
+            try:
+                yield KINDS[name](*(_value(item, aliases) for item in arguments),
+                                  **{str(item.arg): _value(item.value, aliases) for item in keywords})
+            except (TypeError, ValueError):
+                return
+
+
+def _value(node: ast.expr, aliases: MappingABC[str, ast.expr]) -> Any:
+    """Return a plain value that is written out, or has a name in the module."""
+    return ast.literal_eval(aliases.get(node.id, node) if isinstance(node, ast.Name) else node)
 
 
 class _Reader:
@@ -125,7 +156,7 @@ class _Reader:
         return None
 
     def _number(self, node: ast.expr) -> Any:
-        return ast.literal_eval(self._aliases.get(node.id, node) if isinstance(node, ast.Name) else node)
+        return _value(node, self._aliases)
 
 
 def _limited(kind: OptionType, said: Limits | Length | None) -> OptionType:

@@ -13,6 +13,7 @@ from modular_framework_core.task_constructor.explanation import explain, explain
 from modular_framework_core.task_constructor.faults import TaskFault, nearest
 from modular_framework_core.task_constructor.generator import GenerationError
 from modular_framework_core.task_constructor.json_schema import task_schema
+from modular_framework_core.task_constructor.known_names import KnownNames, names_of_installation
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSourceError
 from modular_framework_core.task_constructor.task_builder import load_task
 from modular_framework_core.task_constructor.task_graph import FORMATS, GraphError
@@ -20,18 +21,28 @@ from modular_framework_core.task_constructor.task_spec import TaskSpec
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
 
 
-def check_task(script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path]) -> TaskSpec:
+def check_task(
+    script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path],
+    known: KnownNames | None = None,
+) -> TaskSpec:
     """Read and check a task; nothing is run or written.
+
+    Args:
+        script: the task.
+        states_directories: where its states are, in order.
+        templates_directories: where its templates are, in order.
+        known: names of messages and postures there are, as far as that is known.
 
     Raises:
         TaskFault: something is wrong with the task; carries all faults.
         FileNotFoundError: one of the directories is not there.
     """
-    return load_task(script, StateCatalogue(states_directories), TemplateCatalogue(templates_directories))
+    return load_task(script, StateCatalogue(states_directories), TemplateCatalogue(templates_directories), known)
 
 
 def construct_task(
-    script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path], output: Path
+    script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path], output: Path,
+    known: KnownNames | None = None,
 ) -> tuple[TaskSpec, Path]:
     """Check a task and write its module into the directory ``output``; return the task and the path of the module.
 
@@ -41,7 +52,7 @@ def construct_task(
         TaskFault, FileNotFoundError: as ``check_task``.
         GenerationError: a template is at fault.
     """
-    task = check_task(script, states_directories, templates_directories)
+    task = check_task(script, states_directories, templates_directories, known)
     digest = generator.digest_line(task, templates_directories)
     target = generator.module_path(task, output)
     if not generator.is_up_to_date(target, digest):
@@ -62,22 +73,35 @@ def main(arguments: Sequence[str]) -> int:
     """
     parser = _parser()
     given = parser.parse_args([argument for argument in arguments if ":=" not in argument])
+    if (given.explain or given.schema) and given.script is not None and str(given.script) != ".":
+        given.states, given.templates = directories_from(str(given.script)), given.states  # there is no script
     if given.script is None and not given.explain and not given.schema:
         parser.error("the script is missing; only --explain and --schema work without one")
     try:
-        states = given.states or [default_folders.states_folder()]
-        templates = given.templates or [default_folders.templates_folder()]
+        states = default_folders.states_folders(given.states or [])
+        templates = default_folders.templates_folders(given.templates or [])
+        catalogue = StateCatalogue(states)
+        for folder in catalogue.empty_directories:
+            print(no_states_in(folder), file=sys.stderr)
         if given.explain or given.schema:
-            print(_about_language(given, StateCatalogue(states), TemplateCatalogue(templates)))
-        elif given.check or given.graph:
-            print(_checked(given, check_task(given.script, states, templates)))
+            print(_about_language(given, catalogue, TemplateCatalogue(templates)))
+            return 0
+        known = names_of_installation(given.config, given.moveit_config)
+        if given.check or given.graph:
+            print(_checked(given, check_task(given.script, states, templates, known)))
         else:
             output = given.output or generator.default_output_directory()
-            print(construct_task(given.script, states, templates, output)[1])
-    except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownNameError, OSError) as error:
+            print(construct_task(given.script, states, templates, output, known)[1])
+    except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownNameError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1
     return 0
+
+
+def no_states_in(folder: Path) -> str:
+    """Say that a folder of states has none."""
+    return (f"states directory {folder} has no state: no .py file but those that begin with '_'; name the folder that "
+            "has your states, or leave it out (the framework's own states are found without it)")
 
 
 class UnknownNameError(Exception):
@@ -90,13 +114,17 @@ def _parser() -> argparse.ArgumentParser:
         description="Checks a task constructor script and writes the state machine it describes.",
     )
     parser.add_argument("script", type=Path, nargs="?", help="the task, a YAML file")
-    several = "several are separated by ':'; empty or left out: the framework's"
+    several = "several are separated by ':'; the framework's own are found after them"
     parser.add_argument("states", type=directories_from, nargs="?", help=f"directory of the states; {several}")
     parser.add_argument("templates", type=directories_from, nargs="?", help=f"directory of the templates; {several}")
     parser.add_argument("output", type=Path, nargs="?", help="directory to write to (default: in $ROS_HOME)")
     parser.add_argument("--check", action="store_true", help="only check; write nothing")
     formats = ", ".join(f".{name}" for name in FORMATS)
     parser.add_argument("--graph", type=Path, metavar="FILE", help=f"check, and draw the task into a file ({formats})")
+    parser.add_argument("--config", type=Path, metavar="FOLDER",
+                        help="folder whose named_*.yaml have the names a task may use (default: the API package's)")
+    parser.add_argument("--moveit-config", metavar="PACKAGE", default="",
+                        help="MoveIt configuration package of the robot (default: the API package's launch file's)")
     parser.add_argument("--explain", metavar="NAME", help="say what a state or template does and takes")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of tasks, for editors")
     return parser

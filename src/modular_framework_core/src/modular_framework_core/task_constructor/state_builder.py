@@ -6,7 +6,8 @@ from typing import Any
 
 from modular_framework_core.task_constructor import header_fields
 from modular_framework_core.task_constructor.faults import FaultList, Place
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node
+from modular_framework_core.task_constructor.key_spelling import meant_key, spelt_as_meant, value_of
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.task_constructor.option_types import complaint
 from modular_framework_core.task_constructor.params_scope import ParamsScope
 from modular_framework_core.task_constructor.state_catalogue import (
@@ -16,23 +17,42 @@ from modular_framework_core.task_constructor.state_catalogue import (
     StateSourceError,
 )
 from modular_framework_core.task_constructor.task_spec import StateSpec
-from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
 
-_RESERVED = ("source", "params", "transitions")
+_RESERVED = ("source", "transitions", "remapping", "params")
 """Keys of a state that are not options of it."""
 
 
 class StateBuilder:
     """Builds the states of one task; notes what is wrong with them in the list of faults of the task."""
 
-    def __init__(self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList) -> None:
-        """Use these states; the templates serve to tell a nested machine without states from a misspelt state."""
+    def __init__(self, states: StateCatalogue, faults: FaultList) -> None:
+        """Use these states."""
         self._states = states
-        self._templates = templates
         self._faults = faults
-        self.value_faults = 0
-        """How many faults it noted in values of options and in imports, which leave the state's userdata known."""
         self._with_imports_told: set[str] = set()
+
+    def spelt(self, label: str, body: Mapping) -> Mapping:
+        """Return the fields of a state with known keys only; note the unknown ones, and a source that is missing."""
+        source = self._quiet_source(value_of(body, "source"))
+        if source is None:  # its options are not known
+            given = [key for key in body.entries if key == "source" or meant_key(key, ["source"]) is None]
+            body = spelt_as_meant(body, [*_RESERVED, *given], f"state '{label}': key", self._faults)
+        else:
+            free = [key for key in body.entries if source.takes_any_option and key.isidentifier()]
+            what = f"state '{label}' ({source.name}): key"
+            body = spelt_as_meant(body, [*_RESERVED, *source.options, *free], what, self._faults)
+        if "source" not in body.entries:
+            self._faults.add(body.place, f"state '{label}' has no 'source'; add it: the name of a state's file, or "
+                                         "of a template")
+        return body
+
+    def _quiet_source(self, node: Node | None) -> StateSource | None:
+        """Return the state a source names, without a word when it cannot be used."""
+        name = self._states.resolve(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
+        try:
+            return None if name is None else self._states.get(name)
+        except StateSourceError:
+            return None
 
     def build(
         self, label: str, place: Place, body: Mapping, scope: ParamsScope
@@ -54,9 +74,6 @@ class StateBuilder:
         given = {key: value for key, value in body.entries.items() if key not in _RESERVED}
         options = {**self._options_from_params(label, body, scope, source), **given}
         what = f"state '{label}' ({source.name}): option"
-        for key in given:
-            if key not in source.options and not (source.takes_any_option and key.isidentifier()):
-                self._faults.add_unknown(body.keys[key], what, key, source.options)
         before = len(self._faults)
         self._check_imports(label, body, source)
         for option in source.options.values():
@@ -66,7 +83,7 @@ class StateBuilder:
                 wrong = complaint(option.type, options[option.name])
                 if wrong is not None:
                     self._faults.add(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
-        self.value_faults += len(self._faults) - before
+        self._faults.harmless += len(self._faults) - before
         for key in STATE_KEYS:
             if key in options:
                 may_be_empty = key != "outcomes"
@@ -77,7 +94,8 @@ class StateBuilder:
                              "at least two, the first for success and the last for failure, as [success, fail]")
         values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
         return (
-            StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), place),
+            StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), place,
+                      plain_remapping(body), options),
             outcomes,
         )
 
@@ -95,10 +113,7 @@ class StateBuilder:
             return None
         found = self._states.resolve(name)
         if found is None:
-            if self._templates.get(name) is not None:
-                self._faults.add(node.place, f"'{label}' uses the template '{name}' but has no 'states'")
-            else:
-                self._faults.add_unknown(node.place, f"state '{label}': source", name, self._states.names())
+            self._faults.add_unknown(node.place, f"state '{label}': source", name, self._states.names())
             return None
         try:
             return self._states.get(found)
@@ -119,7 +134,7 @@ class StateBuilder:
                 options[key] = scope.resolve(value, FaultList())
             elif key not in scope.used:
                 what = f"state '{label}' ({source.name}): params: option"
-                self._faults.add_unknown(params.keys[key], what, key, source.options)
+                self._faults.add_unknown(params.keys[key], what, key, source.options, given=body.entries)
         return options
 
     def _state_outcomes(self, options: dict[str, Node], source: StateSource) -> tuple[str, ...] | None:
@@ -128,7 +143,15 @@ class StateBuilder:
         return source.default_names("outcomes") or None
 
 
+def plain_remapping(body: Mapping) -> dict[str, str]:
+    """Return the remapping of a state or nested machine: its key -> key around it; none when it cannot be read."""
+    return _plain_names(body.entries.get("remapping"))
+
+
 def plain_transitions(body: Mapping) -> dict[str, str]:
     """Return the transitions of a state or nested machine as outcome -> target; none when they cannot be read."""
-    node = body.entries.get("transitions")
+    return _plain_names(body.entries.get("transitions"))
+
+
+def _plain_names(node: Node | None) -> dict[str, str]:
     return {} if not isinstance(node, Mapping) else {key: str(value.plain()) for key, value in node.entries.items()}

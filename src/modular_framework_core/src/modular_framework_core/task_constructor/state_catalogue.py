@@ -5,13 +5,15 @@ from __future__ import annotations
 import ast
 import functools
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from modular_framework_core.task_constructor.option_annotations import from_annotation
+from modular_framework_core.option_uses import Use
+from modular_framework_core.task_constructor.option_annotations import from_annotation, uses_in
 from modular_framework_core.task_constructor.option_types import Anything, OptionType
 from modular_framework_core.task_constructor.state_imports import missing_imports
+from modular_framework_core.task_constructor.userdata_reads import UserdataReads, reads_of
 
 _FRAMEWORK = Path(__file__).resolve().parents[2]
 
@@ -39,6 +41,7 @@ class StateOption:
         default: the default when it is written as a literal, else None.
         default_known: whether ``default`` is the real default.
         type: what values it takes, as far as its annotation says.
+        uses: what it names, and what userdata it needs, as far as its annotation says.
     """
 
     name: str
@@ -46,6 +49,7 @@ class StateOption:
     default: Any
     default_known: bool
     type: OptionType = Anything()
+    uses: tuple[Use, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,8 @@ class StateSource:
         is_framework_state: whether it is derived from ``FrameworkState``, which needs two outcomes at least.
         doc: docstring of the class.
         missing_imports: what the file imports that Python does not find, a message each.
+        userdata: what the class reads of userdata.
+        text: the source, for what can be told only by a word in it.
     """
 
     name: str
@@ -71,6 +77,8 @@ class StateSource:
     is_framework_state: bool
     doc: str
     missing_imports: tuple[str, ...] = ()
+    userdata: UserdataReads = UserdataReads()
+    text: str = field(default="", repr=False)
 
     def default_names(self, key: str) -> tuple[str, ...] | None:
         """Return the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
@@ -101,14 +109,18 @@ class StateCatalogue:
         Raises:
             FileNotFoundError: a directory is not there.
         """
+        self.empty_directories: list[Path] = []
+        """Directories in which there is no state."""
         self._files: dict[str, Path] = {}
         self._read: dict[str, StateSource | StateSourceError] = {}
         for directory in directories:
             if not directory.is_dir():
                 raise FileNotFoundError(f"states directory {directory} is not a directory")
-            for file in sorted(directory.glob("*.py")):
-                if not file.stem.startswith("_"):
-                    self._files.setdefault(file.stem, file.resolve())
+            files = [file for file in sorted(directory.glob("*.py")) if not file.stem.startswith("_")]
+            if not files:
+                self.empty_directories.append(directory)
+            for file in files:
+                self._files.setdefault(file.stem, file.resolve())
 
     def names(self) -> list[str]:
         """Return the names ``source`` may have, sorted."""
@@ -153,7 +165,8 @@ def _read_state(name: str, file: Path) -> StateSource:
     options, takes_any = _constructor_options(classes[wanted], classes, {**_imported(tree, file), **_aliases(tree)})
     is_ours = _is_framework_state(classes[wanted], classes)
     doc = ast.get_docstring(classes[wanted]) or ""
-    return StateSource(name, file, wanted, options, takes_any, is_ours, doc, missing_imports(tree, file))
+    return StateSource(name, file, wanted, options, takes_any, is_ours, doc, missing_imports(tree, file),
+                       reads_of(classes[wanted]), file.read_text(encoding="utf-8"))
 
 
 def _parsed(file: Path) -> ast.Module:
@@ -223,15 +236,16 @@ def _arguments(
     padding: list[ast.expr | None] = [None] * (len(positional) - len(arguments.defaults))
     pairs = list(zip(positional, [*padding, *arguments.defaults], strict=True))[1:]
     pairs += list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
-    options = {argument.arg: _option(argument.arg, default, from_annotation(argument.annotation, aliases))
-               for argument, default in pairs}
+    options = {argument.arg: _option(argument, default, aliases) for argument, default in pairs}
     return options, arguments.kwarg is not None
 
 
-def _option(name: str, default: ast.expr | None, kind: OptionType) -> StateOption:
+def _option(argument: ast.arg, default: ast.expr | None, aliases: dict[str, ast.expr]) -> StateOption:
+    name, kind = argument.arg, from_annotation(argument.annotation, aliases)
+    uses = uses_in(argument.annotation, aliases)
     if default is None:
-        return StateOption(name, True, None, False, kind)
+        return StateOption(name, True, None, False, kind, uses)
     try:
-        return StateOption(name, False, ast.literal_eval(default), True, kind)
+        return StateOption(name, False, ast.literal_eval(default), True, kind, uses)
     except (ValueError, TypeError, SyntaxError):
-        return StateOption(name, False, None, False, kind)
+        return StateOption(name, False, None, False, kind, uses)

@@ -3,52 +3,55 @@
 from __future__ import annotations
 
 import builtins
-from collections.abc import Iterable
 from pathlib import Path
 
-from modular_framework_core.task_constructor import header_fields, located_yaml, machine_checks
-from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
+from modular_framework_core.task_constructor import header_fields, located_yaml, machine_checks, userdata_checks
+from modular_framework_core.task_constructor.faults import FaultList, Place
+from modular_framework_core.task_constructor.key_spelling import value_of
+from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
-from modular_framework_core.task_constructor.machine_keys import (
-    SHARED_USERDATA,
-    machine_keys,
-    required_keys,
-    root_keys,
-)
+from modular_framework_core.task_constructor.machine_header import HeaderReader
+from modular_framework_core.task_constructor.machine_keys import UNREAD, root_keys
+from modular_framework_core.task_constructor.option_use_checks import check_uses
 from modular_framework_core.task_constructor.params_scope import ParamsScope, params_of
-from modular_framework_core.task_constructor.state_builder import StateBuilder, plain_transitions
+from modular_framework_core.task_constructor.state_builder import StateBuilder, plain_remapping, plain_transitions
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, class_name_of
 from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, TaskSpec
-from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
-
-DEFAULT_OUTCOMES = ("success", "fail")
+from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
 
 
-def load_task(script: Path, states: StateCatalogue, templates: TemplateCatalogue) -> TaskSpec:
+def load_task(
+    script: Path, states: StateCatalogue, templates: TemplateCatalogue, known: KnownNames | None = None
+) -> TaskSpec:
     """Read and check a task.
 
     Args:
         script: the YAML file.
         states: the states it may use.
         templates: the templates its machines may be written with.
+        known: the names of messages and postures there are, as far as that is known.
 
     Raises:
         TaskFault: something is wrong with it; carries all faults.
     """
-    return TaskBuilder(states, templates).build(located_yaml.load(script), str(script))
+    faults = FaultList()
+    document = located_yaml.load(script, faults)
+    return TaskBuilder(states, templates, faults, known).build(document, str(script))
 
 
 class TaskBuilder:
     """Walks through the YAML of one task, outermost machine first."""
 
-    def __init__(self, states: StateCatalogue, templates: TemplateCatalogue) -> None:
-        """Use these states and templates."""
-        self._states = states
+    def __init__(
+        self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList, known: KnownNames | None = None
+    ) -> None:
+        """Use these states, templates and names; note what is wrong in ``faults``."""
         self._templates = templates
-        self._faults = FaultList()
-        self._link_faults = 0
-        self._state_builder = StateBuilder(states, templates, self._faults)
+        self._faults = faults
+        self._known = known or KnownNames()
+        self._headers = HeaderReader(states, templates, faults)
+        self._state_builder = StateBuilder(states, faults)
         self._taken = {class_name_of(name) for name in states.names()} | set(dir(builtins))
 
     def build(self, document: Node, script: str) -> TaskSpec:
@@ -58,18 +61,24 @@ class TaskBuilder:
                                              f"{', '.join(root_keys())}")
             self._faults.raise_if_any()
         assert isinstance(document, Mapping)
+        self._faults.harmless = len(self._faults)
         scope = ParamsScope().inner(params_of(document.entries.get("params"), self._faults), self._faults)
-        header = self._resolved_header(document, scope)
-        self._require(header, required_keys(is_root=True), "the task")
         name = "task"
+        given = value_of(document, "name")
+        label = str(given.value) if isinstance(given, Scalar) else name
+        header = self._headers.spelt(self._resolved_header(document, scope), label, is_root=True)
         if "name" in header.entries:
             name = header_fields.identifier(header.entries["name"], "name", self._faults) or name
         node = name
         if "node_name" in header.entries:
             node = header_fields.node_name(header.entries["node_name"], self._faults) or name
         root = self._machine(name, header, scope, None)
-        if root is not None and len(self._faults) == self._link_faults + self._state_builder.value_faults:
-            machine_checks.check_userdata(root, self._provided_by(), self._faults)
+        external = self._headers.external_names(header)
+        if root is not None:
+            complete = len(self._faults) == self._faults.harmless
+            check_uses(root, self._known.with_names(external), self._faults, complete=complete)
+            if complete:
+                userdata_checks.check_userdata(root, self._provided_by(), self._faults)
         self._faults.raise_if_any()
         assert root is not None, "a machine that could not be built has left a fault"
         return TaskSpec(name, node, script, root)
@@ -79,28 +88,30 @@ class TaskBuilder:
         self, label: str, header: Mapping, scope: ParamsScope, parent: str | None
     ) -> MachineSpec | None:
         """Build a machine from its header, whose references are resolved; ``parent`` is the class name around it."""
-        template = self._template(header, label)
-        known_outcomes = self._outcomes(header)
+        read = self._headers
+        template = read.template(header, label)
+        known_outcomes = read.outcomes(header)
         outcomes = known_outcomes or ()
         type_name = self._unique_type(header, label, parent)
         entries, labels = self._child_entries(header)
         children, links = self._children(entries, scope, type_name, outcomes)
+        initial_state = read.initial_state(header, labels)
         if template is None:
             return None
-        self._check_header_keys(header, template, is_root=parent is None, label=label)
-        outcomes_place = header.entries["outcomes"].place if "outcomes" in header.entries else header.place
-        before_links = len(self._faults)
+        outcomes_place = read.place_of(header, "outcomes")
+        before = len(self._faults)
         if template.concurrent:
             machine_checks.check_concurrent(links, self._faults)
         else:
-            machine_checks.check_sequential(links, labels, known_outcomes, outcomes_place, self._faults)
-        before = len(self._faults)
-        default_outcome = self._default_outcome(header, template, outcomes)
-        outcome_map = self._outcome_map(header, template, outcomes, links)
-        if template.concurrent and known_outcomes and links and len(self._faults) == before:
+            first = [initial_state] if initial_state else labels[:1]
+            machine_checks.check_sequential(links, labels, first, known_outcomes, outcomes_place, self._faults)
+        before_map = len(self._faults)
+        default_outcome = read.default_outcome(header, template, outcomes)
+        outcome_map = read.outcome_map(header, template, outcomes, links)
+        if template.concurrent and known_outcomes and links and len(self._faults) == before_map:
             machine_checks.check_outcomes_produced(outcomes, {*outcome_map, default_outcome}, outcomes_place,
                                                    self._faults)
-        self._link_faults += len(self._faults) - before_links
+        self._faults.harmless += len(self._faults) - before
         return MachineSpec(
             label=label,
             template=template,
@@ -108,48 +119,24 @@ class TaskBuilder:
             outcomes=outcomes,
             states=tuple(children),
             transitions=plain_transitions(header),
-            shares_userdata=self._shares_userdata(header),
+            remapping=plain_remapping(header),
+            shares_userdata=read.shares_userdata(header),
             default_outcome=default_outcome,
             outcome_map=outcome_map,
-            input_keys=self._key_names(header, "input_keys"),
-            output_keys=self._key_names(header, "output_keys"),
+            input_keys=read.key_names(header, "input_keys"),
+            output_keys=read.key_names(header, "output_keys"),
+            initial_state=initial_state,
             options={key: header.entries[key].plain() for key in template.options if key in header.entries},
             place=header.place,
         )
 
     def _resolved_header(self, node: Mapping, scope: ParamsScope) -> Mapping:
-        """Resolve the references of a header, leaving ``params`` and ``states`` for later."""
+        """Resolve the references of a header, leaving what is read later, or not at all."""
         entries = {
-            key: value if key in ("params", "states") else scope.resolve(value, self._faults)
+            key: value if key in UNREAD else scope.resolve(value, self._faults)
             for key, value in node.entries.items()
         }
         return Mapping(entries, node.keys, node.place)
-
-    def _require(self, node: Mapping, keys: Iterable[str], what: str) -> None:
-        for key in keys:
-            if key not in node.entries:
-                self._faults.add(node.place, f"{what} has no '{key}'{nearest(key, set(node.entries))}")
-
-    def _template(self, header: Mapping, label: str) -> TemplateSource | None:
-        if "source" not in header.entries:
-            return None
-        node = header.entries["source"]
-        name = header_fields.text(node, "source", self._faults)
-        if name is None:
-            return None
-        template = self._templates.get(name)
-        if template is None and self._states.resolve(name) is not None:
-            self._faults.add(node.place, f"'{label}' contains states, but its source '{name}' is a state; "
-                                         f"{listing(self._templates.names())}")
-        elif template is None:
-            self._faults.add_unknown(node.place, "template", name, self._templates.names())
-        return template
-
-    def _outcomes(self, header: Mapping) -> tuple[str, ...] | None:
-        """Return the outcomes of a machine; None when they are there and wrong."""
-        if "outcomes" not in header.entries:
-            return DEFAULT_OUTCOMES
-        return header_fields.names(header.entries["outcomes"], "outcomes", self._faults)
 
     def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
         """Return a class name no other machine and no state of the task has."""
@@ -166,48 +153,6 @@ class TaskBuilder:
             candidate, number = f"{wanted}{number}", number + 1
         self._taken.add(candidate)
         return candidate
-
-    def _check_header_keys(self, header: Mapping, template: TemplateSource, *, is_root: bool, label: str) -> None:
-        known = [key.name for key in machine_keys(template) if (key.at_root if is_root else key.nested)]
-        for key in header.entries:
-            if key not in known:
-                what = f"'{label}' (template {template.name}): key"
-                self._faults.add_unknown(header.keys[key], what, key, known)
-
-    def _shares_userdata(self, header: Mapping) -> bool:
-        node = header.entries.get("userdata")
-        if node is None:
-            return False
-        if isinstance(node, Scalar) and node.value == SHARED_USERDATA:
-            return True
-        self._faults.add(node.place, f"userdata can only be {SHARED_USERDATA}, found {kind_of(node)}")
-        return False
-
-    def _default_outcome(
-        self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...]
-    ) -> str | None:
-        node = header.entries.get("default_outcome")
-        if not template.concurrent or not outcomes:
-            return None
-        if node is None:
-            return outcomes[-1]
-        name = header_fields.text(node, "default_outcome", self._faults)
-        if name is not None and name not in outcomes:
-            self._faults.add_unknown(node.place, "default_outcome", name, outcomes)
-        return name
-
-    def _outcome_map(
-        self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...], links: list[ChildLinks]
-    ) -> dict[str, dict[str, str]]:
-        node = header.entries.get("outcome_map")
-        if not template.concurrent or node is None or not outcomes:
-            return {}
-        return machine_checks.check_outcome_map(node, outcomes, links, self._faults)
-
-    def _key_names(self, header: Mapping, key: str) -> tuple[str, ...]:
-        if key not in header.entries:
-            return ()
-        return header_fields.names(header.entries[key], key, self._faults, may_be_empty=True) or ()
 
     # ---- children ------------------------------------------------------------------------------------------
     def _children(
@@ -265,14 +210,17 @@ class TaskBuilder:
     ) -> tuple[ChildSpec | None, ChildLinks]:
         scope = outer.inner(params_of(body.entries.get("params"), self._faults), self._faults)
         body = self._resolved_header(body, scope)
-        self._require(body, ("source",), f"state '{label}'")
         spec: ChildSpec | None
         outcomes: tuple[str, ...] | None
-        if "states" in body.entries:
+        if "states" in body.entries or self._headers.template_named(value_of(body, "source")):
+            body = self._headers.spelt(body, label, is_root=False)
             spec = self._machine(label, body, scope, parent_type)
             outcomes = None if spec is None else spec.outcomes
         else:
+            body = self._state_builder.spelt(label, body)
             spec, outcomes = self._state_builder.build(label, place, body, scope)
+        if spec is not None:
+            userdata_checks.check_remapping(spec, body.entries.get("remapping"), self._faults)
         transitions: dict[str, Scalar] | None = {}
         keys: dict[str, Place] = {}
         node = body.entries.get("transitions")

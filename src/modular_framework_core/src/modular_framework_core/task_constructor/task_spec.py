@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Union
 
 from modular_framework_core.task_constructor.faults import Place
+from modular_framework_core.task_constructor.located_yaml import Node
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.template_catalogue import TemplateSource
 
@@ -23,6 +24,8 @@ class StateSpec:
         outcomes: what it may end with, first = positive, last = negative.
         transitions: outcome -> label or outcome of the machine; empty inside a concurrent machine.
         place: where it is defined.
+        remapping: userdata key of the state -> key of the machine it is in; keys not named are called the same.
+        nodes: the options as read, with the place of every value.
     """
 
     label: str
@@ -32,6 +35,8 @@ class StateSpec:
     outcomes: tuple[str, ...]
     transitions: dict[str, str]
     place: Place
+    remapping: dict[str, str] = field(default_factory=dict)
+    nodes: dict[str, Node] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,8 @@ class MachineSpec:
         outcome_map: for a concurrent machine, outcome -> {label: outcome of that child}.
         input_keys: userdata keys copied from the machine around it.
         output_keys: userdata keys copied to the machine around it.
+        initial_state: label of the state it begins with; "" for the first one.
+        remapping: userdata key of the machine -> key of the machine around it; keys not named are called the same.
         options: further header keys, for templates that use them.
         place: where it is defined.
     """
@@ -65,6 +72,8 @@ class MachineSpec:
     outcome_map: dict[str, dict[str, str]]
     input_keys: tuple[str, ...]
     output_keys: tuple[str, ...]
+    initial_state: str
+    remapping: dict[str, str]
     options: dict[str, Any]
     place: Place
     is_machine: bool = field(default=True, init=False)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import rospy
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.managers.ros_acm_services import apply_matrix
+from modular_framework_core.option_uses import FROM_USERDATA, Key
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest, ModifyACM, ModifyACMRequest
 from modular_framework_states.manager_clients import ManagerError
@@ -18,7 +19,7 @@ MODIFICATIONS = {"": GetModifiedACMRequest.NOTHING,
                  "object-collision": GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION}
 OF_LINKS = {"self-collision": ModifyACMRequest.ROBOT_SELF_COLLISION,
             "object-collision": ModifyACMRequest.ROBOT_OBJECT_COLLISION}
-FROM_USERDATA = "userdata"
+Objects = Annotated[Sequence[str] | str, Key("input", "selected_grasp", when=FROM_USERDATA)]
 SERVICE_TIMEOUT_S = 10.0
 
 
@@ -38,7 +39,7 @@ class AllowManipulatorCollisions(FrameworkState):
     """
 
     def __init__(self, allow: bool, collision_type: Literal["", "self-collision", "object-collision"] = "",
-                 objects: Sequence[str] | str = (), links: Sequence[str] = (),
+                 objects: Objects = (), links: Sequence[str] = (),
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

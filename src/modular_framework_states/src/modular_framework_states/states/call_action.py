@@ -14,7 +14,8 @@ from actionlib_msgs.msg import GoalStatus
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import NotNegative
 from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result, wait_until
-from modular_framework_states.message_filling import FillingError, difference, filled
+from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
+from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
 
 RESULT = "result"
 
@@ -22,10 +23,19 @@ RESULT = "result"
 class CallAction(FrameworkState):
     """Sends a goal and waits for its end; positive when the goal succeeded and the result is as expected.
 
+    A text ``userdata.<key>`` in a goal or expectation stands for what userdata has there, and
+    ``userdata.<key>.<field>`` for a field of it; the key must be an input key.
+
     Args:
         action_name: Action; its type is found out when it is there.
         goal: Field to value, nested as the goal is; fields left out keep their default.
         expect: Field to value of the result, nested as it is.
+        outcome_field: Field of the result that decides about the outcome: true is the first outcome, false the last, a
+            whole number the outcome with that number, from 0, a text the one it names. It decides for an aborted goal
+            too, for which the first outcome is never given.
+        outcome_values: Outcome to the value of that field, or a list of values, that stands for it; any other value
+            is a failure.
+        keep: Userdata key to the field of the result that it receives; the keys must be output keys.
         timeout: Longest wait for the end of the goal [s]; a goal that takes longer is cancelled.
         server_timeout: Longest wait for the action server [s].
         outcomes: First positive, last negative.
@@ -35,21 +45,24 @@ class CallAction(FrameworkState):
             ``result`` receives the result when it is listed.
     """
 
-    def __init__(self, action_name: str, goal: Mapping[str, Any] | None = None,
-                 expect: Mapping[str, Any] | None = None, timeout: NotNegative = 60.0,
-                 server_timeout: NotNegative = 10.0,
+    def __init__(self, action_name: str, goal: MessageFields | None = None, expect: MessageFields | None = None,
+                 timeout: NotNegative = 60.0, server_timeout: NotNegative = 10.0, outcome_field: str = "",
+                 outcome_values: OutcomeValues | None = None, keep: KeptFields | None = None,
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._name, self._goal, self._expected = str(action_name), dict(goal or {}), dict(expect or {})
         self._timeout_s, self._server_timeout_s = float(timeout), float(server_timeout)
+        self._rules = AnswerRules(outcome_field, dict(outcome_values or {}), dict(keep or {}))
+        self._rules.check("CallAction", self.outcomes, self.get_registered_output_keys())
 
     def execute(self, userdata: Any) -> str:
         """Sends the goal and waits."""
         name = rospy.resolve_name(self._name)
         try:
             action_type = self._type_of(name)
-            goal = filled(type(action_type().action_goal.goal), self._goal)
+            goal = filled(type(action_type().action_goal.goal), self._goal, userdata)
+            expected = with_userdata(self._expected, userdata)
             client = actionlib.SimpleActionClient(name, action_type)
             wait_for_action(client, name, self._server_timeout_s)
         except (CallError, FillingError) as error:
@@ -62,16 +75,21 @@ class CallAction(FrameworkState):
             return self.stopped()
         if status == GoalStatus.LOST:
             return self.fail(f"action '{name}' did not end within {self._timeout_s} s; the goal was cancelled")
-        if status != GoalStatus.SUCCEEDED:
-            return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}: "
-                             f"{client.get_goal_status_text() or 'it gave no reason'}")
-        result = client.get_result()
-        wrong = difference(result, self._expected)
-        if wrong:
-            return self.fail(f"action '{name}' succeeded, but {wrong}")
+        return self._end(name, client, status, expected, userdata)
+
+    def _end(self, name: str, client: Any, status: int, expected: Mapping[str, Any], userdata: Any) -> str:
+        """Returns the outcome of a goal that has ended."""
+        result, said = client.get_result(), client.get_goal_status_text() or "it gave no reason"
+        what = f"action '{name}' ended as {GoalStatus.to_string(status)}: {said}"
+        aborted = status == GoalStatus.ABORTED and self._rules.outcome_field
+        if result is None or (status != GoalStatus.SUCCEEDED and not aborted):
+            return self.fail(what)
         if RESULT in self.get_registered_output_keys():
             userdata[RESULT] = result
-        return self.succeed()
+        wrong = difference(result, expected)
+        if wrong:
+            return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}, but {wrong}")
+        return end_with(self, self._rules, result, userdata, what, said, aborted=bool(aborted))
 
     def _type_of(self, name: str) -> Any:
         found: list[str] = []

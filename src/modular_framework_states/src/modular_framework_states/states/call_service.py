@@ -2,7 +2,7 @@
 """Lets a task call any service."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import rospy
@@ -11,7 +11,8 @@ import rosservice
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import NotNegative
 from modular_framework_core.ros_calls import CallError, call_service, wait_until
-from modular_framework_states.message_filling import FillingError, difference, filled
+from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
+from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
 
 ANSWER = "response"
 
@@ -20,10 +21,18 @@ class CallService(FrameworkState):
     """Calls a service; positive when the answer's field ``success`` (or ``ok``), if it has one, is true and all is as
     expected.
 
+    A text ``userdata.<key>`` in a request or expectation stands for what userdata has there, and
+    ``userdata.<key>.<field>`` for a field of it; the key must be an input key.
+
     Args:
         service_name: Service; its type is found out when it is there.
         request: Field to value, nested as the request is; fields left out keep their default.
         expect: Field to value of the answer, nested as it is.
+        outcome_field: Field of the answer that decides about the outcome, instead of ``success`` or ``ok``: true is the
+            first outcome, false the last, a whole number the outcome with that number, from 0, a text the one it names.
+        outcome_values: Outcome to the value of that field, or a list of values, that stands for it; any other value
+            is a failure.
+        keep: Userdata key to the field of the answer that it receives; the keys must be output keys.
         timeout: Longest wait for the service, and again for its answer [s].
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
@@ -32,13 +41,16 @@ class CallService(FrameworkState):
             ``response`` receives the answer when it is listed.
     """
 
-    def __init__(self, service_name: str, request: Mapping[str, Any] | None = None,
-                 expect: Mapping[str, Any] | None = None, timeout: NotNegative = 10.0,
+    def __init__(self, service_name: str, request: MessageFields | None = None, expect: MessageFields | None = None,
+                 timeout: NotNegative = 10.0, outcome_field: str = "", outcome_values: OutcomeValues | None = None,
+                 keep: KeptFields | None = None,
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._name, self._request, self._expected = str(service_name), dict(request or {}), dict(expect or {})
         self._timeout_s = float(timeout)
+        self._rules = AnswerRules(outcome_field, dict(outcome_values or {}), dict(keep or {}))
+        self._rules.check("CallService", self.outcomes, self.get_registered_output_keys())
 
     def execute(self, userdata: Any) -> str:
         """Calls the service and looks at the answer."""
@@ -51,18 +63,23 @@ class CallService(FrameworkState):
             if self.preempt_requested():
                 return self.stopped()
             service_type = rosservice.get_service_class_by_name(name)
-            request = filled(service_type._request_class, self._request)
+            request = filled(service_type._request_class, self._request, userdata)
+            expected = with_userdata(self._expected, userdata)
             answer = call_service(rospy.ServiceProxy(name, service_type), request, self._timeout_s)
         except (CallError, FillingError, rosservice.ROSServiceException) as error:
             return self.fail(f"service '{name}': {error}")
-        for field in ("success", "ok"):
-            if getattr(answer, field, True) is False:
-                said = next((str(getattr(answer, text)) for text in ("message", "status_message")
-                             if getattr(answer, text, "")), "it gave no reason")
-                return self.fail(f"service '{name}' answered {field}: false: {said}")
-        wrong = difference(answer, self._expected)
-        if wrong:
-            return self.fail(f"service '{name}' answered, but {wrong}")
         if ANSWER in self.get_registered_output_keys():
             userdata[ANSWER] = answer
-        return self.succeed()
+        for field in () if self._rules.outcome_field else ("success", "ok"):
+            if getattr(answer, field, True) is False:
+                return self.fail(f"service '{name}' answered {field}: false: {_said(answer)}")
+        wrong = difference(answer, expected)
+        if wrong:
+            return self.fail(f"service '{name}' answered, but {wrong}")
+        return end_with(self, self._rules, answer, userdata, f"service '{name}'", _said(answer))
+
+
+def _said(answer: Any) -> str:
+    """Returns the reason an answer gives in its fields."""
+    return next((str(getattr(answer, text)) for text in ("message", "status_message") if getattr(answer, text, "")),
+                "it gave no reason")

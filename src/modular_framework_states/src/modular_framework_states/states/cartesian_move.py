@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.moveit_requests import error_name, robot_state
 from modular_framework_core.option_limits import Limits, Share, Vector
+from modular_framework_core.option_uses import Named
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_states.manager_clients import ManagerError, fetch
 
@@ -37,7 +38,8 @@ class CartesianMove(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, pose_name: str = "", offset: Vector | None = None, offset_in_tip: bool = False,
+    def __init__(self, pose_name: Annotated[str, Named("pose")] = "", offset: Vector | None = None,
+                 offset_in_tip: bool = False,
                  max_step: Annotated[float, Limits(above=0.0, at_most=1000.0)] = 0.01, min_fraction: Share = 1.0,
                  speed: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 0.0, avoid_collisions: bool = True,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),

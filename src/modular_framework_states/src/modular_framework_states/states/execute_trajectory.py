@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import rospy
@@ -15,6 +15,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.moveit_requests import robot_state
 from modular_framework_core.option_limits import NotNegative, Positive
+from modular_framework_core.option_uses import Named
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_states.arm_positions import run_to_end
 from modular_framework_states.manager_clients import ManagerError, fetch
@@ -39,7 +40,8 @@ class ExecuteTrajectory(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, trajectory_name: str = "", step: NotNegative = 0.05, goal_tolerance: Positive = 0.03,
+    def __init__(self, trajectory_name: Annotated[str, Named("trajectory")] = "", step: NotNegative = 0.05,
+                 goal_tolerance: Positive = 0.03,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

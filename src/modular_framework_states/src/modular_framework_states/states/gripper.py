@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import Finite, Positive, Share
+from modular_framework_core.option_uses import Named
 from modular_framework_core.robot_groups import RobotModelError
 from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
 from modular_framework_states.manipulator_postures import posture_grasp, posture_positions
@@ -27,7 +28,8 @@ class Gripper(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, posture: str = "", positions: Mapping[str, Finite] | None = None, grip: bool = False,
+    def __init__(self, posture: Annotated[str, Named("posture")] = "",
+                 positions: Mapping[str, Finite] | None = None, grip: bool = False,
                  torque: Share = 1.0, timeout: Positive = 30.0, outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import rospy
 from std_msgs.msg import String
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import Finite
+from modular_framework_core.option_uses import Key
 
 TOPIC = "task_metrics"
 
@@ -30,7 +31,8 @@ class LogMetric(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, name_of_metric: str, value: Finite | None = None, from_key: str = "", unit: str = "",
+    def __init__(self, name_of_metric: str, value: Finite | None = None, from_key: Annotated[str, Key("input")] = "",
+                 unit: str = "",
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

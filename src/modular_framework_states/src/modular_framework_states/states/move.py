@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import NotNegative
+from modular_framework_core.option_uses import Named
 from modular_framework_states.arm_positions import run_to_end, worst_joint
 from modular_framework_states.manager_clients import ManagerError, fetch
 
@@ -25,7 +26,8 @@ class Move(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, plan_name: str = "", start_tolerance: NotNegative = 0.02, goal_tolerance: NotNegative = 0.03,
+    def __init__(self, plan_name: Annotated[str, Named("plan")] = "", start_tolerance: NotNegative = 0.02,
+                 goal_tolerance: NotNegative = 0.03,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
@@ -43,7 +45,7 @@ class Move(FrameworkState):
         if not trajectory.points:
             return self.fail(f"plan '{self._plan_name}' has no point")
         first = dict(zip(trajectory.joint_names, trajectory.points[0].positions, strict=False))
-        away = worst_joint(commander.current_joints(), first)
+        away = worst_joint(commander.positions_of(first), first)
         if away[1] > self._start_tolerance:
             return self.fail(f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
                              f"its first point, allowed is {self._start_tolerance}; plan again from the current state")

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+from modular_framework_core.arm_commander import CommanderError
 from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_uses import FROM_USERDATA, Named, kind_of
 from modular_framework_states.grasp_stages import (
     StageError,
     arrival_fingers,
     near_joints,
     stage_joints,
 )
-from modular_framework_states.manager_clients import ManagerError, fetch, kind_of, store_plan
+from modular_framework_states.manager_clients import ManagerError, fetch, store_plan
 
 StateType = Literal["pose", "joint_state", "pregrasp", "grasp", "postgrasp"]
-FROM_USERDATA = "userdata"
+TargetName = Annotated[str, Named("option:target_state_type", userdata=True)]
+StartName = Annotated[str, Named("option:starting_state_type", userdata=True)]
 
 
 class Plan(FrameworkState):
@@ -31,25 +34,28 @@ class Plan(FrameworkState):
         plan_name: Name to store the plan under; empty stores it anonymously.
         starting_state_type: As the target's; empty starts from where the arm is.
         starting_state_name: As the target's.
+        group: Planning group to plan for; empty for that of the arm commander (``arm_group_name``).
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
         output_keys: Userdata that is written; ``selected_plan`` receives the plan when it is listed.
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, target_state_type: StateType, target_state_name: str = "", plan_name: str = "",
-                 starting_state_type: StateType | Literal[""] = "", starting_state_name: str = "",
+    def __init__(self, target_state_type: StateType, target_state_name: TargetName = "",
+                 plan_name: Annotated[str, Named("plan", made=True)] = "",
+                 starting_state_type: StateType | Literal[""] = "", starting_state_name: StartName = "",
+                 group: Annotated[str, Named("group")] = "",
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._target_type, self._target_name = target_state_type, target_state_name
         self._start_type, self._start_name = starting_state_type, starting_state_name
-        self._plan_name = plan_name
+        self._plan_name, self._group = plan_name, group
 
     def execute(self, userdata: Any) -> str:
         """Plans and stores the plan."""
         try:
-            commander = userdata.arm_commander
+            commander = userdata.arm_commander.of_group(self._group)
             start = self._start(userdata, commander)
             target = self._target(userdata, commander, start)
             if self.preempt_requested():
@@ -60,7 +66,7 @@ class Plan(FrameworkState):
             if self.preempt_requested():
                 return self.stopped()
             store_plan(result.trajectory, self._plan_name)
-        except (ManagerError, StageError) as error:
+        except (ManagerError, StageError, CommanderError) as error:
             return self.fail(f"{self._describe()}: {error}")
         if "selected_plan" in self.get_registered_output_keys():
             userdata.selected_plan = result.trajectory

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_states.manager_clients import ManagerError, fetch, kind_of
+from modular_framework_core.option_uses import Key, Named, kind_of
+from modular_framework_states.manager_clients import ManagerError, fetch
 
-MessageType = Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"]
+MessageType = Annotated[Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"],
+                        Key("output", "selected_{}")]
+Names = Annotated[Sequence[str] | str | None, Named("option:message_type")]
 
 
 class Select(FrameworkState):
@@ -27,7 +30,7 @@ class Select(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, message_type: MessageType, message_names: Sequence[str] | str | None = None,
+    def __init__(self, message_type: MessageType, message_names: Names = None,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)

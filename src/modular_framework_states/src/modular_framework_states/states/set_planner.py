@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import Limits, Share
+from modular_framework_core.option_uses import Named
 
 
 class SetPlanner(FrameworkState):
@@ -17,6 +18,7 @@ class SetPlanner(FrameworkState):
         planning_time: Time a plan may take [s].
         attempts: How often a plan is tried for.
         speed_factor: Share of the joints' velocity and acceleration limits.
+        group: Planning group whose settings change; empty for that of the arm commander (``arm_group_name``).
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
         output_keys: Userdata that is written.
@@ -26,18 +28,19 @@ class SetPlanner(FrameworkState):
     def __init__(self, planner_id: str = "",
                  planning_time: Annotated[float, Limits(above=0.0, at_most=86400.0)] | None = None,
                  attempts: Annotated[int, Limits(at_least=1)] | None = None, speed_factor: Share | None = None,
+                 group: Annotated[str, Named("group")] = "",
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("arm_commander",)) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-        self._planner_id = planner_id
+        self._planner_id, self._group = planner_id, group
         self._settings = {"set_planning_time": planning_time, "set_num_planning_attempts": attempts,
                           "set_max_velocity_scaling_factor": speed_factor}
 
     def execute(self, userdata: Any) -> str:
         """Sets what was given, after a look whether there is such a planner."""
-        commander = userdata.arm_commander
         try:
+            commander = userdata.arm_commander.of_group(self._group)
             if self._planner_id:
                 known = commander.planner_names()
                 if self._planner_id not in known:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import roslib.message
@@ -11,7 +11,8 @@ import rospy
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import Positive
-from modular_framework_states.message_filling import difference
+from modular_framework_states.answers import MessageFields
+from modular_framework_states.message_filling import FillingError, difference, with_userdata
 
 FOUND = "message"
 
@@ -22,7 +23,8 @@ class WaitForMessage(FrameworkState):
     Args:
         topic_name: Topic.
         timeout: Longest wait [s]; None waits without limit.
-        expect: Field to value, nested as the message is; other messages are passed over.
+        expect: Field to value, nested as the message is; other messages are passed over. A text ``userdata.<key>``
+            stands for what userdata has there, and ``userdata.<key>.<field>`` for a field of it.
         outcomes: First positive, last negative.
         input_keys: Userdata that is read.
         output_keys: Userdata that is written.
@@ -30,19 +32,24 @@ class WaitForMessage(FrameworkState):
             ``message`` receives the message when it is listed.
     """
 
-    def __init__(self, topic_name: str, timeout: Positive | None = None, expect: Mapping[str, Any] | None = None,
+    def __init__(self, topic_name: str, timeout: Positive | None = None, expect: MessageFields | None = None,
                  outcomes: Sequence[str] = ("success", "fail"),
                  input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._expected = dict(expect or {})
+        self._wanted: dict[str, Any] = {}
         self._found: list[Any] = []
         self._last_difference = ""
 
     def execute(self, userdata: Any) -> str:
         """Waits for a publisher, whose type it takes, then subscribes, waits and unsubscribes."""
         self._found, self._last_difference = [], "nobody publishes it"
+        try:
+            self._wanted = with_userdata(self._expected, userdata)
+        except FillingError as error:
+            return self.fail(f"message of topic '{self._topic}': {error}")
         end = None if self._timeout_s is None else time.monotonic() + self._timeout_s
         name = rospy.resolve_name(self._topic)
         arrived = self._wait(lambda: bool(published_type(name)), end, 0.1) and self._receive(name, end)
@@ -71,7 +78,7 @@ class WaitForMessage(FrameworkState):
         return self.wait_until(condition, None if end is None else max(0.0, end - time.monotonic()), period_s)
 
     def _on_message(self, message: Any) -> None:
-        self._last_difference = difference(message, self._expected)
+        self._last_difference = difference(message, self._wanted)
         if not self._last_difference:
             self._found.append(message)
 

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks what the options of states stand for: names that must exist, and userdata the states must declare."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from modular_framework_core.option_uses import (
+    FROM_USERDATA,
+    USERDATA_PREFIX,
+    Fields,
+    Key,
+    Named,
+    OutcomeNames,
+    OutputKeys,
+    kind_of,
+)
+from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
+from modular_framework_core.task_constructor.known_names import KnownNames
+from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence
+from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
+from modular_framework_core.task_constructor.userdata_checks import declared_keys
+
+_PLURALS = {"trajectory": "trajectories"}
+_WORDS = {"posture": "posture", "group": "planning group"}
+
+
+def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
+    """Check the options of all states of a task.
+
+    Args:
+        root: the outermost machine.
+        known: the names there are beside those that states of the task make.
+        faults: where faults are noted.
+        complete: whether all states of the task could be read, so that no other makes a plan.
+    """
+    states = list(root.leaf_states())
+    names = known.with_names(_made(states))
+    open_kinds = {kind for kind in names.names if any(_may_make(state, kind) for state in states)}
+    open_kinds |= set() if complete else {"plan"}
+    for state in states:
+        _Checker(state, names, open_kinds, faults).check()
+
+
+class _Checker:
+    """Checks the options of one state."""
+
+    def __init__(self, state: StateSpec, known: KnownNames, open_kinds: set[str], faults: FaultList) -> None:
+        self._state = state
+        self._known = known
+        self._open = open_kinds
+        self._faults = faults
+        self._inputs = _declared(state, ("input_keys", "io_keys"))
+        self._outputs = _declared(state, ("output_keys", "io_keys"))
+
+    def check(self) -> None:
+        """Note everything that is wrong."""
+        source = self._state.source
+        for option in source.options.values():
+            node = self._state.nodes.get(option.name)
+            value = option.default if node is None else node.plain()
+            for use in option.uses:
+                self._check_use(use, option.name, value, node)
+        self._check_reads()
+
+    def _check_use(self, use: Any, name: str, value: Any, node: Node | None) -> None:
+        place = self._state.place if node is None else node.place
+        match use:
+            case Named():
+                self._check_name(use, name, node)
+            case Key(direction=direction, name=key, when=when):
+                if not value or (when and value not in (when, [when])):
+                    return
+                needed = str(value) if not key else key.format(kind_of(str(value)))
+                self._need(direction, needed, f"option '{name}' {value!r}", place)
+            case Fields() if node is not None:
+                for place, text in _references(node):
+                    self._need("input", text.removeprefix(USERDATA_PREFIX).split(".")[0], f"'{text}'", place)
+            case OutputKeys() if isinstance(node, Mapping):
+                for key in node:
+                    self._need("output", key, f"option '{name}'", node.keys[key])
+            case OutcomeNames() if isinstance(node, Mapping) and self._state.outcomes:
+                for key in node:
+                    if key not in self._state.outcomes:
+                        what = f"state '{self._state.label}': {name}: outcome"
+                        self._faults.add_unknown(node.keys[key], what, key, self._state.outcomes, given=node.entries)
+
+    def _check_name(self, use: Named, option: str, node: Node | None) -> None:
+        kind_word = self._kind_word(use.kind)
+        kind = kind_of(kind_word)
+        for item in node.items if isinstance(node, Sequence) else [] if node is None else [node]:
+            name = item.value if isinstance(item, Scalar) else None
+            if not isinstance(name, str) or not name or use.made:
+                continue
+            if use.userdata and name == FROM_USERDATA:
+                keys = tuple(dict.fromkeys((f"selected_{kind_word}", f"selected_{kind}")))
+                if self._inputs is not None and not self._inputs.intersection(keys):
+                    self._need("input", keys[-1], f"option '{option}' 'userdata'", item.place)
+                continue
+            names = self._known.names.get(kind)
+            if names is not None and kind not in self._open and name not in names:
+                self._faults.add(item.place, self._unknown(option, kind, name, names))
+
+    def _unknown(self, option: str, kind: str, name: str, names: frozenset[str]) -> str:
+        word = _WORDS.get(kind, kind.replace("_", " "))
+        text = (f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
+                f"unknown; {listing(sorted(names), 'there is none')}")
+        origin = self._known.origins.get(kind, "the manager's file")
+        meant = nearest(name, sorted(names))
+        if kind in _WORDS:
+            return f"{text}; name one of these, or add it to {origin}{meant}"
+        maker = "let a state make it (plan_name)" if kind == "plan" else f"add it to {origin}"
+        return f"{text}; {maker}, or name it in external_names of the task where another node adds it{meant}"
+
+    def _kind_word(self, kind: str) -> str:
+        if not kind.startswith("option:"):
+            return kind
+        return str(self._state.options.get(kind.removeprefix("option:"), ""))
+
+    def _need(self, direction: str, key: str, what: str, place: Place, listed: str = "") -> None:
+        declared = self._inputs if direction == "input" else self._outputs
+        if declared is None or key in declared:
+            return
+        does = "takes" if direction == "input" else "writes"
+        self._faults.add(place, f"state '{self._state.label}' ({self._state.source.name}): {what} {does} the userdata "
+                                f"key '{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
+                                f"add it to {listed or f'{direction}_keys'}")
+
+    def _check_reads(self) -> None:
+        """Note keys that the source reads and the task's own lists of keys leave out."""
+        source, inputs = self._state.source, self._inputs
+        if inputs is None:
+            return
+        by_default = {key for option in ("input_keys", "io_keys") if option in self._state.nodes
+                      for key in source.default_names(option) or ()}
+        for key in sorted((by_default & source.userdata.anywhere) | source.userdata.always):
+            if key in inputs:
+                continue
+            listed = "io_keys" if key in (source.default_names("io_keys") or ()) else "input_keys"
+            place = self._state.nodes[listed].place if listed in self._state.nodes else self._state.place
+            self._need("input", key, source.file.name, place, listed)
+
+
+def _declared(state: StateSpec, lists: tuple[str, ...]) -> frozenset[str] | None:
+    """Return the keys of some lists together; None where one of them is not known."""
+    found = [declared_keys(state, name) for name in lists]
+    return None if None in found else frozenset(key for keys in found for key in keys or ())
+
+
+def _references(node: Node) -> Iterator[tuple[Place, str]]:
+    """Yield the references to userdata in the fields of a message, with their places."""
+    match node:
+        case Scalar(value=str(text)) if text.startswith(USERDATA_PREFIX):
+            yield node.place, text
+        case Sequence(items=items):
+            for item in items:
+                yield from _references(item)
+        case Mapping(entries=entries):
+            for item in entries.values():
+                yield from _references(item)
+
+
+def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
+    """Return the names that states of the task store messages under: kind -> names."""
+    found: dict[str, set[str]] = {}
+    for state in states:
+        for option in state.source.options.values():
+            for use in option.uses:
+                if isinstance(use, Named) and use.made:
+                    found.setdefault(use.kind, set()).add(str(state.options.get(option.name, option.default)))
+    return {kind: frozenset(names - {""}) for kind, names in found.items()}
+
+
+def _may_make(state: StateSpec, kind: str) -> bool:
+    """Return whether a state may store messages of a kind under names that cannot be told from the task.
+
+    So does what loads files of messages, what calls a service of the kind's manager by its name, and a state whose own
+    source speaks of such a service.
+    """
+    plural = _PLURALS.get(kind, f"{kind}s")
+    if state.source.name == "load" and state.options.get("kind") == kind:
+        return True
+    services = (f"add_{kind}", f"load_{plural}", f"reload_{plural}", f"store_{kind}(")
+    words = [str(value) for value in state.options.values() if isinstance(value, str)]
+    return any(service in text for service in services for text in [*words, state.source.text])

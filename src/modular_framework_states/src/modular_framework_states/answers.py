@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a task makes of the answer of a service or action: the outcome that a field of it says, and fields to keep."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.option_uses import Fields, OutcomeNames, OutputKeys
+from modular_framework_states.message_filling import FillingError, field_at
+
+MessageFields = Annotated[Mapping[str, Any], Fields()]
+OutcomeValues = Annotated[Mapping[str, Any], OutcomeNames()]
+KeptFields = Annotated[Mapping[str, str], OutputKeys()]
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerRules:
+    """What is made of an answer.
+
+    Attributes:
+        outcome_field: Field that decides about the outcome; empty when none does.
+        outcome_values: Outcome to the value of the field, or a list of values, that stands for it.
+        keep: Userdata key to the field that it receives.
+    """
+
+    outcome_field: str = ""
+    outcome_values: Mapping[str, Any] = field(default_factory=dict)
+    keep: Mapping[str, str] = field(default_factory=dict)
+
+    def check(self, state: str, outcomes: Sequence[str], output_keys: Sequence[str]) -> None:
+        """Checks the rules against what the state declares.
+
+        Raises:
+            ValueError: An outcome or a key is not declared, or values are given without a field.
+        """
+        if self.outcome_values and not self.outcome_field:
+            raise ValueError(f"{state}: outcome_values without outcome_field; name the field that has the values")
+        unknown = [name for name in self.outcome_values if name not in outcomes]
+        if unknown:
+            raise ValueError(f"{state}: outcome_values names {unknown}; its outcomes are {list(outcomes)}")
+        missing = [key for key in self.keep if key not in output_keys]
+        if missing:
+            raise ValueError(f"{state}: keep writes {missing}; its output keys are {sorted(output_keys)}; add them")
+
+    def outcome(self, answer: Any, outcomes: Sequence[str]) -> str:
+        """Returns the outcome that the answer's field stands for.
+
+        Without ``outcome_values`` a true value stands for the first outcome and a false one for the last, a whole
+        number for the outcome with that number, from 0, and a text for the outcome of that name.
+
+        Raises:
+            FillingError: The field is not there, or its value stands for no outcome.
+        """
+        value = field_at(answer, self.outcome_field)
+        if self.outcome_values:
+            for name, wanted in self.outcome_values.items():
+                if value in (wanted if isinstance(wanted, list | tuple) else [wanted]):
+                    return name
+            raise FillingError(f"{self.outcome_field} is {value!r}, which is none of outcome_values: "
+                               f"{dict(self.outcome_values)}")
+        match value:
+            case bool():
+                return outcomes[0 if value else -1]
+            case int() if 0 <= value < len(outcomes):
+                return outcomes[value]
+            case str() if value in outcomes:
+                return value
+        raise FillingError(f"{self.outcome_field} is {value!r}, which stands for no outcome; allowed are a truth "
+                           f"value, 0 to {len(outcomes) - 1}, or one of {', '.join(outcomes)}; say others in "
+                           "outcome_values")
+
+    def kept(self, answer: Any) -> dict[str, Any]:
+        """Returns the userdata that fields of the answer give.
+
+        Raises:
+            FillingError: A field is not there.
+        """
+        return {key: field_at(answer, path) for key, path in self.keep.items()}
+
+
+def end_with(state: FrameworkState, rules: AnswerRules, answer: Any, userdata: Any, what: str, said: str,
+             aborted: bool = False) -> str:
+    """Ends a state as an answer says: keeps its fields and returns the outcome.
+
+    Args:
+        state: The state.
+        rules: What is made of the answer.
+        answer: The answer.
+        userdata: Where fields are kept.
+        what: What answered, for reasons.
+        said: The reason the answer gives.
+        aborted: Whether what answered calls it a failure, which the first outcome cannot be then.
+    """
+    try:
+        outcome = rules.outcome(answer, state.outcomes) if rules.outcome_field else state.outcomes[0]
+        if aborted and outcome == state.outcomes[0]:
+            return state.fail(f"{what}; its {rules.outcome_field} says '{outcome}'")
+        for key, value in rules.kept(answer).items():
+            userdata[key] = value
+    except FillingError as error:
+        return state.fail(f"{what}: {error}")
+    if outcome == state.outcomes[0]:
+        return state.succeed()
+    reason = f"{what}: its {rules.outcome_field} is {field_at(answer, rules.outcome_field)!r}: {said}"
+    return state.end(outcome, reason)
