@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import rospy
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import Positive
+from modular_framework_core.option_uses import Named
 from modular_framework_core.robot_groups import RobotModelError
 from modular_framework_core.ros_calls import CallError, wait_until
 from modular_framework_states.grasp_goals import GraspGoalError, send
@@ -34,7 +35,7 @@ class Release(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, posture: str = "open", timeout: Positive = 30.0,
+    def __init__(self, posture: Annotated[str, Named("posture")] = "open", timeout: Positive = 30.0,
                  outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
                  output_keys: Sequence[str] = (),
                  io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
