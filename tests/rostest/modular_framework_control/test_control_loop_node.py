@@ -94,6 +94,16 @@ WAITING = """
   </node>
 </launch>
 """
+SECOND = """
+<launch>
+  <group ns="second">
+    <rosparam>arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}</rosparam>
+    <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen">
+      <rosparam>{joints: [shoulder]}</rosparam>
+    </node>
+  </group>
+</launch>
+"""
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +206,7 @@ def test_what_every_controller_claims_is_listed_on_the_wire(robot: Any) -> None:
               rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller}
     claims = {name: [(claim.hardware_interface, claim.resources) for claim in entry.claimed_resources]
               for name, entry in listed.items()}
-    assert claims == {"arm": [("hardware_interface::PositionJointInterface", ["elbow", "shoulder"])],
+    assert claims == {"arm": [("hardware_interface::PositionJointInterface", ["shoulder", "elbow"])],
                       "wheel": [("hardware_interface::VelocityJointInterface", ["wheel"])],
                       "wrench": [("hardware_interface::ForceTorqueSensorInterface", [])]}
 
@@ -244,6 +254,18 @@ def rosnode_pid(name: str) -> int:
     _, _, uri = rospy.get_master().lookupNode(name)
     _, _, pid = xmlrpc.client.ServerProxy(uri).getPid("/test")
     return int(pid)
+
+
+def test_rosnode_kill_ends_goals_like_a_signal(ros_launch: Callable[..., Any]) -> None:
+    session = ros_launch(SECOND)
+    rospy.wait_for_service("second/controller_manager/load_controller", 60.0)
+    assert rospy.ServiceProxy("second/controller_manager/load_controller", LoadController)("arm").ok
+    assert rospy.ServiceProxy("second/controller_manager/switch_controller", SwitchController)(
+        ["arm"], [], 2, False, 0.0).ok
+    arm = follow("second/arm", ["shoulder"], [1.0], 60.0)
+    subprocess.run(["rosnode", "kill", "/second/robot_hw"], env=session.env, check=True, timeout=60.0)
+    assert arm.wait_for_result(rospy.Duration(30.0)), "the end of the goal is not lost with the node"
+    assert arm.get_state() == GoalStatus.PREEMPTED and "stopped" in arm.get_goal_status_text()
 
 
 def test_every_listed_hardware_that_is_not_ready_in_time_is_named(ros_launch: Callable[..., Any],
