@@ -7,6 +7,7 @@ ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 VENV="$ROOT/.venv"
 LOG="$ROOT/logs/install.log"
 STAMPS="$ROOT/.venv/.stamps"
+PROGRESS_PERIOD_S=${PROGRESS_PERIOD_S:-30}
 
 usage() {
   cat <<'TEXT'
@@ -33,19 +34,48 @@ fail() {  # message, what to do
   exit 1
 }
 
+# Shows that a step goes on: on a terminal its seconds and the last line of the log, elsewhere now and then its seconds.
+show_progress() {  # title
+  local start=$SECONDS shown=$SECONDS line
+  while sleep 1 >/dev/null && kill -0 "$$" 2>/dev/null; do
+    if [ -t 1 ]; then
+      line="$1 ... $((SECONDS - start)) s  $(tail -n 1 "$LOG" | tr -cd '[:print:]')"
+      printf '\r%s\033[K' "${line:0:$(($(tput cols 2>/dev/null || echo 80) - 1))}"
+    elif [ $((SECONDS - shown)) -ge "$PROGRESS_PERIOD_S" ]; then
+      shown=$SECONDS
+      printf '%d s ... ' $((SECONDS - start))
+    fi
+  done
+}
+
 # Runs a step with its output in the log; on failure shows the end of the log and what to do.
 step() {  # title, what to do on failure, command...
-  local title=$1 remedy=$2 start=$SECONDS
+  local title=$1 remedy=$2 start=$SECONDS code=0 progress clear=""
   shift 2
   printf '%s ... ' "$title"
   printf '\n==== %s\n' "$title" >>"$LOG"
-  if "$@" >>"$LOG" 2>&1; then
-    printf 'done (%d s)\n' $((SECONDS - start))
+  show_progress "$title" &
+  progress=$!
+  "$@" >>"$LOG" 2>&1 || code=$?
+  kill "$progress" 2>/dev/null || true
+  wait "$progress" 2>/dev/null || true
+  [ ! -t 1 ] || clear=$(printf '\r\033[K%s ... ' "$title")
+  if [ "$code" = 0 ]; then
+    printf '%sdone (%d s)\n' "$clear" $((SECONDS - start))
   else
-    printf 'FAILED\n'
+    printf '%sFAILED\n' "$clear"
     tail -n 25 "$LOG" >&2
     fail "$title failed; the whole output is in $LOG" "$remedy"
   fi
+}
+
+check_path() {
+  case $ROOT in
+    *[[:space:]:\;\$\&#\"\'\`\\\(\)]*)
+      fail "the checkout is in '$ROOT'; catkin and make cannot build in a path with a space or one of : ; \$ & # \" ' \` \\ ( )" \
+        "move it to a path of letters, digits, '/', '_', '-' and '.', then run this script again"
+      ;;
+  esac
 }
 
 check_system() {
@@ -221,6 +251,7 @@ find_underlay() {
 }
 
 set_up_packages() {
+  check_path
   check_system
   mkdir -p "$ROOT/logs"
   : >"$LOG"
@@ -240,8 +271,9 @@ source_workspace() {
   local space=devel
   [ "${INSTALL_SPACE:-0}" = 1 ] && space=install
   # One computer: nodes listen on the loopback interface only, and its name need not resolve. A user's own choice wins.
+  # ROS_IP, because C++ nodes bind to the loopback interface for a ROS_IP of 127.*, but not for such a ROS_HOSTNAME.
   if [ -z "${ROS_IP:-}${ROS_HOSTNAME:-}" ]; then
-    export ROS_HOSTNAME=127.0.0.1 ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
+    export ROS_IP=127.0.0.1 ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
   fi
   set +u
   # shellcheck disable=SC1090,SC1091
@@ -288,4 +320,4 @@ main() {
   esac
 }
 
-main "$@"
+[ "${BASH_SOURCE[0]}" != "$0" ] || main "$@"

@@ -93,12 +93,12 @@ class RosSession:
         self.env = {
             **os.environ,
             "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}",
-            "ROS_HOSTNAME": "127.0.0.1",
+            "ROS_IP": "127.0.0.1",
             "ROS_HOME": str(self.folder / "ros_home"),
             "ROS_LOG_DIR": str(self.folder / "log"),
             "PYTHONUNBUFFERED": "1",
         }
-        self.env.pop("ROS_IP", None)
+        self.env.pop("ROS_HOSTNAME", None)
         self._launches: list[Launch] = []
         self._master: Launch | None = None
 

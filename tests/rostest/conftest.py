@@ -20,7 +20,7 @@ def ros_session() -> Iterator[RosSession]:
 
     session = RosSession()
     os.environ.update(
-        {name: session.env[name] for name in ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_HOME", "ROS_LOG_DIR")}
+        {name: session.env[name] for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME", "ROS_LOG_DIR")}
     )
     try:
         session.start_master()

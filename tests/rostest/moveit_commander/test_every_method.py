@@ -417,10 +417,17 @@ def test_an_object_is_picked_and_placed(arm: MoveGroupCommander, scene: Planning
 
 
 # ---------------------------------------------------------------- the command line
+def written(values: list[float]) -> str:
+    return f"[{' '.join(str(value) for value in values)}]"
+
+
 def test_commands_as_text(robot: RobotCommander, tmp_path: Path) -> None:
     interpreter = MoveGroupCommandInterpreter()
     assert interpreter.get_active_group() is None
     assert interpreter.execute("joints")[0] == MoveGroupInfoLevel.WARN
+    assert interpreter.execute_generic_command("go home") is None
+    assert interpreter.resolve_command_alias("which") == "id"
+    assert interpreter.execute_group_command(robot.get_group("hand"), "id") == (MoveGroupInfoLevel.INFO, "hand")
     assert interpreter.execute("use panda_arm") == (MoveGroupInfoLevel.DEBUG, "OK")
     assert interpreter.get_loaded_groups() == ["panda_arm"] and interpreter.get_active_group() is not None
     assert interpreter.execute("id") == (MoveGroupInfoLevel.INFO, "panda_arm")
@@ -428,7 +435,9 @@ def test_commands_as_text(robot: RobotCommander, tmp_path: Path) -> None:
     assert interpreter.execute(f"home = {READY}")[0] == MoveGroupInfoLevel.SUCCESS
     assert interpreter.execute("side = home")[0] == MoveGroupInfoLevel.SUCCESS
     assert interpreter.execute("side[0] = 0.4")[0] == MoveGroupInfoLevel.SUCCESS
-    assert interpreter.execute("side") == (MoveGroupInfoLevel.INFO, str([0.4, *READY[1:]]))
+    assert interpreter.execute("side") == (MoveGroupInfoLevel.INFO, written([0.4, *READY[1:]]))
+    assert interpreter.execute("show side") == (MoveGroupInfoLevel.INFO, f"side = {written([0.4, *READY[1:]])}")
+    assert interpreter.execute("vars") == (MoveGroupInfoLevel.INFO, "[home side]")
     assert interpreter.execute("execute")[0] == MoveGroupInfoLevel.WARN
     assert interpreter.execute("plan side")[0] == MoveGroupInfoLevel.SUCCESS
     assert interpreter.execute("execute")[0] == MoveGroupInfoLevel.SUCCESS
@@ -436,7 +445,9 @@ def test_commands_as_text(robot: RobotCommander, tmp_path: Path) -> None:
     assert interpreter.execute("go up 0.02")[0] == MoveGroupInfoLevel.SUCCESS
     for line in ("eef", "current", "group_state", "time 3", "tolerance 0.001", "tol", "record here", "vars", "show",
                  "show here", "delete here", "planner RRTConnect", "allow replanning true", "constrain", "database",
-                 "stop", "wait 0.01", "trace on", "trace off", "ground", "help", f"save {tmp_path / 'commands'}"):
+                 "stop", "wait 0.01", "trace on", "trace off", "ground", "help", "rec now", "rand some", "del some",
+                 "allow look T", "allow replan 0", f"database {tmp_path / 'constraints.sqlite'}",
+                 f"save {tmp_path / 'commands'}"):
         level, text = interpreter.execute(line)
         assert level in (MoveGroupInfoLevel.SUCCESS, MoveGroupInfoLevel.INFO, MoveGroupInfoLevel.DEBUG), (line, text)
     for line in ("nonsense", "go", "go nowhere", "time x", "allow flying true", "side[9] = 1", "show nobody",
@@ -444,9 +455,20 @@ def test_commands_as_text(robot: RobotCommander, tmp_path: Path) -> None:
         assert interpreter.execute(line)[0] in (MoveGroupInfoLevel.WARN, MoveGroupInfoLevel.FAIL), line
     again = MoveGroupCommandInterpreter()
     assert again.execute(f"load {tmp_path / 'commands'}") == (MoveGroupInfoLevel.DEBUG, "OK")
-    assert again.execute("side")[1] == str([0.4, *READY[1:]])
+    assert again.execute("side")[1] == written([0.4, *READY[1:]])
+    assert again.execute("database")[1] == f"Connected to {tmp_path / 'constraints.sqlite'}"
     assert "panda_arm" in again.get_keywords()["use"] and "go" in again.get_help()
     PlanningSceneInterface().clear()
+
+
+def test_a_file_in_the_folder_cmd_is_a_command(session: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cmd").mkdir()
+    (tmp_path / "cmd" / "prepare").write_text("use hand\nclosed = [0.0]  # comment\n")
+    monkeypatch.chdir(tmp_path)
+    interpreter = MoveGroupCommandInterpreter()
+    assert interpreter.execute("prepare") == (MoveGroupInfoLevel.DEBUG, "OK")
+    assert interpreter.execute("closed") == (MoveGroupInfoLevel.INFO, "[0.0]")
+    assert interpreter.execute("load prepare") == (MoveGroupInfoLevel.DEBUG, "OK")
 
 
 def test_the_terminal_executes_what_it_reads(session: Any) -> None:

@@ -2,7 +2,11 @@
 """What the set-up script does before it changes anything."""
 from __future__ import annotations
 
+import contextlib
 import os
+import pty
+import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -30,6 +34,45 @@ def test_refuses_an_unknown_command_and_lists_the_known_ones() -> None:
     answer = run_install("instal")
     assert answer.returncode == 1
     assert "unknown command 'instal'" in answer.stderr and "run, test, shell" in answer.stderr
+
+
+@pytest.mark.parametrize("folder", ["my checkout", "a:b", "price$", "it's"])
+def test_refuses_a_path_that_cannot_be_built_in_before_anything_is_done(tmp_path: Path, folder: str) -> None:
+    (tmp_path / folder).mkdir()
+    shutil.copy(ROOT / "install.sh", tmp_path / folder)
+    answer = subprocess.run([str(tmp_path / folder / "install.sh")], capture_output=True, text=True, check=False)
+    assert answer.returncode == 1 and answer.stdout == ""
+    assert f"the checkout is in '{tmp_path / folder}'" in answer.stderr and "move it to a path of" in answer.stderr
+    assert [item.name for item in (tmp_path / folder).iterdir()] == ["install.sh"]
+
+
+def run_step(folder: Path, command: str, output: int) -> subprocess.Popen[bytes]:
+    script = f"source {ROOT}/install.sh; LOG={folder}/log; step 'A long step' 'try again' {command}"
+    return subprocess.Popen(["bash", "-c", script], stdout=output, env={**os.environ, "PROGRESS_PERIOD_S": "1"})
+
+
+def test_a_long_step_counts_its_seconds(tmp_path: Path) -> None:
+    output = tmp_path / "output"
+    with output.open("w") as stream:
+        step = run_step(tmp_path, f"bash -c 'until grep -q \" s ... \" {output}; do sleep 0.1; done'", stream.fileno())
+        assert step.wait(60.0) == 0, "the step ends when its seconds are shown"
+    assert re.fullmatch(r"A long step \.\.\. (\d+ s \.\.\. )+done \(\d+ s\)\n", output.read_text())
+
+
+def test_a_long_step_shows_the_last_line_of_its_log_on_a_terminal(tmp_path: Path) -> None:
+    terminal, end = pty.openpty()
+    gate = tmp_path / "gate"
+    step = run_step(tmp_path, f"bash -c 'echo compiling part 7; until [ -e {gate} ]; do sleep 0.1; done'", end)
+    os.close(end)
+    seen = ""
+    with contextlib.suppress(OSError):  # the terminal closes with the step
+        while part := os.read(terminal, 4096):
+            seen += part.decode()
+            if "compiling part 7" in seen:
+                gate.touch()
+    os.close(terminal)
+    assert step.wait(60.0) == 0
+    assert re.search(r"A long step \.\.\. \d+ s  compiling part 7", seen) and re.search(r"done \(\d+ s\)\s+$", seen)
 
 
 def test_every_pinned_requirement_is_asked_for_or_needed_by_one() -> None:

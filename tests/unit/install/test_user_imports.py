@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+MODULES = (
+    "tf",
+    "tf.transformations",
+    "tf2_ros",
+    "tf2_geometry_msgs",
+    "actionlib",
+    "smach_ros",
+    "moveit_commander",
+    "moveit_ros_planning_interface._moveit_move_group_interface",
+    "moveit_ros_planning_interface._moveit_planning_scene_interface",
+    "moveit_ros_planning_interface._moveit_robot_interface",
+    "moveit_ros_planning_interface._moveit_roscpp_initializer",
+)
 
 
-@pytest.mark.parametrize("module", ["tf", "tf.transformations", "tf2_ros", "tf2_geometry_msgs", "actionlib", "smach_ros",
-                                    "moveit_commander", "moveit_ros_planning_interface._moveit_move_group_interface",
-                                    "moveit_ros_planning_interface._moveit_planning_scene_interface",
-                                    "moveit_ros_planning_interface._moveit_robot_interface",
-                                    "moveit_ros_planning_interface._moveit_roscpp_initializer"])
+@pytest.mark.parametrize("module", MODULES)
 def test_a_script_of_a_user_imports_the_public_modules(module: str) -> None:
     answer = subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stderr

@@ -7,44 +7,44 @@ from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
 from moveit_commander.exception import MoveItCommanderException
 
 
-def set_default(matrix: AllowedCollisionMatrix, obj: str, allow: bool) -> None:
+def set_default(acm: AllowedCollisionMatrix, obj: str, allow: bool) -> None:
     """Whether an object may touch everything that has no entry of its own with it."""
-    if obj in matrix.default_entry_names:
-        matrix.default_entry_values[matrix.default_entry_names.index(obj)] = allow
+    if obj in acm.default_entry_names:
+        acm.default_entry_values[acm.default_entry_names.index(obj)] = allow
     else:
-        matrix.default_entry_names = [*matrix.default_entry_names, obj]
-        matrix.default_entry_values = [*matrix.default_entry_values, allow]
+        acm.default_entry_names = [*acm.default_entry_names, obj]
+        acm.default_entry_values = [*acm.default_entry_values, allow]
 
 
-def set_allowed(matrix: AllowedCollisionMatrix, obj: str, other: str | None = None, allow: bool = True) -> None:
+def set_allowed(acm: AllowedCollisionMatrix, obj: str, other: str | None = None, allow: bool = True) -> None:
     """Whether two objects or links may touch; without `other`: the object's default.
 
     Raises:
-        MoveItCommanderException: `other` has no entry in the matrix.
+        MoveItCommanderException: `other` has no entry in the acm.
     """
     if other is None:
-        set_default(matrix, obj, allow)
+        set_default(acm, obj, allow)
         return
-    if other not in matrix.entry_names:
+    if other not in acm.entry_names:
         raise MoveItCommanderException(f"collision matrix: '{other}' has no entry; those there are: "
-                                       f"{', '.join(matrix.entry_names)}")
-    if obj not in matrix.entry_names:
-        _add_entry(matrix, obj)
-    first, second = matrix.entry_names.index(obj), matrix.entry_names.index(other)
+                                       f"{', '.join(acm.entry_names)}")
+    if obj not in acm.entry_names:
+        _add_entry(acm, obj)
+    first, second = acm.entry_names.index(obj), acm.entry_names.index(other)
     for row, column in ((first, second), (second, first)):
-        enabled = list(matrix.entry_values[row].enabled)
+        enabled = list(acm.entry_values[row].enabled)
         enabled[column] = allow
-        matrix.entry_values[row].enabled = enabled
+        acm.entry_values[row].enabled = enabled
 
 
-def _add_entry(matrix: AllowedCollisionMatrix, obj: str) -> None:
+def _add_entry(acm: AllowedCollisionMatrix, obj: str) -> None:
     """A row and a column for an object, filled with the defaults in force."""
-    defaults = dict(zip(matrix.default_entry_names, matrix.default_entry_values, strict=True))
-    row = [bool(defaults.get(obj, defaults.get(name, False))) for name in matrix.entry_names]
-    for entry, enabled in zip(matrix.entry_values, row, strict=True):
+    defaults = dict(zip(acm.default_entry_names, acm.default_entry_values, strict=True))
+    row = [bool(defaults.get(obj, defaults.get(name, False))) for name in acm.entry_names]
+    for entry, enabled in zip(acm.entry_values, row, strict=True):
         entry.enabled = [*entry.enabled, enabled]
-    matrix.entry_names = [*matrix.entry_names, obj]
-    matrix.entry_values = [*matrix.entry_values, AllowedCollisionEntry([*row, False])]
+    acm.entry_names = [*acm.entry_names, obj]
+    acm.entry_values = [*acm.entry_values, AllowedCollisionEntry([*row, False])]
 
 
 AllowedCollisionMatrix.set_default = set_default

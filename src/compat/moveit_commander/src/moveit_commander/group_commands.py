@@ -35,6 +35,7 @@ OK: Answer = (MoveGroupInfoLevel.DEBUG, "OK")
 DIRECTIONS = {"up": (2, 1), "down": (2, -1), "z": (2, 1), "left": (1, 1), "right": (1, -1), "y": (1, 1),
               "forward": (0, 1), "backward": (0, -1), "back": (0, -1), "x": (0, 1)}
 RANDOM = ("rand", "random")
+TRUE = ("1", "t", "true")
 GROUND_SIZE = (3.0, 3.0, 0.1)
 GROUND_GAP = 1.0e-4  # [m] below the robot, which would touch it otherwise
 VALUE = r"[\d.eE+\-]+"
@@ -65,6 +66,11 @@ def told(succeeded: bool, success: str, failure: str) -> Answer:
 def info(text: object) -> Answer:
     """Returns an answer to a question."""
     return MoveGroupInfoLevel.INFO, str(text)
+
+
+def vector(values: Sequence[float]) -> str:
+    """Writes joint values as commands take them: [0.1 0.2]."""
+    return f"[{' '.join(str(value) for value in values)}]"
 
 
 def number(word: str) -> float:
@@ -99,7 +105,7 @@ class GroupCommands:
         if match := VECTOR.fullmatch(line):
             values = [number(word) for word in match[2].replace(",", " ").split()]
             self.group.remember_joint_values(match[1], values)
-            return MoveGroupInfoLevel.SUCCESS, f"{match[1]} = {values}"
+            return MoveGroupInfoLevel.SUCCESS, f"{match[1]} = {vector(values)}"
         if (match := COPY.fullmatch(line)) and match[2] in known:
             self.group.remember_joint_values(match[1], known[match[2]])
             return MoveGroupInfoLevel.SUCCESS, f"{match[1]} is now the same as {match[2]}"
@@ -109,22 +115,23 @@ class GroupCommands:
                 raise MoveItCommanderException(f"{match[1]} has {len(values)} values, there is no [{match[2]}]")
             values[int(match[2])] = number(match[3])
             self.group.remember_joint_values(match[1], values)
-            return MoveGroupInfoLevel.SUCCESS, f"{match[1]} = {values}"
+            return MoveGroupInfoLevel.SUCCESS, f"{match[1]} = {vector(values)}"
         return None
 
     def _value(self, line: str) -> Answer:
         known = self.group.get_remembered_joint_values()
         if line in known:
-            return info(known[line])
+            return info(vector(known[line]))
         return MoveGroupInfoLevel.WARN, f"Unknown command: '{line}'; type help"
 
     def allow(self, words: Words) -> Answer:
         """Switches replanning or looking around."""
-        switches = {"looking": self.group.allow_looking, "replanning": self.group.allow_replanning}
+        switches = {"look": self.group.allow_looking, "looking": self.group.allow_looking,
+                    "replan": self.group.allow_replanning, "replanning": self.group.allow_replanning}
         what, value = words[0].lower(), words[1].lower()
-        if what not in switches or value not in ("1", "true", "0", "false"):
+        if what not in switches or value not in (*TRUE, "0", "f", "false"):
             raise MoveItCommanderException(f"allow {' '.join(words)}: looking or replanning, true or false are allowed")
-        switches[what](value in ("1", "true"))
+        switches[what](value in TRUE)
         return OK
 
     def constrain(self, words: Words) -> Answer:
@@ -134,7 +141,7 @@ class GroupCommands:
 
     def current(self, _: Words) -> Answer:
         """Shows joint values and the end effector's pose."""
-        text = f"joints = {self.group.get_current_joint_values()}"
+        text = f"joints = [{', '.join(str(value) for value in self.group.get_current_joint_values())}]"
         link = self.group.get_end_effector_link()
         if link:
             text += f"\n\n{link} pose = [\n{self.group.get_current_pose()}\n]"
@@ -144,16 +151,21 @@ class GroupCommands:
     def group_state(self, _: Words) -> Answer:
         """Shows the state as the SRDF writes it."""
         values = zip(self.group._group_names(), self.group.get_current_joint_values(), strict=True)
-        lines = [f'    <joint name="{name}" value="{value:.6g}"/>' for name, value in values]
-        return info("\n".join([f'<group_state name="custom_state" group="{self.group.get_name()}">', *lines,
-                               "</group_state>"]))
+        lines = [f'        <joint name="{name}" value="{value}"/>' for name, value in values]
+        return info("\n".join([f'    <group_state name="custom_state" group="{self.group.get_name()}">', *lines,
+                               "    </group_state>"]))
 
     def database(self, words: Words) -> Answer:
         """Chooses the file of constraints, or tells which it is."""
         if words:
             self.group.set_constraints_database(words[0], int(number(words[1])) if len(words) > 1 else 33829)
+        path = self.database_path()
+        return info("Not connected to a database" if path is None else f"Connected to {path}")
+
+    def database_path(self) -> str | None:
+        """Returns the file of constraints; None where none is chosen."""
         storage = self.group._storage
-        return info("Not connected to a database" if storage is None else f"Connected to {storage.path}")
+        return None if storage is None else str(storage.path)
 
     def delete(self, words: Words) -> Answer:
         """Forgets joint values."""
@@ -213,6 +225,10 @@ class GroupCommands:
         self._scene.attach_box(self._root_link, "ground", pose, GROUND_SIZE)
         return info("Added ground")
 
+    def identify(self, _: Words) -> Answer:
+        """Names the group."""
+        return info(self.group.get_name())
+
     def joints(self, _: Words) -> Answer:
         """Lists the joints."""
         return info("\n".join(f"{place} = {name}" for place, name in enumerate(self.group.get_joints())))
@@ -240,6 +256,11 @@ class GroupCommands:
         self.group.set_planner_id(words[0])
         return MoveGroupInfoLevel.SUCCESS, f"Planner is now {words[0]}"
 
+    def remember_random(self, words: Words) -> Answer:
+        """Remembers random joint values."""
+        self.group.remember_joint_values(words[0], self.group.get_random_joint_values())
+        return MoveGroupInfoLevel.SUCCESS, f"Remembered random joint values under the name {words[0]}"
+
     def record(self, words: Words) -> Answer:
         """Remembers the present joint values."""
         self.group.remember_joint_values(words[0])
@@ -256,7 +277,8 @@ class GroupCommands:
         known = self.group.get_remembered_joint_values()
         if words and words[0] not in known:
             raise MoveItCommanderException(f"'{words[0]}' is not known; known: {', '.join(known) or 'none'}")
-        return info("\n".join(f"{name} = {values}" for name, values in known.items() if not words or name == words[0]))
+        chosen = {words[0]: known[words[0]]} if words else known
+        return info("\n".join(f"{name} = {vector(values)}" for name, values in chosen.items()))
 
     def stop(self, _: Words) -> Answer:
         """Stops the motion."""
@@ -274,6 +296,10 @@ class GroupCommands:
         if words:
             self.group.set_goal_tolerance(number(words[0]))
         return info("Joint = {:.6g}, Position = {:.6g}, Orientation = {:.6g}".format(*self.group.get_goal_tolerance()))
+
+    def variables(self, _: Words) -> Answer:
+        """Names the remembered joint values."""
+        return info(f"[{' '.join(self.group.get_remembered_joint_values())}]")
 
     def wait(self, words: Words) -> Answer:
         """Sleeps."""
@@ -298,19 +324,23 @@ COMMANDS = dict((
     _command("go <name>|rand|<direction> <dx>|<x> <y> <z> [<r> <p> <y>] [approx]",
              "plan and move; directions: " + " ".join(DIRECTIONS), (1, 2, 3, 4, 6, 7), G.go),
     _command("ground", "put a plate below the robot", (0,), G.ground),
+    _command("id", "name of the group that is commanded", (0,), G.identify),
     _command("joints", "names of the joints", (0,), G.joints),
     _command("pick <name>", "pick an object", (1,), G.pick),
     _command("place <name>", "place an object", (1,), G.place),
     _command("plan [<name>|rand]", "plan to a state, or show the last plan", (0, 1), G.plan),
     _command("planner <name>", "choose a planner", (1,), G.planner),
+    _command("random <name>", "remember random joint values", (1,), G.remember_random),
     _command("record <name>", "remember the present joint values", (1,), G.record),
     _command("rotate <r> <p> <y>", "turn the end effector [rad]", (3,), G.rotate),
     _command("show [<name>]", "remembered joint values", (0, 1), G.show),
     _command("stop", "stop the motion", (0,), G.stop),
     _command("time [<s>]", "show or set the planning time", (0, 1), G.time),
     _command("tolerance [<x>]", "show or set the tolerance of goals", (0, 1), G.tolerance),
+    _command("vars", "names of remembered joint values", (0,), G.variables),
     _command("wait <s>", "sleep", (1,), G.wait),
 ))
-COMMANDS["tol"] = COMMANDS["tolerance"]
+COMMANDS |= {short: COMMANDS[name] for short, name in (("del", "delete"), ("rand", "random"), ("rec", "record"),
+                                                       ("tol", "tolerance"))}
 ASSIGNMENTS = (("<name>", "show joint values"), ("<name> = <other>", "copy joint values"),
                ("<name> = [<v1> <v2> ...]", "remember joint values"), ("<name>[<i>] = <v>", "change one joint value"))

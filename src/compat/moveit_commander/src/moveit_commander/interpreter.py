@@ -16,19 +16,19 @@ from moveit_commander.group_commands import (
     MoveGroupInfoLevel,
     Words,
     info,
+    vector,
 )
 from moveit_commander.move_group import MoveGroupCommander
 from moveit_commander.planning_scene_interface import PlanningSceneInterface
 from moveit_commander.robot import RobotCommander
 
 GENERAL = {"use": ("use [<group>|previous]", "command another group, or list those in use"),
-           "id": ("id", "name of the group that is commanded"),
-           "vars": ("vars", "names of remembered joint values"),
            "trace": ("trace [on|off]", "show the lines of a file as they are executed"),
            "load": ("load [<file>]", "execute the commands of a file"),
            "save": ("save [<file>]", "write groups and remembered joint values as commands"),
            "help": ("help", "this list")}
 ALIASES = {"which": "id", "groups": "use"}
+FOLDER = Path("cmd")  # files here are commands by their names
 
 
 class MoveGroupCommandInterpreter:
@@ -55,30 +55,55 @@ class MoveGroupCommandInterpreter:
 
     def execute(self, cmd: str) -> Answer:
         """Executes a line; answers a level of MoveGroupInfoLevel and what to show. It never raises for a bad line."""
+        line = self.resolve_command_alias(cmd.strip())
+        if not line:
+            return OK
+        answer = self.execute_generic_command(line)
+        if answer is not None:
+            return answer
+        group = self.get_active_group()
+        if group is None:
+            return MoveGroupInfoLevel.WARN, ("No group is commanded yet; say: use <group>, with one of "
+                                             f"{', '.join(self._robot.get_group_names())}\n\n{self.get_help()}")
+        return self.execute_group_command(group, line)
+
+    def resolve_command_alias(self, cmdorig: str) -> str:
+        """Answers the command another name stands for."""
+        return ALIASES.get(cmdorig.lower(), cmdorig)
+
+    def execute_generic_command(self, cmd: str) -> Answer | None:
+        """Executes a command that concerns no group in particular; None: it is not one."""
         try:
-            return self._execute(cmd.strip())
+            return self._execute_generic(cmd)
         except MoveItCommanderException as error:
             return MoveGroupInfoLevel.WARN, str(error)
 
-    def _execute(self, line: str) -> Answer:
+    def execute_group_command(self, g: MoveGroupCommander, cmdorig: str) -> Answer:
+        """Executes a command for a group."""
+        try:
+            return self._commands_of(g).execute(cmdorig)
+        except MoveItCommanderException as error:
+            return MoveGroupInfoLevel.WARN, str(error)
+
+    def _execute_generic(self, line: str) -> Answer | None:
+        if (FOLDER / line).is_file():
+            return self._load([line])
         words = line.split()
-        if not words:
-            return OK
-        first = ALIASES.get(words[0].lower(), words[0].lower())
+        first = words[0].lower()
         general: dict[str, Callable[[Words], Answer]] = {
-            "use": self._use, "id": self._id, "vars": self._vars, "trace": self._trace, "load": self._load,
-            "save": self._save, "help": lambda _: info(self.get_help())}
-        if first in general and len(words) <= (1 if first in ("id", "vars", "help") else 2):
+            "use": self._use, "trace": self._trace, "load": self._load, "save": self._save,
+            "help": lambda _: info(self.get_help())}
+        if first in general and len(words) <= (1 if first == "help" else 2):
             return general[first](words[1:])
         if first in general and "=" not in line:
             return MoveGroupInfoLevel.WARN, f"'{line}': this command is used as: {GENERAL[first][0]}"
-        return self._active().execute(line)
+        return None
 
-    def _active(self) -> GroupCommands:
-        if not self._name:
-            raise MoveItCommanderException("No group is commanded yet; say: use <group>, with one of "
-                                           f"{', '.join(self._robot.get_group_names())}")
-        return self._groups[self._name]
+    def _commands_of(self, group: MoveGroupCommander) -> GroupCommands:
+        for commands in self._groups.values():
+            if commands.group is group:
+                return commands
+        return GroupCommands(group, self._scene, self._robot.get_root_link())
 
     def _use(self, words: Words) -> Answer:
         if not words:
@@ -89,12 +114,6 @@ class MoveGroupCommandInterpreter:
         if name:
             self._previous, self._name = self._name, name
         return OK
-
-    def _id(self, _: Words) -> Answer:
-        return info(self._active().group.get_name())
-
-    def _vars(self, _: Words) -> Answer:
-        return info(" ".join(self._active().group.get_remembered_joint_values()))
 
     def _trace(self, words: Words) -> Answer:
         if not words:
@@ -107,6 +126,8 @@ class MoveGroupCommandInterpreter:
     def _load(self, words: Words) -> Answer:
         """Executes a file; it ends at the first line that is not understood or not done."""
         path = Path(words[0] if words else self.DEFAULT_FILENAME)
+        if not path.is_file() and (FOLDER / path).is_file():
+            path = FOLDER / path
         try:
             lines = path.read_text().splitlines()
         except (OSError, UnicodeDecodeError) as error:
@@ -126,7 +147,9 @@ class MoveGroupCommandInterpreter:
         for name, commands in self._groups.items():
             lines.append(f"use {name}")
             for key, values in commands.group.get_remembered_joint_values().items():
-                lines.append(f"{key} = [{' '.join(repr(value) for value in values)}]")
+                lines.append(f"{key} = {vector(values)}")
+            if (database := commands.database_path()) is not None:
+                lines.append(f"database {database}")
         try:
             path.write_text("".join(f"{line}\n" for line in lines))
         except OSError as error:
@@ -146,5 +169,6 @@ class MoveGroupCommandInterpreter:
         states = list(group.get_named_targets()) if group else []
         more = {"go": [*DIRECTIONS, "random", *states], "plan": ["random", *states],
                 "use": self._robot.get_group_names(), "record": known, "show": known, "delete": known,
+                "constrain": group.get_known_constraints() if group else [],
                 "allow": ["replanning", "looking"], "trace": ["on", "off"]}
         return {name: more.get(name, []) for name in (*GENERAL, *COMMANDS)}
