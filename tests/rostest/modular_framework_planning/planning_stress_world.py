@@ -7,16 +7,14 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-import coal
 import numpy as np
 import rospy
 from moveit_msgs.msg import CollisionObject, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit/modular_framework_planning"))
-from independent_checker import IndependentChecker, pose_matrix  # noqa: E402
+from independent_checker import IndependentChecker, Solid, box, pose_matrix  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -82,11 +80,10 @@ def gone(name: str) -> CollisionObject:
     return CollisionObject(id=name, operation=CollisionObject.REMOVE)
 
 
-def obstacle(message: CollisionObject) -> tuple[str, Any, float, np.ndarray]:
+def obstacle(message: CollisionObject) -> tuple[str, Solid, np.ndarray]:
     """A box for the independent checker."""
     size, place = message.primitives[0].dimensions, message.primitive_poses[0].position
-    return (message.id, coal.Box(*size), float(np.linalg.norm(size)) / 2.0,
-            pose_matrix([place.x, place.y, place.z], np.eye(3)))
+    return message.id, box(*size), pose_matrix([place.x, place.y, place.z], np.eye(3))
 
 
 def touched_bodies(checker: IndependentChecker, names: Sequence[str], path: np.ndarray, rest: Mapping[str, float],

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass
 
-import coal
 import numpy as np
 import pinocchio as pin
 import trimesh
-from independent_checker import IndependentChecker, Part, mesh_geometry
+from independent_checker import IndependentChecker, Part, Solid, box, cone, cylinder, mesh, sphere
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
@@ -33,20 +32,20 @@ class Verdicts:
         return Verdicts(*(one + two for one, two in zip(astuple(self), astuple(other), strict=True)))
 
 
-def shape_of(kind: int, size: np.ndarray) -> tuple[Shape, object, float]:
-    """A shape, the same as Coal's geometry built apart, and its radius about the origin."""
+def shape_of(kind: int, size: np.ndarray) -> tuple[Shape, Solid]:
+    """A shape, and the same as FCL's geometry."""
     x, y, z = size.tolist()
     if kind == 0:
-        return Box(x, y, z), coal.Box(x, y, z), float(np.linalg.norm(size)) / 2
+        return Box(x, y, z), box(x, y, z)
     if kind == 1:
-        return Cylinder(z, x / 2), coal.Cylinder(x / 2, z), float(np.hypot(x, z)) / 2
+        return Cylinder(z, x / 2), cylinder(x / 2, z)
     if kind == 2:
-        return Sphere(x / 2), coal.Sphere(x / 2), x / 2
+        return Sphere(x / 2), sphere(x / 2)
     if kind == 3:
-        return Cone(z, x / 2), coal.Cone(x / 2, z), float(np.hypot(x, z)) / 2
-    mesh = trimesh.creation.annulus(r_min=x / 3, r_max=x / 2, height=z)
-    vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
-    return Mesh(vertices, faces), mesh_geometry(vertices, faces), float(np.linalg.norm(vertices, axis=1).max())
+        return Cone(z, x / 2), cone(x / 2, z)
+    ring = trimesh.creation.annulus(r_min=x / 3, r_max=x / 2, height=z)
+    vertices, faces = np.asarray(ring.vertices, dtype=float), np.asarray(ring.faces, dtype=np.int64)
+    return Mesh(vertices, faces), mesh(vertices, faces)
 
 
 def random_pose(rng: np.random.Generator) -> pin.SE3:
@@ -59,12 +58,12 @@ def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Gen
     """Ten shapes of all kinds around the robot and one held object, told to both checkers."""
     scene, world = empty_scene(model), []
     for number in range(10):
-        shape, geometry, radius = shape_of(number % 5, rng.uniform(0.17, 0.3, 3))  # nothing fits inside a link
+        shape, solid = shape_of(number % 5, rng.uniform(0.17, 0.3, 3))  # nothing fits inside a link
         pose = random_pose(rng)
         scene = scene.with_object(CollisionObject(f"thing{number}", pose, ((shape, pin.SE3.Identity()),)))
-        world.append((f"thing{number}", geometry, radius, pose.homogeneous))
+        world.append((f"thing{number}", solid, pose.homogeneous))
     second.set_world(world)
-    shape, geometry, radius = shape_of(held, np.array([0.17, 0.17, 0.2]))
+    shape, solid = shape_of(held, np.array([0.17, 0.17, 0.2]))
     pose = pin.SE3(np.eye(3), np.array([0.0, 0.25, 0.05]))
     touch = frozenset(link for link in model.document.links if model.has_link(link)
                       and ("wrist_3" in link or "ee" in link or "ezgripper" in link or "tool" in link))
@@ -72,22 +71,11 @@ def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Gen
     scene = scene.with_attached(AttachedObject(body, TIP, touch))
     robot_parts = [number for number, part in enumerate(second.parts) if part.link]
     things = [number for number, part in enumerate(second.parts) if not part.link]
-    second.parts.append(Part("held", TIP, pose.homogeneous, geometry, radius))
+    second.parts.append(Part("held", TIP, pose.homogeneous, solid))
     number = len(second.parts) - 1
     second._pairs += [(other, number) for other in things]
     second._pairs += [(other, number) for other in robot_parts if second.parts[other].link not in touch | {TIP}]
     return scene
-
-
-def smallest_distance(second: IndependentChecker, values: dict[str, float]) -> float:
-    links = second.link_poses(values)
-    poses = [links[part.link] @ part.pose for part in second.parts]
-    best = np.inf
-    for i, j in second._pairs:
-        first, other = (coal.Transform3s(poses[k][:3, :3], poses[k][:3, 3]) for k in (i, j))
-        best = min(best, coal.distance(second.parts[i].geometry, first, second.parts[j].geometry, other,
-                                       coal.DistanceRequest(), coal.DistanceResult()))
-    return float(best)
 
 
 def random_state(model: RobotModel, rng: np.random.Generator) -> np.ndarray:
@@ -99,7 +87,7 @@ def verdict(ours: CollisionChecker, second: IndependentChecker, positions: np.nd
     values = dict(zip(ours.model.joint_names, positions.tolist(), strict=True))
     free, touching = ours.is_free(positions), bool(second.collisions(values))
     refused = not free and not touching
-    near = refused and smallest_distance(second, values) <= NEAR
+    near = refused and second.distance(values) <= NEAR
     return Verdicts(1, free, free and touching, refused and not near, near)
 
 

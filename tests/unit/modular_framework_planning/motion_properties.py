@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-import coal
 import numpy as np
 import pinocchio as pin
 from independent_checker import IndependentChecker
+from independent_checker import box as solid_box
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.constraint_kinds import JointConstraint
@@ -79,7 +79,7 @@ def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, 
         pose = pin.SE3(np.eye(3), np.array([distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.9, 1.6)]))
         size = rng.uniform(0.05, 0.25, 3)
         scene = scene.with_object(CollisionObject(f"b{number}", pose, ((Box(*size), pin.SE3.Identity()),)))
-        world.append((f"b{number}", coal.Box(*size), float(np.linalg.norm(size)) / 2, pose.homogeneous))
+        world.append((f"b{number}", solid_box(*size), pose.homogeneous))
     return scene, world
 
 

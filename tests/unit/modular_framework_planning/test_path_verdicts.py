@@ -114,7 +114,7 @@ def bars(tmp_path_factory: pytest.TempPathFactory) -> Neighbourhood:
     trimesh.creation.box((LONG, THICK, THICK)).export(file)
     scene, rng = empty_scene(RobotModel(BARS_URDF, BARS_SRDF, {}, lambda _: file)), np.random.default_rng(41)
     for number in range(OBSTACLES):
-        shape, _, _ = shape_of(number % 5, rng.uniform(1.2, 2.0, 3) * THICK)
+        shape, _ = shape_of(number % 5, rng.uniform(1.2, 2.0, 3) * THICK)
         away = rng.normal(size=3)
         place = pin.SE3(np.eye(3), away / np.linalg.norm(away) * rng.uniform(0.5, 3.0) * LONG)
         scene = scene.with_object(CollisionObject(f"thing{number}", place, ((shape, pin.SE3.Identity()),)))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import re
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 from independent_checker import IndependentChecker
+from independent_checker import box as solid_box
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -57,7 +57,7 @@ def random_world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningS
         pose = at(distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.9, 1.6))
         size = rng.uniform(0.05, 0.25, 3)
         scene = scene.with_object(CollisionObject(f"b{number}", pose, ((Box(*size), pin.SE3.Identity()),)))
-        world.append((f"b{number}", coal.Box(*size), float(np.linalg.norm(size)) / 2, pose.homogeneous))
+        world.append((f"b{number}", solid_box(*size), pose.homogeneous))
     return scene, world
 
 

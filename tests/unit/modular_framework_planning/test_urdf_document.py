@@ -77,3 +77,20 @@ def test_a_collision_mesh_that_cannot_be_read_is_refused_with_link_and_file(tmp_
 def test_an_unknown_or_empty_collision_shape_is_refused_with_its_link(shape: str) -> None:
     with pytest.raises(ModelError, match="link 'a' collision"):
         load_urdf(f'<robot name="r"><link name="a"><collision><geometry>{shape}</geometry></collision></link></robot>')
+
+
+PAIR = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="one" type="{0}"><parent link="a"/><child link="b"/><limit lower="-1" upper="1" velocity="1" effort="1"/>
+</joint><joint name="two" type="{1}"><parent link="b"/><child link="c"/><mimic joint="one"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_a_fixed_joint_that_mimics_is_fixed_and_noted() -> None:
+    model = RobotModel(PAIR.format("prismatic", "fixed"), '<robot name="r"/>')
+    assert model.joint_names == ("one",) and not model.mimics
+    assert "'two'" in model.document.notes[0] and "<mimic> is ignored" in model.document.notes[0]
+
+
+def test_a_joint_that_mimics_one_that_does_not_move_is_refused() -> None:
+    with pytest.raises(ModelError, match="'two'.*mimics 'one'.*allowed are two"):
+        load_urdf(PAIR.format("fixed", "prismatic"))

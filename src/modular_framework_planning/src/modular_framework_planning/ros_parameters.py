@@ -28,8 +28,11 @@ def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
                              "description (planning_context.launch) before move_group")
         rospy.rostime.wallsleep(0.1)
     planning = rospy.get_param(f"{DESCRIPTION}_planning", {})
-    return RobotModel(str(rospy.get_param(names[0])), str(rospy.get_param(names[1])),
-                      planning.get("joint_limits") or {})
+    model = RobotModel(str(rospy.get_param(names[0])), str(rospy.get_param(names[1])),
+                       planning.get("joint_limits") or {})
+    for note in model.document.notes:
+        rospy.logwarn(note)
+    return model
 
 
 def load_kinematics_settings() -> dict[str, KinematicsSettings]:

@@ -46,6 +46,7 @@ class UrdfDocument:
     visual_meshes: Mapping[str, tuple[VisualMesh, ...]] = field(default_factory=dict)
     visual_shapes: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
     collisions: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()  # what was ignored, and why
 
 
 def directory_resolver(root: Path) -> MeshResolver:
@@ -87,7 +88,38 @@ def _number(element: ET.Element, attribute: str, default: float, where: str) -> 
         raise ModelError(f"{where}: attribute '{attribute}' is '{text}'; a number is needed") from error
 
 
-def _prepare_joint(joint: ET.Element, name: str, mimics: dict[str, Mimic]) -> None:
+@dataclass(frozen=True, slots=True)
+class _Joints:
+    """What the joints of a URDF say; `notes`: what was ignored, and why."""
+
+    parents: dict[str, str] = field(default_factory=dict)
+    children: dict[str, str] = field(default_factory=dict)
+    kinds: dict[str, str] = field(default_factory=dict)
+    mimics: dict[str, Mimic] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def _read_joints(root: ET.Element) -> _Joints:
+    """Reads the joints and makes them ready for Pinocchio; raises ModelError."""
+    result = _Joints()
+    for joint in root.findall("joint"):
+        name, kind = joint.get("name", ""), joint.get("type", "")
+        parent, child = joint.find("parent"), joint.find("child")
+        if kind not in (*MOVABLE_KINDS, "fixed") or parent is None or child is None:
+            raise ModelError(f"URDF joint '{name}': type '{kind}' with parent and child; allowed types are "
+                             f"{', '.join(MOVABLE_KINDS)} and fixed, and both links must be named")
+        result.parents[name], result.children[name] = parent.get("link", ""), child.get("link", "")
+        result.kinds[name] = kind
+        _prepare_joint(joint, name, result)
+    for name, mimic in result.mimics.items():
+        if result.kinds.get(mimic.leader, "fixed") == "fixed":
+            movable = ", ".join(joint for joint, kind in result.kinds.items() if kind != "fixed")
+            raise ModelError(f"URDF joint '{name}': it mimics '{mimic.leader}', which is no joint that moves; allowed "
+                             f"are {movable}")
+    return result
+
+
+def _prepare_joint(joint: ET.Element, name: str, result: _Joints) -> None:
     if joint.get("type") == "continuous":
         joint.set("type", "revolute")
         limit = joint.find("limit")
@@ -96,11 +128,16 @@ def _prepare_joint(joint: ET.Element, name: str, mimics: dict[str, Mimic]) -> No
         limit.set("lower", str(-CONTINUOUS_BOUND))
         limit.set("upper", str(CONTINUOUS_BOUND))
     mimic = joint.find("mimic")
-    if mimic is not None:
-        where = f"URDF joint '{name}' mimic"
-        mimics[name] = Mimic(mimic.get("joint", ""), _number(mimic, "multiplier", 1.0, where),
-                             _number(mimic, "offset", 0.0, where))
-        joint.remove(mimic)
+    if mimic is None:
+        return
+    joint.remove(mimic)
+    if joint.get("type") == "fixed":
+        result.notes.append(f"URDF joint '{name}': <mimic> is ignored, because the joint is fixed; remove it, or make "
+                            "the joint one that moves")
+        return
+    where = f"URDF joint '{name}' mimic"
+    result.mimics[name] = Mimic(mimic.get("joint", ""), _number(mimic, "multiplier", 1.0, where),
+                                _number(mimic, "offset", 0.0, where))
 
 
 def _numbers(text: str | None, default: tuple[float, float, float], where: str) -> tuple[float, float, float]:
@@ -192,24 +229,13 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
         root = ET.fromstring(text)
     except ET.ParseError as error:
         raise ModelError(f"URDF: not an XML document ({error}); is robot_description loaded and expanded?") from error
-    parents: dict[str, str] = {}
-    children: dict[str, str] = {}
-    kinds: dict[str, str] = {}
-    mimics: dict[str, Mimic] = {}
-    for joint in root.findall("joint"):
-        name, kind = joint.get("name", ""), joint.get("type", "")
-        parent, child = joint.find("parent"), joint.find("child")
-        if kind not in (*MOVABLE_KINDS, "fixed") or parent is None or child is None:
-            raise ModelError(f"URDF joint '{name}': type '{kind}' with parent and child; allowed types are "
-                             f"{', '.join(MOVABLE_KINDS)} and fixed, and both links must be named")
-        parents[name], children[name], kinds[name] = parent.get("link", ""), child.get("link", ""), kind
-        _prepare_joint(joint, name, mimics)
+    joints = _read_joints(root)
     links = tuple(link.get("name", "") for link in root.findall("link"))
-    roots = [link for link in links if link not in children.values()]
+    roots = [link for link in links if link not in joints.children.values()]
     if len(roots) != 1:
         raise ModelError(f"URDF: {len(roots)} links without a parent joint ({', '.join(roots)}); exactly one is needed")
     meshes = {link.get("name", ""): tuple(_visual_meshes(link)) for link in root.findall("link")}
     shapes = {link.get("name", ""): tuple(_visual_shapes(link)) for link in root.findall("link")}
     collisions = {link.get("name", ""): tuple(_collisions(link, resolve)) for link in root.findall("link")}
-    return UrdfDocument(_without_geometry(root), root.get("name", ""), roots[0], links, parents,
-                        children, kinds, mimics, meshes, shapes, collisions)
+    return UrdfDocument(_without_geometry(root), root.get("name", ""), roots[0], links, joints.parents,
+                        joints.children, joints.kinds, joints.mimics, meshes, shapes, collisions, tuple(joints.notes))
