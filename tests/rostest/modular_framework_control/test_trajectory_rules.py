@@ -400,7 +400,13 @@ INF, NAN = math.inf, math.nan
     (faulty(points=[(1.0, HOME, None), (1.0, HOME, None)]), INVALID_GOAL,
      "point 1: time_from_start 1 s does not come after 1 s of point 0; times must increase strictly"),
     (faulty(points=[(2.0, HOME, None), (1.0, HOME, None)]), INVALID_GOAL, "does not come after 2 s"),
-    (faulty(points=[(-1.0, HOME, None)]), INVALID_GOAL, "time_from_start is -1 s; expected at least 0"),
+    (faulty(points=[(-1.0, HOME, None)]), INVALID_GOAL, "all 1 points lie in the past"),
+    (faulty(points=[(1.0, [51.0, 0.0, 0.0], None)]), INVALID_GOAL,
+     "point 0: position of joint 'shoulder' is 51; its limits are -50 to 50; give a position within them"),
+    (faulty(points=[(1.0, HOME, [0.0, -95.0, 0.0])]), INVALID_GOAL,
+     "point 0: velocity of joint 'elbow' is -95; its limit is 90; give a lower velocity"),
+    (faulty(points=[(1.0, HOME, None), (1.1, [0.0, 20.0, 0.0], None)]), INVALID_GOAL,
+     "on the way to point 1 joint 'elbow' reaches the velocity 375; its limit is 90; give the point a later"),
     (faulty(points=[(1.0, [0.0], None)]), INVALID_GOAL, "point 0: has 1 positions; expected 3"),
     (faulty(points=[(1.0, [0.0] * 4, None)]), INVALID_GOAL, "point 0: has 4 positions; expected 3"),
     (faulty(points=[(1.0, HOME, [0.0])]), INVALID_GOAL, "point 0: has 1 velocities; expected 3 or none"),
@@ -413,8 +419,6 @@ INF, NAN = math.inf, math.nan
      "joints missing: wrist (allow_partial_joints_goal is false); joints of the controller: shoulder, elbow, wrist"),
     (faulty(names=[], points=[]), INVALID_JOINTS, "joints missing: shoulder, elbow, wrist"),
     (faulty(names=["shoulder", "elbow", "wrist", "knee"], points=[(1.0, [0.0] * 4, None)]), INVALID_JOINTS, "'knee'"),
-    (faulty(path_tolerance=[JointTolerance(name="knee", position=1.0)]), INVALID_GOAL,
-     "path_tolerance names joint 'knee', which the controller does not have; it has: shoulder, elbow, wrist"),
     (faulty(goal_tolerance=[JointTolerance(name="elbow", position=NAN)]), INVALID_GOAL,
      "goal_tolerance of joint 'elbow' is not a number: position nan"),
 ])
@@ -428,6 +432,14 @@ def test_a_bad_goal_is_refused_with_what_is_wrong_where_and_nothing_else_happens
     assert arm.is_running(running)
     listed = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller
     assert {entry.state for entry in listed} == {"running"}
+
+
+def test_a_first_point_before_the_beginning_and_tolerances_of_other_joints_are_left_out(robot: SteppedRobot,
+                                                                                       arm: Arm) -> None:
+    foreign = [JointTolerance(name="knee", position=1e-9)]
+    assert move(robot, arm, (-0.1, [9.0, 9.0, 9.0]), (1.0, [0.2, 0.1, 0.0]), path_tolerance=foreign,
+                goal_tolerance=foreign)[:2] == ("SUCCEEDED", OK)
+    assert arm.state().actual.positions[:2] == pytest.approx((0.2, 0.1))
 
 
 @pytest.mark.parametrize(("name", "joint"), [("lift", "rail"), ("crane", "hoist")])

@@ -17,7 +17,6 @@ from modular_framework_control.trajectory import (
     Track,
     TrajectoryPoint,
     splice,
-    stop_ramp,
 )
 from modular_framework_control.trajectory_check import check_points
 
@@ -111,16 +110,6 @@ def test_a_joint_without_end_goes_the_short_way() -> None:
     assert track.sample(3.0)[0, 0] == pytest.approx(4.0 * math.pi + 0.4)
 
 
-def test_a_stop_ramp_comes_to_rest_in_its_time_and_does_not_turn_back() -> None:
-    state = np.array([[1.0], [2.0], [0.0]])
-    track = stop_ramp([0], state, 5.0, 0.4)
-    samples = np.array([track.sample(5.0 + t)[:, 0] for t in np.linspace(0.0, 0.4, 50)])
-    assert samples[0, :2] == pytest.approx([1.0, 2.0])
-    assert samples[-1] == pytest.approx([1.4, 0.0, 0.0], abs=1e-9)
-    assert (np.diff(samples[:, 0]) > -1e-12).all()
-    assert stop_ramp([0], state, 5.0, 0.0).sample(5.0)[:, 0] == pytest.approx([1.0, 0.0, 0.0])
-
-
 def test_a_track_without_some_joints_keeps_the_others() -> None:
     times, states = random_states(4)
     track = track_of(trajectory_of(times, states, 3), REST)
@@ -132,12 +121,12 @@ def test_a_track_without_some_joints_keeps_the_others() -> None:
 
 def test_all_faults_of_a_trajectory_are_listed() -> None:
     trajectory = JointTrajectory(("a", "b"), (
-        TrajectoryPoint(-0.1, (0.0, math.nan)), TrajectoryPoint(1.0, (0.0,)),
+        TrajectoryPoint(-math.inf, (0.0, math.nan)), TrajectoryPoint(1.0, (0.0,)),
         TrajectoryPoint(1.0, (0.0, 0.0), (1.0,)), TrajectoryPoint(2.0, (), (), (1.0, -math.inf))), math.inf)
     with pytest.raises(InvalidTrajectoryError) as caught:
         check_points(trajectory)
     for words in ("point 0: position of joint 'b' (index 1) is nan; expected a finite number",
-                  "point 0: time_from_start is -0.1 s; expected at least 0", "point 1: has 1 positions; expected 2",
+                  "point 0: time_from_start is -inf s; expected a time", "point 1: has 1 positions; expected 2",
                   "point 2: has 1 velocities; expected 2 or none", "point 3: has 0 positions; expected 2",
                   "point 2: time_from_start 1 s does not come after 1 s of point 1",
                   "point 3: acceleration of joint 'b' (index 1) is -inf", "header stamp is inf"):

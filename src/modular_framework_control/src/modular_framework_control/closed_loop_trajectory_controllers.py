@@ -27,9 +27,6 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
         self._velocity_ff = [read_number(forward, name, 0.0, None) for name in self.joint_names]
         return True
 
-    def _command_end(self) -> None:
-        self._command_rest()
-
     def _command_rest(self) -> None:
         for handle, pid in zip(self._handles, self.pids.values(), strict=True):
             pid.reset()

@@ -32,12 +32,12 @@ class EffortGripperActionController(GripperActionController):
         super().starting(time_s)
 
     def stopping(self, time_s: float) -> None:
-        self._handle.command = 0.0
         super().stopping(time_s)
+        self._handle.command = 0.0
 
     def failed(self, time_s: float, reason: str) -> None:
-        self._handle.command = 0.0
         super().failed(time_s, reason)
+        self._handle.command = 0.0
 
     def _apply(self, period_s: float) -> None:
         handle = self._handle

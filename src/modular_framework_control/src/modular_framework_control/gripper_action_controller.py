@@ -145,6 +145,9 @@ class GripperActionController(Controller):
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
+        if self._active is not None:    # a gripper that has come to its end goes on squeezing, one on its way stops
+            self._hold()
+            self._apply(0.0)
         self._finish(status, self._state(False, False), text)
         self._reject_waiting(text)
 

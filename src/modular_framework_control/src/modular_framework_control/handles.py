@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from modular_framework_control.joint_limit_parameters import JointLimits
+
 Vector = tuple[float, float, float]
 
 
@@ -42,15 +44,20 @@ class JointHandle:
         max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
             Only hardware that says so (`supports_max_effort`) heeds it.
         supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
+        limits: what the hardware keeps the joint within; whoever enforces limits sets it. None: the hardware enforces
+            none.
+        held: set by `hold`; who enforces limits goes on from that command, and clears it.
     """
 
-    __slots__ = ("state", "command", "max_effort", "supports_max_effort")
+    __slots__ = ("state", "command", "max_effort", "supports_max_effort", "limits", "held")
 
     def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
         self.state = state
         self.command = command
         self.max_effort = 0.0
         self.supports_max_effort = supports_max_effort
+        self.limits: JointLimits | None = None
+        self.held = False
 
     @property
     def name(self) -> str:
@@ -67,6 +74,16 @@ class JointHandle:
     @property
     def effort(self) -> float:
         return self.state.effort
+
+    def hold(self, position: float) -> None:
+        """Command a joint that takes positions to stay where it stands, whatever it was commanded before.
+
+        Args:
+            position: where that is [rad|m]: as measured; for a joint that turns without end, in the turn in which it is
+                commanded.
+        """
+        self.command = position
+        self.held = True
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, command={self.command:.6g})"

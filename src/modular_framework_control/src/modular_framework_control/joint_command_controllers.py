@@ -17,7 +17,7 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.joint_limits import JointLimits, limits_from_urdf
+from modular_framework_control.joint_limits import limits_of
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names
 from modular_framework_control.pid import PidGains, read_pid
 
@@ -139,6 +139,14 @@ class PositionJointPositionController(JointCommandController):
 
     interface_class = PositionJointInterface
 
+    def stopping(self, time_s: float) -> None:
+        self._rest()
+
+    def _rest(self) -> None:
+        super()._rest()
+        for handle in self._handles:
+            handle.hold(handle.position)
+
     def _resting(self) -> tuple[float, ...]:
         return tuple(handle.position for handle in self._handles)
 
@@ -214,13 +222,11 @@ class GainsController(_Zeroing):
 
 
 class _PositionByGains(GainsController):
-    """Positions [rad|m], kept within the limits of the robot description, for joints that take something else."""
+    """Positions [rad|m], kept within the limits that are known, for joints that take something else."""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
-        description = root_nh.get_param("robot_description")
-        known = limits_from_urdf(description) if isinstance(description, str) else {}
-        self._limits = [known.get(name, JointLimits()) for name in self.joint_names]
+        self._limits = limits_of(self._handles, root_nh)
         return True
 
     def _resting(self) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ ros_control's joint_limits_interface.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 from modular_framework_control.hardware_interface import (
@@ -47,7 +47,8 @@ class PositionJointSaturation:
     """Saturates position commands: inside the range, and no faster than the velocity limit from one cycle to the next.
 
     With soft limits the speed towards an end of the soft range is besides at most `k_position` times the way left.
-    It looks at commands, not at measured positions, which lag behind them.
+    It looks at commands, not at measured positions, which lag behind them; only a joint that is held
+    (`JointHandle.hold`) gets that command at once, as it is where the joint stands.
 
     Args:
         handle: the joint.
@@ -75,6 +76,8 @@ class PositionJointSaturation:
         """
         limits, handle, last = self.limits, self.handle, self._last_command
         command = handle.command
+        if handle.held:
+            handle.held, last = False, command
         if last != last:
             last = handle.position
         if command != command:
@@ -224,7 +227,7 @@ def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits)
 
 def limit_handle(interface_class: type[HardwareInterface[Any]], handle: JointHandle, limits: JointLimits,
                  soft_limits: SoftJointLimits | None = None) -> JointLimiter:
-    """What keeps the commands of a handle within limits, by what the handle commands.
+    """What keeps the commands of a handle within limits, by what the handle commands; the handle then says its limits.
 
     Args:
         interface_class: interface the handle belongs to.
@@ -232,6 +235,7 @@ def limit_handle(interface_class: type[HardwareInterface[Any]], handle: JointHan
         limits: its limits.
         soft_limits: its soft limits, if any.
     """
+    handle.limits = limits
     if issubclass(interface_class, VelocityJointInterface):
         return VelocityJointSaturation(handle, limits, soft_limits)
     if issubclass(interface_class, EffortJointInterface):
@@ -239,6 +243,25 @@ def limit_handle(interface_class: type[HardwareInterface[Any]], handle: JointHan
     if issubclass(interface_class, (PosVelJointInterface, PosVelAccJointInterface)):
         return PosVelJointSaturation(handle, limits, soft_limits)
     return PositionJointSaturation(handle, limits, soft_limits)
+
+
+def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[JointLimits]:
+    """What is known of the limits of joints: those their hardware enforces; where it enforces none, those of
+    `robot_description` and `joint_limits/<joint>/...`.
+
+    Args:
+        handles: the joints.
+        root_nh: where `robot_description` and `joint_limits` are found, if they are there.
+
+    Raises:
+        ParameterError: a limit makes no sense; says which parameter.
+    """
+    unknown = [handle.name for handle in handles if handle.limits is None]
+    description = root_nh.get_param("robot_description") if unknown else None
+    described = limits_from_urdf(description) if isinstance(description, str) else {}
+    return [handle.limits if handle.limits is not None
+            else limits_with_parameters(handle.name, described.get(handle.name, JointLimits()), root_nh)
+            for handle in handles]
 
 
 class JointLimitGuard:
@@ -283,4 +306,5 @@ class JointLimitGuard:
 
 __all__ = ["EffortJointSaturation", "JointLimitGuard", "JointLimiter", "JointLimits", "PosVelJointSaturation",
            "PositionJointSaturation", "SoftJointLimits", "VelocityJointSaturation", "limit_handle", "limits_from_urdf",
-           "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters", "soft_velocities"]
+           "limits_of", "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters",
+           "soft_velocities"]

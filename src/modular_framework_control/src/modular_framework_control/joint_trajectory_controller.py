@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_switch import LOGGER
 from modular_framework_control.goal_ticket import GoalStatus
 from modular_framework_control.hardware_interface import HardwareInterface, PositionJointInterface
-from modular_framework_control.joint_limits import limits_from_urdf
+from modular_framework_control.joint_limits import limits_of
 from modular_framework_control.mailbox import Mailbox
 from modular_framework_control.node_handle import NodeHandle, read_bool, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
@@ -26,8 +27,8 @@ from modular_framework_control.trajectory import (
     POSITION,
     SHORTEST_SEGMENT_S,
     Array,
+    Track,
     splice,
-    stop_ramp,
 )
 from modular_framework_control.trajectory_clock import TrajectoryClock
 from modular_framework_control.trajectory_goal import (
@@ -37,9 +38,11 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
-from modular_framework_control.trajectory_order import TrajectoryOrder, order_of
+from modular_framework_control.trajectory_limits import MotionLimits, excess_of_first_way
+from modular_framework_control.trajectory_order import GoalRules, TrajectoryOrder, order_of
 from modular_framework_control.trajectory_plan import TrajectoryPlan
-from modular_framework_control.trajectory_tolerances import read_tolerances, violations
+from modular_framework_control.trajectory_stop import StopMotion
+from modular_framework_control.trajectory_tolerances import foreign_tolerances, read_tolerances, violations
 
 
 class JointTrajectoryController(Controller):
@@ -48,6 +51,10 @@ class JointTrajectoryController(Controller):
     Parameters, below the controller's name: `joints`; `constraints/{goal_time [s] 0.0, stopped_velocity_tolerance
     [rad/s] 0.01, <joint>/{trajectory, goal} [rad] 0 = not checked}`; `stop_trajectory_duration` [s] 0.0;
     `state_publish_rate` [1/s] 50; `action_monitor_rate` [1/s] 20; `allow_partial_joints_goal` false.
+
+    A goal beyond the limits of its joints, where they are known, is refused. Whatever ends a motion before its goal
+    (cancel, abort, a trajectory without points) stops it from where the joints are measured, within their limits:
+    with `stop_trajectory_duration` 0 they are held there.
 
     While the hardware has a fault the joints are held where they are measured, and goals are refused with its reason.
 
@@ -73,14 +80,14 @@ class JointTrajectoryController(Controller):
         self._namespace = controller_nh.namespace
         self.joint_names = read_names(controller_nh, "joints")
         self._handles = [hw.get_handle(name) for name in self.joint_names]
-        self._tolerances = read_tolerances(controller_nh, self.joint_names)
-        self._stop_duration_s = read_number(controller_nh, "stop_trajectory_duration", 0.0)
+        known = limits_of(self._handles, root_nh)
+        self._limits = MotionLimits.of(known)
+        self._rules = GoalRules(tuple(self.joint_names), read_tolerances(controller_nh, self.joint_names), self._limits,
+                                read_bool(controller_nh, "allow_partial_joints_goal", False))
+        self._stop_motion = StopMotion(read_number(controller_nh, "stop_trajectory_duration", 0.0), self._limits)
         self._state_period_s = period_of(read_number(controller_nh, "state_publish_rate", 50.0))
         self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
-        self._allow_partial = read_bool(controller_nh, "allow_partial_joints_goal", False)
-        description = root_nh.get_param("robot_description")
-        limits = limits_from_urdf(description) if isinstance(description, str) else {}
-        self._continuous = np.array([name in limits and limits[name].continuous for name in self.joint_names])
+        self._continuous = np.array([limits.continuous for limits in known])
         self._any_continuous = bool(self._continuous.any())
         self._clock = TrajectoryClock(speed_scaling_handles(self.robot_hw, self.joint_names))
         self._plan = TrajectoryPlan(len(self.joint_names))
@@ -98,7 +105,11 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
-        self._mailbox.put(order_of(goal, ticket, self.joint_names, self._tolerances, self._allow_partial))
+        unused = foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance)
+        if unused:
+            LOGGER.warning("%s: %s", self._namespace, unused)
+        here = np.array([handle.position for handle in self._handles])
+        self._mailbox.put(order_of(goal, ticket, replace(self._rules, limits=self._limits.with_positions(here))))
         if not self._running:
             self._reject_waiting("the controller was stopped")
 
@@ -129,6 +140,7 @@ class JointTrajectoryController(Controller):
         self._clock.start(time_s)
         self._next_state_s = self._next_feedback_s = time_s
         self._read_actual()
+        self._plan.hold(self._actual[POSITION], time_s)
         self._rest()
         self._running = True
 
@@ -151,10 +163,11 @@ class JointTrajectoryController(Controller):
         self._rest()
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
-        self._command_end()
         self._running = False
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
         self._reject_waiting(text)
+        self._read_actual()
+        self._command_rest()
 
     def _reject_waiting(self, text: str) -> None:
         for order in self._mailbox.taken():
@@ -167,18 +180,23 @@ class JointTrajectoryController(Controller):
         self._mailbox.work_off(self._carry_out)
         if self._fault:
             self._rest()
-        now_s = self._clock.now_s
-        self._plan.forget_before(now_s)
-        desired = self._clock.slowed(self._plan.sample(now_s))
+        self._plan.forget_before(self._clock.now_s)
+        desired, error = self._desired_and_error()
+        if self._active is not None and self._check(self._active, self._clock.now_s, error):
+            self._stop()
+            desired, error = self._desired_and_error()
+        if not self._fault:
+            self._command(desired, error, period_s)
+        self._report(time_s, desired, error)
+
+    def _desired_and_error(self) -> tuple[Array, Array]:
+        """Position, velocity and acceleration desired now, and how far the joints are from the first two."""
+        desired = self._clock.slowed(self._plan.sample(self._clock.now_s))
         error = desired[:2] - self._actual
         if self._any_continuous:
             turned = error[POSITION, self._continuous]
             error[POSITION, self._continuous] = turned - 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
-        if not self._fault:
-            self._command(desired, error, period_s)
-        if self._active is not None:
-            self._check(self._active, now_s, error)
-        self._report(time_s, desired, error)
+        return desired, error
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
         """Command the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
@@ -187,12 +205,11 @@ class JointTrajectoryController(Controller):
             handle.command = position
 
     def _command_rest(self) -> None:
-        """Command what keeps the joints where they are measured."""
-        for handle in self._handles:
-            handle.command = handle.position
-
-    def _command_end(self) -> None:
-        """Command what is in force while the controller does not run; positions stay as they are."""
+        """Command what keeps the joints where they are measured, in the turn in which they are commanded; it also is in
+        force while the controller does not run."""
+        desired, error = self._desired_and_error()
+        for handle, position in zip(self._handles, (desired[POSITION] - error[POSITION]).tolist(), strict=True):
+            handle.hold(position)
 
     def _read_actual(self) -> None:
         states = [handle.state for handle in self._handles]
@@ -200,7 +217,8 @@ class JointTrajectoryController(Controller):
         self._actual[1] = [state.velocity for state in states]
 
     def _rest(self) -> None:
-        self._plan.hold(self._actual[POSITION], self._clock.now_s)
+        desired, error = self._desired_and_error()
+        self._plan.hold(desired[POSITION] - error[POSITION], self._clock.now_s)
         self._command_rest()
 
     def _carry_out(self, order: TrajectoryOrder | TrajectoryTicket) -> None:
@@ -231,13 +249,27 @@ class JointTrajectoryController(Controller):
         splice_s = max(now_s, origin_s)
         if end_s <= splice_s + SHORTEST_SEGMENT_S:
             splice_s = now_s
-        self._warn_of_late_points(order, splice_s - origin_s)
         joints = list(order.joints)
         track = splice(order.spline, joints, origin_s, splice_s, self._plan.sample(splice_s)[:, joints],
                        self._continuous[joints].tolist())
+        refusal = self._beyond_limits(order, track, splice_s - origin_s)
+        if refusal:
+            return refusal
+        self._warn_of_late_points(order, splice_s - origin_s)
         self._replace_active(order)
-        self._plan.follow(track, splice_s)
+        self._plan.follow([track], splice_s)
         return ""
+
+    def _beyond_limits(self, order: TrajectoryOrder, track: Track, late_s: float) -> str:
+        """What a goal, joined to the motion so far, asks beyond the limits of its joints; "" for nothing."""
+        if order.spline is None or order.excesses is None:
+            return ""
+        first = int(np.searchsorted(order.spline.times_s, late_s, side="right"))
+        joints = list(order.joints)
+        limits = self._limits.with_positions(self._actual[POSITION]).of_joints(joints)
+        names = [self.joint_names[joint] for joint in joints]
+        return (order.excesses.text(first, first + 1)
+                or excess_of_first_way(track, names, limits, first))
 
     def _warn_of_late_points(self, order: TrajectoryOrder, late_s: float) -> None:
         times_s = order.spline.times_s if order.spline is not None else np.zeros(0)
@@ -259,20 +291,23 @@ class JointTrajectoryController(Controller):
             order.ticket.activate()
 
     def _stop(self) -> None:
-        """Come to rest; a slowed robot, which has less speed to lose, in as much less of its trajectory's time."""
-        now_s = self._clock.now_s
-        self._plan.follow(stop_ramp(range(len(self.joint_names)), self._plan.sample(now_s), now_s,
-                                    self._stop_duration_s * self._clock.rate), now_s)
+        """Come to rest from where the joints are measured, in the turn in which they are commanded."""
+        desired, error = self._desired_and_error()
+        actual = desired[:2] - error
+        self._plan.follow(self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate),
+                          self._clock.now_s)
+        for handle in self._handles:
+            handle.held = self._stop_motion.holds(self._clock.rate)
 
-    def _check(self, order: TrajectoryOrder, now_s: float, error: Array) -> None:
+    def _check(self, order: TrajectoryOrder, now_s: float, error: Array) -> bool:
+        """End a goal that is reached or whose tolerances are violated; returns whether the motion is to stop."""
         tolerances, late_s = order.tolerances, now_s - self._plan.end_s
         if late_s < 0.0:
             outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""
             if outside:
                 self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
                              f"path tolerance violated: {outside}")
-                self._stop()
-            return
+            return bool(outside)
         outside = violations(error, tolerances.goal, self.joint_names)
         if not outside:
             self._finish(GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL, "goal reached")
@@ -280,6 +315,8 @@ class JointTrajectoryController(Controller):
             self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
                          f"goal tolerance violated {late_s:.6g} s after the end of the trajectory (goal_time "
                          f"{tolerances.goal_time_s:.6g} s): {outside}")
+            return True
+        return False
 
     def _finish(self, status: GoalStatus, code: TrajectoryErrorCode, text: str) -> None:
         order, self._active = self._active, None

@@ -72,7 +72,8 @@ class MockRobotHW(RobotHW):
             return
         for handle, position in zip(self._handles, self._sent, strict=True):
             state = handle.state
-            state.velocity = (position - state.position) / self._sent_period_s if self._sent_period_s > 0.0 else 0.0
+            if self._sent_period_s > 0.0:     # while time stands still a joint keeps the velocity it has
+                state.velocity = (position - state.position) / self._sent_period_s
             state.position = position
 
     def _move_on(self, period_s: float) -> None:
@@ -83,7 +84,8 @@ class MockRobotHW(RobotHW):
                 state.effort = sent
                 velocity = state.velocity + sent * period_s
             position = min(max(state.position + velocity * period_s, limit.min_position), limit.max_position)
-            state.velocity = (position - state.position) / period_s if period_s > 0.0 else 0.0
+            if period_s > 0.0:
+                state.velocity = (position - state.position) / period_s
             state.position = position
 
     def write(self, time_s: float, period_s: float) -> None:

@@ -25,9 +25,6 @@ class PosVelJointTrajectoryController(JointTrajectoryController):
 
     def _command_rest(self) -> None:
         super()._command_rest()
-        self._command_end()
-
-    def _command_end(self) -> None:
         for handle in self._handles:
             handle.command_velocity = 0.0
 
@@ -42,7 +39,7 @@ class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
         for handle, acceleration in zip(self._handles, desired[ACCELERATION].tolist(), strict=True):
             handle.command_acceleration = acceleration
 
-    def _command_end(self) -> None:
-        super()._command_end()
+    def _command_rest(self) -> None:
+        super()._command_rest()
         for handle in self._handles:
             handle.command_acceleration = 0.0

@@ -161,6 +161,11 @@ class Track:
         sampled: Array = np.dot(basis, self._coefficients[i])
         return sampled
 
+    def first_segment(self) -> tuple[Array, float]:
+        """Coefficients of the first segment, shape (6, joints), and its duration [s]."""
+        end_s = self._starts_s[1] if len(self._starts_s) > 1 else self.end_s
+        return self._coefficients[0], end_s - self._starts_s[0]
+
     def without(self, joints: Sequence[int]) -> Track | None:
         """This track for its other joints; None when none is left."""
         kept = [i for i, joint in enumerate(self.joints) if joint not in joints]
@@ -220,20 +225,3 @@ def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Arr
     velocity = spline.states[point, VELOCITY]
     return bool(np.all(np.abs(spline.states[point, POSITION] + offset - state[POSITION]) < tolerance)
                 and np.all(np.abs(velocity - state[VELOCITY]) < tolerance))
-
-
-def stop_ramp(joints: Sequence[int], state: Array, time_s: float, duration_s: float) -> Track:
-    """Come to rest from `state` within `duration_s`, on the way of an even deceleration; at once when it is 0.
-
-    Args:
-        joints: indices of the joints in the controller.
-        state: desired state at `time_s`, shape (3, joints).
-        time_s: beginning of the ramp [s].
-        duration_s: length of the ramp [s].
-    """
-    if duration_s <= SHORTEST_SEGMENT_S:
-        return Track.hold(joints, state[POSITION], time_s)
-    end = np.zeros_like(state)
-    end[POSITION] = state[POSITION] + 0.5 * duration_s * state[VELOCITY]
-    coefficients = segment_coefficients(state, end, duration_s, 5)[np.newaxis]
-    return Track(joints, [time_s], coefficients, time_s + duration_s, end[POSITION], time_s)

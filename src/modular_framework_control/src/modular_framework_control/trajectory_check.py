@@ -2,6 +2,7 @@
 """What a sender may ask a trajectory controller for: joints, sizes, numbers, times, checked before anything moves."""
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 
@@ -54,8 +55,8 @@ def _faults_of(trajectory: JointTrajectory) -> Iterator[str]:
     points = trajectory.points
     for number, point in enumerate(points):
         yield from (f"point {number}: {fault}" for fault in _faults_of_point(point, trajectory.joint_names))
-    if points and not points[0].time_s >= 0.0:
-        yield f"point 0: time_from_start is {points[0].time_s:.9g} s; expected at least 0"
+    if points and not math.isfinite(points[0].time_s):
+        yield f"point 0: time_from_start is {points[0].time_s:.9g} s; expected a time"
     for number, (before, point) in enumerate(pairwise(points)):
         if not point.time_s > before.time_s:
             yield (f"point {number + 1}: time_from_start {point.time_s:.9g} s does not come after {before.time_s:.9g} s"

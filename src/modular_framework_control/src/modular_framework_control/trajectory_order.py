@@ -7,7 +7,6 @@ time.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from modular_framework_control.trajectory import InvalidTrajectoryError, Spline
@@ -18,6 +17,7 @@ from modular_framework_control.trajectory_goal import (
     TrajectoryGoal,
     TrajectoryTicket,
 )
+from modular_framework_control.trajectory_limits import Excesses, MotionLimits, excesses_of
 from modular_framework_control.trajectory_tolerances import Tolerances, tolerances_of_goal
 
 
@@ -31,6 +31,7 @@ class TrajectoryOrder:
         spline: its curve; None for "stop".
         tolerances: the ones it is watched with.
         ticket: of an action goal; None for a command.
+        excesses: what it asks beyond the limits of the joints; None for "stop".
     """
 
     joints: tuple[int, ...]
@@ -38,26 +39,41 @@ class TrajectoryOrder:
     spline: Spline | None
     tolerances: Tolerances
     ticket: TrajectoryTicket | None
+    excesses: Excesses | None = None
 
 
-def order_of(goal: TrajectoryGoal, ticket: TrajectoryTicket | None, joint_names: Sequence[str],
-             tolerances: Tolerances, allow_partial: bool) -> TrajectoryOrder:
+@dataclass(frozen=True, slots=True)
+class GoalRules:
+    """What a goal is checked against.
+
+    Attributes:
+        joint_names: the controller's joints.
+        tolerances: the controller's, where the goal has none of its own.
+        limits: of the joints.
+        allow_partial: whether the goal may leave joints out.
+    """
+
+    joint_names: tuple[str, ...]
+    tolerances: Tolerances
+    limits: MotionLimits
+    allow_partial: bool
+
+
+def order_of(goal: TrajectoryGoal, ticket: TrajectoryTicket | None, rules: GoalRules) -> TrajectoryOrder:
     """Check a goal and compute its curve.
 
     Args:
         goal: as it was sent.
         ticket: of an action goal; None for a command, which may be empty to say "stop".
-        joint_names: the controller's joints.
-        tolerances: the controller's, where the goal has none of its own.
-        allow_partial: whether the goal may leave joints out.
+        rules: what it is checked against; limits are noted in the order, as points that come too late do not count.
 
     Raises:
         GoalRejectedError: it is malformed; says what is wrong with which point and joint.
     """
-    trajectory = goal.trajectory
+    trajectory, joint_names, tolerances = goal.trajectory, rules.joint_names, rules.tolerances
     if not trajectory.points and ticket is None:
         return TrajectoryOrder(tuple(range(len(joint_names))), 0.0, None, tolerances, None)
-    faults = joint_faults(trajectory.joint_names, joint_names, allow_partial)
+    faults = joint_faults(trajectory.joint_names, joint_names, rules.allow_partial)
     if faults:
         raise GoalRejectedError(TrajectoryErrorCode.INVALID_JOINTS, faults)
     joints = tuple(joint_names.index(name) for name in trajectory.joint_names)
@@ -69,4 +85,8 @@ def order_of(goal: TrajectoryGoal, ticket: TrajectoryTicket | None, joint_names:
                                  goal.goal_time_tolerance_s)
     except InvalidTrajectoryError as error:
         raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, str(error)) from error
-    return TrajectoryOrder(joints, trajectory.stamp_s, Spline(trajectory) if trajectory.points else None, own, ticket)
+    if not trajectory.points:
+        return TrajectoryOrder(joints, trajectory.stamp_s, None, own, ticket)
+    spline = Spline(trajectory)
+    excesses = excesses_of(spline, trajectory.joint_names, rules.limits.of_joints(joints))
+    return TrajectoryOrder(joints, trajectory.stamp_s, spline, own, ticket, excesses)

@@ -7,6 +7,7 @@ plan is a row of stages, each with the tracks in force from its beginning on; ev
 """
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,12 +51,14 @@ class TrajectoryPlan:
         self._stages = (_Stage(time_s, (Track.hold(self._everything, position, time_s),)),)
         self.end_s = time_s
 
-    def follow(self, track: Track, from_s: float) -> None:
-        """Let the joints of `track` follow it from `from_s` [s] on; the motion until then, and of the others, stays."""
+    def follow(self, tracks: Sequence[Track], from_s: float) -> None:
+        """Let the joints of `tracks`, of which no two have a joint in common, follow them from `from_s` [s] on; the
+        motion until then, and of the others, stays."""
         earlier = tuple(stage for stage in self._stages if stage.from_s < from_s) or self._stages[:1]
-        others = (old.without(track.joints) for old in earlier[-1].tracks)
-        self._stages = (*earlier, _Stage(from_s, (*(other for other in others if other is not None), track)))
-        self.end_s = track.end_s
+        moved = [joint for track in tracks for joint in track.joints]
+        others = (old.without(moved) for old in earlier[-1].tracks)
+        self._stages = (*earlier, _Stage(from_s, (*(other for other in others if other is not None), *tracks)))
+        self.end_s = max(track.end_s for track in tracks)
 
     def forget_before(self, time_s: float) -> None:
         """Drop the stages that are over at `time_s` [s]."""

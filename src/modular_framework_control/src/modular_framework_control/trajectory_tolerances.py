@@ -74,7 +74,7 @@ def _bound(value: float) -> float:
 def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints: Sequence[int],
                        path: Mapping[str, JointTolerance], goal: Mapping[str, JointTolerance],
                        goal_time_s: float) -> Tolerances:
-    """The tolerances of one goal; joints it does not move are not checked.
+    """The tolerances of one goal; joints it does not move are not checked, and those of other joints are not used.
 
     Args:
         defaults: those of the controller.
@@ -85,12 +85,10 @@ def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints:
         goal_time_s: positive replaces the default [s], 0 keeps it, negative means no time at all.
 
     Raises:
-        InvalidTrajectoryError: a tolerance for a joint that the controller does not have, or one that is not a number.
+        InvalidTrajectoryError: one that is not a number.
     """
     given = [(kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()]
-    faults = [f"{kind}_tolerance names joint '{name}', which the controller does not have; it has: "
-              f"{', '.join(joint_names)}" for kind, name, _ in given if name not in joint_names]
-    faults += [f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
+    faults = [f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
                f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the parameter's) or less (not checked)"
                for kind, name, tolerance in given if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)]
     if faults:
@@ -98,6 +96,21 @@ def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints:
     time_s = defaults.goal_time_s if goal_time_s == 0.0 else max(0.0, goal_time_s)
     return Tolerances(_merged(defaults.path, joint_names, joints, path),
                       _merged(defaults.goal, joint_names, joints, goal), time_s)
+
+
+def foreign_tolerances(joint_names: Sequence[str], path: Mapping[str, JointTolerance],
+                       goal: Mapping[str, JointTolerance]) -> str:
+    """Which tolerances of a goal are of joints that the controller does not have; "" when none is.
+
+    Args:
+        joint_names: all joints of the controller.
+        path: what the goal says for the way, by joint name.
+        goal: what the goal says for the end, by joint name.
+    """
+    foreign = [f"{kind}_tolerance of joint '{name}'" for kind, tolerances in (("path", path), ("goal", goal))
+               for name in tolerances if name not in joint_names]
+    return (f"not used: {', '.join(foreign)}, which the controller does not have; it has: {', '.join(joint_names)}"
+            if foreign else "")
 
 
 def _merged(defaults: Array, joint_names: Sequence[str], joints: Sequence[int],

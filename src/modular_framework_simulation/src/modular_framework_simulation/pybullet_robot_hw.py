@@ -37,6 +37,7 @@ _INTERFACES = {
     Mode.VELOCITY: VelocityJointInterface,
     Mode.EFFORT: EffortJointInterface,
 }
+_ROUNDING = 1.0 + 1e-6
 _MODES = {interface.type_name: mode for mode, interface in _INTERFACES.items()}
 
 
@@ -126,7 +127,7 @@ class PyBulletRobotHW(RobotHW):
             handle = self._handles[name][drive.mode]
             self._saturations[name][drive.mode].enforce_limits(period_s)
             if drive.mode is Mode.POSITION and period_s > 0:
-                drive.feed_forward = (handle.command - drive.command) / period_s
+                drive.feed_forward = _feed_forward(handle, (handle.command - drive.command) / period_s)
             drive.command = handle.command
             limit = self._efforts[name]
             drive.effort_limit = min(limit, handle.max_effort) if handle.max_effort > 0 else limit
@@ -152,6 +153,12 @@ def _claims(controllers: Iterable[ControllerInfo]) -> Iterable[tuple[Mode, tuple
         for claim in controller.claimed_resources:
             if claim.hardware_interface in _MODES:
                 yield _MODES[claim.hardware_interface], claim.resources
+
+
+def _feed_forward(handle: JointHandle, velocity: float) -> float:
+    """Returns `velocity` unless the joint cannot have it: a command that is put back to the joint is no motion."""
+    fastest = handle.limits.max_velocity if handle.limits is not None else float("inf")
+    return velocity if abs(velocity) <= _ROUNDING * fastest else 0.0
 
 
 def _limits(joint: RobotJoint) -> JointLimits:

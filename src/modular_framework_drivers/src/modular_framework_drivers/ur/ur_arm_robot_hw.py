@@ -20,7 +20,7 @@ from modular_framework_control.robot_hw import RobotHW
 from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, PROGRAM_STOPPED, robot_fault
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints, read_link_settings, read_prefix
-from modular_framework_drivers.ur.command_check import CommandCheck
+from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
 
 LOGGER = logging.getLogger("rosout.ur_arm")
@@ -69,26 +69,30 @@ class UrArmHardware(RobotHW):
             self._settings = read_link_settings(robot_hw_nh)
             names = [self._prefix + name for name in JOINT_NAMES]
             max_jump = read_number(robot_hw_nh, "max_jump_rad", 0.5)
-            self._check = CommandCheck(read_checked_joints(names, root_nh), max_jump)
+            joints = read_checked_joints(names, root_nh)
+            self._check = CommandCheck(joints, max_jump)
         except ParameterError as error:
             LOGGER.error("%s in %s: %s", type(self).__name__, where, error)
             return False
         unused = [key for key in ("control_pc_ip_address", "robot_program_path") if robot_hw_nh.get_param(key)]
         if unused:
             LOGGER.info("%s: not used, as RTDE does not need it: %s", where, ", ".join(unused))
-        self._register(names)
+        self._register(joints)
         self._link = RtdeLink(self._settings)
         self._link.connect()
         self._link.request_program()
         self._fault = self._current_fault()
         return True
 
-    def _register(self, names: list[str]) -> None:
+    def _register(self, joints: list[CheckedJoint]) -> None:
         states, commands = JointStateInterface(), PositionJointInterface()
-        for name in names:
-            self._handles.append(commands.register_handle(JointHandle(states.register_handle(JointStateHandle(name)))))
+        for joint in joints:
+            handle = JointHandle(states.register_handle(JointStateHandle(joint.name)))
+            handle.limits = joint.limits
+            self._handles.append(commands.register_handle(handle))
         self._wrench = ForceTorqueSensorHandle(self._prefix + "wrench", self._prefix + "base")
-        self._scaling = SpeedScalingHandle(self._prefix + "speed_scaling_factor", names, 0.0)
+        self._scaling = SpeedScalingHandle(self._prefix + "speed_scaling_factor",
+                                           [joint.name for joint in joints], 0.0)
         sensors, scaling = ForceTorqueSensorInterface(), SpeedScalingInterface()
         sensors.register_handle(self._wrench)
         scaling.register_handle(self._scaling)

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""However a motion ends, the joints stop within their braking distance, and the next valid goal succeeds."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+
+from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
+from modular_framework_control.hardware_interface import COMMAND_INTERFACES
+from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory_goal import (
+    GoalRejectedError,
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectoryTicket,
+)
+
+FASTEST = 3.15
+LIMITS = {"has_velocity_limits": True, "max_velocity": FASTEST, "has_position_limits": True, "min_position": -6.28,
+          "max_position": 6.28}
+FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
+            "effort": "EffortJointInterface", "pos_vel": "PosVelJointInterface",
+            "pos_vel_acc": "PosVelAccJointInterface"}
+GAINS = {"velocity": {"p": 20.0}, "effort": {"p": 100.0, "d": 20.0}}
+GOAL = {"trajectory": 0.1, "goal": 0.02}
+JOINTS = ("pan", "lift")
+
+
+class WalledRobotHW(MockRobotHW):
+    """Fake hardware whose joints cannot pass a wall.
+
+    Attributes:
+        wall: largest position [rad].
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.wall = float("inf")
+
+    @property
+    def joints(self) -> list[Any]:
+        """The command handles."""
+        return next(interface.handles for interface in map(self.find, COMMAND_INTERFACES) if interface is not None)
+
+    def read(self, time_s: float, period_s: float) -> None:
+        super().read(time_s, period_s)
+        for joint in self.joints:
+            if joint.position > self.wall:
+                joint.state.position, joint.state.velocity = self.wall, 0.0
+
+
+@pytest.fixture
+def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
+    def starter(family: str = "position", limits: dict[str, Any] | None = LIMITS, stop_s: float = 0.0,
+                tolerance: dict[str, float] | None = None) -> Any:
+        controller = {"type": f"{family}_controllers/JointTrajectoryController", "joints": list(JOINTS),
+                      "gains": dict.fromkeys(JOINTS, GAINS.get(family)), "stop_trajectory_duration": stop_s,
+                      "velocity_ff": dict.fromkeys(JOINTS, 1.0 if family == "velocity" else 0.0),
+                      "constraints": {"goal_time": 0.6, "stopped_velocity_tolerance": 0.05,
+                                      **dict.fromkeys(JOINTS, GOAL if tolerance is None else tolerance)}}
+        loop = make_loop({"hw": {"joints": list(JOINTS), "command_interface": FAMILIES[family]}, "c": controller,
+                          "joint_limits": dict.fromkeys(JOINTS, limits) if limits else {}}, WalledRobotHW())
+        loop.spawn("c")
+        return loop
+
+    return starter
+
+
+def send(loop: Any, *points: tuple[float, Sequence[float], Sequence[float]]) -> TrajectoryTicket:
+    """Send a goal and let a cycle pass; a goal that is refused at once ends as rejected, too."""
+    ticket: TrajectoryTicket = GoalTicket()
+    rows = tuple(TrajectoryPoint(time_s, tuple(position), tuple(velocity), (0.0, 0.0) if velocity else ())
+                 for time_s, position, velocity in points)
+    try:
+        loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(JOINTS, rows)), ticket)
+    except GoalRejectedError as error:
+        ticket.finish(GoalStatus.REJECTED, error.code, str(error))
+    loop.step()
+    return ticket
+
+
+def positions(loop: Any) -> list[float]:
+    return [joint.position for joint in loop.robot_hw.joints]
+
+
+def way_after(loop: Any, duration_s: float = 3.0) -> float:
+    """How far the joints still go from where they are [rad]."""
+    before, furthest = positions(loop), 0.0
+    for _ in range(round(duration_s / loop.period_s)):
+        loop.step()
+        furthest = max(furthest, *(abs(now - then) for now, then in zip(positions(loop), before, strict=True)))
+    return furthest
+
+
+def assert_next_goal_succeeds(loop: Any) -> None:
+    target = tuple(position + 0.05 for position in positions(loop))
+    ticket = send(loop, (1.0, target, (0.0, 0.0)))
+    loop.run(2.0)
+    assert ticket.status is GoalStatus.SUCCEEDED, ticket.text
+    assert positions(loop) == pytest.approx(target, abs=0.02)
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+@pytest.mark.parametrize(("points", "words"), [
+    ([(0.05, (-1.5, 0.0), ())],
+     "on the way to point 0 joint 'pan' reaches the velocity -30; its limit is 3.15"),
+    ([(1.0, (0.5, 0.0), (30.0, 0.0))], "point 0: velocity of joint 'pan' is 30; its limit is 3.15"),
+    ([(1.0, (0.5, 0.5), (1e6, -1e6))], "point 0: velocity of joint 'lift' is -1e+06; its limit is 3.15"),
+    ([(0.5, (0.5, 0.0), (0.0, 0.0)), (1.0, (0.5, 9.0), (0.0, 0.0))],
+     "point 1: position of joint 'lift' is 9; its limits are -6.28 to 6.28"),
+])
+def test_a_goal_beyond_known_limits_is_refused_with_point_and_joint_and_nothing_moves(
+        start: Callable[..., Any], family: str, points: list[Any], words: str) -> None:
+    loop = start(family, stop_s=0.5)
+    ticket = send(loop, *points)
+    assert (ticket.status, ticket.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
+    assert words in ticket.text
+    assert way_after(loop) < 1e-6
+    assert_next_goal_succeeds(loop)
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+@pytest.mark.parametrize("stop_s", [0.0, 0.3])
+@pytest.mark.parametrize("end", ["cancel", "empty goal", "empty command", "switch"])
+def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(start: Callable[..., Any], family: str,
+                                                                       stop_s: float, end: str) -> None:
+    loop = start(family, stop_s=stop_s, tolerance={"goal": 0.02})
+    ticket = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
+    loop.run(0.5)
+    speed = abs(loop.robot_hw.joints[0].state.velocity)
+    assert speed > 1.5
+    if end == "cancel":
+        loop.controllers["c"].cancel(ticket)
+    elif end == "switch":
+        assert loop.switch([], ["c"]) is None
+    else:
+        names = JOINTS if end == "empty goal" else ()
+        goal = TrajectoryGoal(JointTrajectory(names, ()))
+        loop.controllers["c"].submit(goal, GoalTicket() if end == "empty goal" else None)
+    if family == "effort" and end == "switch":
+        return      # a body without friction rolls on when nothing brakes it
+    way = way_after(loop)
+    lag_s = 0.1 if family in GAINS else 0.03     # gains follow later
+    assert way <= speed * (0.5 * stop_s + lag_s) + 1e-3
+    assert ticket.status is GoalStatus.CANCELED
+    if end == "switch":
+        assert loop.switch(["c"], []) is None
+    assert_next_goal_succeeds(loop)
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+@pytest.mark.parametrize("end", ["cancel", "path", "goal", "switch"])
+def test_at_a_wall_the_actual_position_is_held_and_nothing_pushes(start: Callable[..., Any], family: str,
+                                                                   end: str) -> None:
+    loop = start(family, tolerance=GOAL if end == "path" else {"goal": 0.02})
+    loop.robot_hw.wall = 0.2
+    ticket = send(loop, (1.0, (1.0, 0.1), (0.0, 0.0)))
+    loop.run(0.7)
+    if end == "cancel":
+        loop.controllers["c"].cancel(ticket)
+    elif end == "switch":
+        assert loop.switch([], ["c"]) is None
+    loop.run(1.5)
+    assert ticket.result is {"path": TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
+                             "goal": TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED}.get(
+                                 end, TrajectoryErrorCode.INVALID_GOAL)
+    rest = 0.0 if family in GAINS else 0.2
+    assert loop.robot_hw.joints[0].command == pytest.approx(rest, abs=1e-6)
+    if end != "switch":
+        assert loop.controllers["c"].desired_at(loop.time_s)[:, 0] == pytest.approx([0.2, 0.0, 0.0])
+        loop.robot_hw.wall = float("inf")
+        assert way_after(loop) < 1e-3
+        assert_next_goal_succeeds(loop)
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_no_goal_makes_a_controller_forget_where_its_joints_are(start: Callable[..., Any], family: str) -> None:
+    loop = start(family, limits=None, stop_s=0.5)
+    loop.robot_hw.wall = 0.01
+    for velocity in (1e6, -1e6, 1e9):
+        ticket = send(loop, (0.5, (0.5, 0.005), (velocity, 0.0)))
+        loop.run(2.0)
+        assert ticket.status is GoalStatus.ABORTED
+        before = positions(loop)
+        desired = loop.controllers["c"].desired_at(loop.time_s)
+        assert abs(desired[0, 0] - before[0]) < 1e-3 or family in GAINS
+    loop.robot_hw.wall = float("inf")
+    assert way_after(loop, 1.0) < 0.1
+    assert_next_goal_succeeds(loop)
+
+
+def test_a_preempting_goal_that_the_present_motion_makes_too_fast_is_refused_and_the_motion_goes_on(
+        start: Callable[..., Any]) -> None:
+    loop = start()
+    first = send(loop, (1.0, (1.5, 0.0), (0.0, 0.0)))
+    loop.run(0.5)
+    second = send(loop, (0.2, (0.0, 0.0), (0.0, 0.0)))
+    assert second.status is GoalStatus.REJECTED
+    assert "on the way to point 0 joint 'pan' reaches the velocity -" in second.text
+    loop.run(0.7)
+    assert first.status is GoalStatus.SUCCEEDED
+
+
+def test_a_joint_outside_its_range_may_come_back(make_loop: Callable[..., Any]) -> None:
+    loop = make_loop({"hw": {"joints": list(JOINTS), "initial_positions": {"pan": 6.4}},
+                      "joint_limits": dict.fromkeys(JOINTS, LIMITS),
+                      "c": {"type": "position_controllers/JointTrajectoryController", "joints": list(JOINTS)}},
+                     WalledRobotHW())
+    loop.spawn("c")
+    loop.robot_hw.joints[0].state.position = 6.4
+    further = send(loop, (1.0, (6.5, 0.0), (0.0, 0.0)))
+    assert "point 0: position of joint 'pan' is 6.5; its limits are" in further.text
+    back = send(loop, (1.0, (6.0, 0.0), (0.0, 0.0)))
+    loop.run(1.1)
+    assert back.status is GoalStatus.SUCCEEDED and positions(loop)[0] == pytest.approx(6.0)
