@@ -78,11 +78,19 @@ def test_each_tells_the_states_of_its_own_joints(robots: Any, robot: str) -> Non
 def test_each_moves_its_own_joint_within_its_own_limits(robots: Any, robot: str) -> None:
     client = actionlib.SimpleActionClient(f"/{robot}/arm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
-    point = JointTrajectoryPoint(positions=[0.5], time_from_start=rospy.Duration.from_sec(0.3))
-    client.send_goal(FollowJointTrajectoryGoal(
-        trajectory=JointTrajectory(joint_names=[f"{robot}_joint"], points=[point])))
-    assert client.wait_for_result(rospy.Duration(30.0)) and client.get_state() == GoalStatus.SUCCEEDED
+
+    def move(position: float) -> int:
+        point = JointTrajectoryPoint(positions=[position], time_from_start=rospy.Duration.from_sec(0.3))
+        client.send_goal(FollowJointTrajectoryGoal(
+            trajectory=JointTrajectory(joint_names=[f"{robot}_joint"], points=[point])))
+        assert client.wait_for_result(rospy.Duration(30.0))
+        return client.get_state()
+
+    if robot == "left":
+        assert move(0.5) == GoalStatus.REJECTED
+        assert "position of joint 'left_joint' is 0.5; its limits are -1 to 0.1" in client.get_result().error_string
     reached, deadline = {"left": 0.1, "right": 0.5}[robot], time.monotonic() + 30.0
+    assert move(reached) == GoalStatus.SUCCEEDED
     while abs(rospy.wait_for_message(f"/{robot}/joint_states", JointState, 30.0).position[0] - reached) > 1e-6:
         assert time.monotonic() < deadline
 
