@@ -199,6 +199,29 @@ def test_an_object_in_urdf_is_read_with_weight_and_friction(world: PhysicsWorld)
     assert world.entity_state("r").pose.position[2] == pytest.approx(0.05, abs=0.002)
 
 
+LONG = "n" * 1024
+LINK = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>"
+
+
+def two_links(robot: str = "r", link: str = "a", joint: str = "j") -> str:
+    """An object whose names are given."""
+    return (f"<robot name='{robot}'><link name='{link}'>{LINK}<link name='b'>{LINK}<joint name='{joint}' type='fixed'>"
+            f"<parent link='{link}'/><child link='b'/></joint></robot>")
+
+
+@pytest.mark.parametrize("part", ["robot", "link", "joint"])
+def test_a_name_the_engine_has_no_room_for_is_refused(world: PhysicsWorld, part: str) -> None:
+    model = read_urdf_model(two_links(**{part: LONG}), "text", Resources())
+    with pytest.raises(DescriptionError, match=rf"<{part} name='n+\.\.\.'>: is 1,024 bytes long; .* at most 1,023"):
+        world.spawn(model)
+    accented = "\N{LATIN SMALL LETTER E WITH ACUTE}" * 600
+    with pytest.raises(DescriptionError, match="is 1,200 bytes long"):
+        world.spawn(read_urdf_model(two_links(**{part: accented}), "text", Resources()))
+    longest = read_urdf_model(two_links(**{part: LONG[1:]}), "text", Resources())
+    assert world.spawn(longest).name == longest.name
+    run(world, 0.01)
+
+
 @pytest.mark.parametrize(
     ("body", "said"),
     [

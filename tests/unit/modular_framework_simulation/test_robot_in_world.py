@@ -243,6 +243,19 @@ def test_the_same_commands_give_the_same_world(
     assert prints[0] == prints[1]
 
 
+def test_a_robot_with_a_name_the_engine_has_no_room_for_is_refused(
+    world: PhysicsWorld, convex_parts: ConvexParts
+) -> None:
+    urdf = lift_robot_urdf()
+    for name in ("lift", "slide_1"):
+        description = read_robot(urdf.replace(f"'{name}'", f"'{'n' * 2000}'").replace(f'"{name}"', f'"{"n" * 2000}"'),
+                                 no_packages, convex_parts, False)
+        with pytest.raises(DescriptionError, match=r"model 'r': <joint name='n+\.\.\.'>: is 2,000 bytes long"):
+            RobotBody(world, description, "r", Pose(), {})
+    with pytest.raises(DescriptionError, match="n{2000}.*allowed: lift, slide_1, slide_2"):
+        RobotBody(world, read_robot(urdf, no_packages, convex_parts, False), "r", Pose(), {"n" * 2000: 1.0})
+
+
 def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
     description = read_robot(lift_robot_urdf(), no_packages, convex_parts, False)
     with pytest.raises(DescriptionError, match=r"\['elbow'\].*allowed: lift, slide_1, slide_2"):

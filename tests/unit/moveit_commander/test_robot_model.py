@@ -84,8 +84,8 @@ def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> N
 
 
 @pytest.mark.parametrize(("urdf", "srdf", "words"), [
-    ("no xml", SRDF, "URDF: not an XML document"),
-    (URDF, "no xml", "SRDF: not an XML document"),
+    ("no xml", SRDF, "URDF:1: not an XML document"),
+    (URDF, "no xml", "SRDF:1: not an XML document"),
     (URDF.replace('<link name="base"/>', '<link name="base"/><link name="alone"/>'), SRDF, "2 links have no parent"),
     (URDF.replace('lower="0.5"', 'lower="low"'), SRDF, "joint 'a_shoulder'"),
     (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import importlib
 import sys
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from modular_framework_urdf import xml_text
 
 EXPORT_TAG = "modular_framework_control"
 ROBOT_HW_BASE = "hardware_interface::RobotHW"
@@ -152,8 +153,8 @@ class PluginIndex:
 
 def _descriptions(package: str, manifest: Path, faults: list[str]) -> list[Path]:
     try:
-        exports = ElementTree.parse(manifest).getroot().findall(f"export/{EXPORT_TAG}")
-    except ElementTree.ParseError as error:
+        exports = xml_text.read(manifest).findall(f"export/{EXPORT_TAG}")
+    except xml_text.XmlError as error:
         faults.append(f"{manifest} of package {package}: {error}")
         return []
     return [Path(export.get("plugin", "").replace("${prefix}", str(manifest.parent))) for export in exports]
@@ -166,8 +167,8 @@ def read_description(path: Path) -> list[Plugin]:
         PluginError: no such file, not XML, or entries that lack something; all of them are named.
     """
     try:
-        root = ElementTree.parse(path).getroot()
-    except (OSError, ElementTree.ParseError) as error:
+        root = xml_text.read(path)
+    except (OSError, xml_text.XmlError) as error:
         raise PluginError(f"plugin description {path}: {error}") from error
     plugins: list[Plugin] = []
     faults: list[str] = []

@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
 
 from modular_framework_control.node_handle import ParameterError
+from modular_framework_urdf.xml_text import XmlError, refuse_doctype
 
 
 class LocatedElement(ElementTree.Element):
@@ -29,7 +30,7 @@ def parse_description(description: str, where: str = "robot_description") -> Ele
         where: what to call it in messages.
 
     Raises:
-        ParameterError: not well-formed XML, or it has a DOCTYPE, whose entities could fill the memory.
+        ParameterError: not well-formed XML, or it has a DOCTYPE.
     """
     builder = ElementTree.TreeBuilder(element_factory=LocatedElement)
     parser = expat.ParserCreate()
@@ -39,16 +40,14 @@ def parse_description(description: str, where: str = "robot_description") -> Ele
         if isinstance(element, LocatedElement):
             element.line = parser.CurrentLineNumber
 
-    def refuse_doctype(*_: object) -> None:
-        raise ParameterError(f"{where}:{parser.CurrentLineNumber}: got a DOCTYPE; a robot description has none; remove "
-                             "it")
-
     parser.StartElementHandler = start
     parser.EndElementHandler = builder.end
     parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = refuse_doctype
     try:
+        refuse_doctype(description, where)
         parser.Parse(description, True)
+    except XmlError as error:
+        raise ParameterError(str(error)) from error
     except expat.ExpatError as error:
         raise ParameterError(f"{where}: not well-formed XML ({error})") from error
     return builder.close()

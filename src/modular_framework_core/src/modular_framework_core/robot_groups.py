@@ -6,6 +6,8 @@ import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
+from modular_framework_urdf import xml_text
+
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
@@ -174,6 +176,6 @@ def _chain(base: str, tip: str, by_child: dict[str, Joint]) -> list[str]:
 
 def _parse(text: str, what: str) -> ElementTree.Element:
     try:
-        return ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise RobotModelError(f"The text of {what} is no XML: {error}. Check the launch file that loads it.") from error
+        return xml_text.parse(text, what)
+    except xml_text.XmlError as error:
+        raise RobotModelError(f"{error}. Check the launch file that loads it.") from error

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_description.solids import rotation_from_rpy
+from modular_framework_urdf import xml_text
 
 Array = npt.NDArray[np.float64]
 
@@ -93,13 +94,20 @@ def _links_of(model: ElementTree.Element, name: str, pose: Array) -> list[Placed
     return links
 
 
+def _read(path: Path) -> ElementTree.Element:
+    try:
+        return xml_text.read(path)
+    except xml_text.XmlError as error:
+        raise WorldError(str(error)) from error
+
+
 def _included_model(include: ElementTree.Element, models_dir: Path) -> ElementTree.Element:
     uri = include.findtext("uri", "").strip()
     folder = models_dir / uri.removeprefix("model://")
     if not uri.startswith("model://") or not (folder / "model.sdf").is_file():
         available = sorted(path.parent.name for path in models_dir.glob("*/model.sdf"))
         raise WorldError(f"include '{uri}': no such model under {models_dir}, allowed model:// and one of {available}")
-    model = ElementTree.parse(folder / "model.sdf").getroot().find("model")
+    model = _read(folder / "model.sdf").find("model")
     if model is None:
         raise WorldError(f"{folder / 'model.sdf'}: no <model> element")
     return model
@@ -115,7 +123,7 @@ def read_world(world_file: Path, models_dir: Path) -> list[PlacedLink]:
     Raises:
         WorldError: when a model is missing or uses a shape that cannot be put into a scene.
     """
-    world = ElementTree.parse(world_file).getroot().find("world")
+    world = _read(world_file).find("world")
     if world is None:
         raise WorldError(f"{world_file}: no <world> element")
     links: list[PlacedLink] = []

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from modular_framework_planning.errors import ModelError
+from modular_framework_urdf import xml_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +95,12 @@ def parse_srdf(text: str) -> SemanticDescription:
     """Parses an SRDF document.
 
     Raises:
-        ModelError: the text is not XML, or an element lacks an attribute.
+        ModelError: the text is not XML, has a DOCTYPE, or an element lacks an attribute.
     """
     try:
-        root = ET.fromstring(text)
-    except ET.ParseError as error:
-        raise ModelError(f"SRDF: not an XML document ({error}); is robot_description_semantic loaded?") from error
+        root = xml_text.parse(text, "SRDF")
+    except xml_text.XmlError as error:
+        raise ModelError(f"{error} (is robot_description_semantic loaded?)") from error
     try:
         states = _group_states(root)
     except ValueError as error:

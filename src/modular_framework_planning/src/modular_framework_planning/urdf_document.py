@@ -13,6 +13,7 @@ import pinocchio as pin
 from modular_framework_planning.errors import GeometryError, ModelError
 from modular_framework_planning.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.spatial import Transform
+from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 
 MeshResolver = Callable[[str], str]
@@ -223,12 +224,12 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
         resolve: turns a mesh URI into the path of an existing file.
 
     Raises:
-        ModelError: not XML, no root link, an unsupported joint type, a mesh that is not there or cannot be read.
+        ModelError: not XML, a DOCTYPE, no root link, an unsupported joint type, a mesh that cannot be read.
     """
     try:
-        root = ET.fromstring(text)
-    except ET.ParseError as error:
-        raise ModelError(f"URDF: not an XML document ({error}); is robot_description loaded and expanded?") from error
+        root = xml_text.parse(text, "URDF")
+    except xml_text.XmlError as error:
+        raise ModelError(f"{error} (is robot_description loaded, and its xacro expanded?)") from error
     joints = _read_joints(root)
     links = tuple(link.get("name", "") for link in root.findall("link"))
     roots = [link for link in links if link not in joints.children.values()]

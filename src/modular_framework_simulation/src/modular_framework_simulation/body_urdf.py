@@ -84,7 +84,7 @@ class _Writer:
         if self._with_visuals:
             for number, visual in enumerate(link.visuals):
                 colour = " ".join(f"{value:g}" for value in visual.colour)
-                material = f'<material name="{link.name}_{number}"><color rgba="{colour}"/></material>'
+                material = f'<material name={quoteattr(f"{link.name}_{number}")}><color rgba="{colour}"/></material>'
                 text += f"<visual>{_origin(shift @ visual.pose)}{_geometry(visual.geometry)}{material}</visual>"
         return text
 

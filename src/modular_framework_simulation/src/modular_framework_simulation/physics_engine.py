@@ -16,9 +16,16 @@ from typing import Any
 from modular_framework_simulation.errors import DescriptionError, SimulationError
 from modular_framework_simulation.physics_settings import PhysicsSettings
 from modular_framework_simulation.poses import Vector3
+from modular_framework_urdf import xml_text
 
 BASE_INDEX = -1
 """The engine's number of a body's root link."""
+
+LONGEST_NAME_BYTES = 1023
+"""The engine copies names and file names into arrays of 1,024 bytes without a look at their length, and crashes."""
+
+_SHOWN_CHARACTERS = 40
+_NAMING_ATTRIBUTES = ("name", "link", "filename")
 
 Log = Callable[[str], None]
 
@@ -34,6 +41,25 @@ def _silenced() -> Iterator[None]:
     finally:
         os.dup2(saved, 1)
         os.close(saved)
+
+
+def refuse_long_names(text: str, where: str) -> None:
+    """Raises DescriptionError where a URDF holds a name, or the name of a file, that the engine has no room for.
+
+    Args:
+        text: The URDF.
+        where: Named in the error.
+    """
+    for element in xml_text.parse(text, where).iter():
+        for key in _NAMING_ATTRIBUTES:
+            value = element.get(key, "")
+            size = len(value.encode())
+            if size > LONGEST_NAME_BYTES:
+                raise DescriptionError(
+                    f"{where}: <{element.tag} {key}='{value[:_SHOWN_CHARACTERS]}...'>",
+                    f"is {size:,} bytes long",
+                    f"the physics engine takes at most {LONGEST_NAME_BYTES:,} bytes; use a shorter name",
+                )
 
 
 class PhysicsEngine:
@@ -106,8 +132,9 @@ class PhysicsEngine:
             The engine's number of the body.
 
         Raises:
-            DescriptionError: The engine refuses the description.
+            DescriptionError: The engine refuses the description, or has no room for a name in it.
         """
+        refuse_long_names(text, f"model '{name[:_SHOWN_CHARACTERS]}'")
         # The engine remembers files by name, so each body needs a file of its own.
         self._files_written += 1
         file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"

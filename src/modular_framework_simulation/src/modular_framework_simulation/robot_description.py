@@ -15,6 +15,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.mesh_files import ConvexParts
 from modular_framework_simulation.sdf_resources import PackageFinder
 from modular_framework_simulation.sdf_specs import Mesh
+from modular_framework_urdf import xml_text
 
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
 
@@ -89,9 +90,9 @@ def read_robot(
         DescriptionError: The text is no URDF, or refers to something that is not there.
     """
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise DescriptionError("robot_description", f"is not well-formed XML ({error})", "expected a URDF") from error
+        root = xml_text.parse(text, "robot_description")
+    except xml_text.XmlError as error:
+        raise DescriptionError(error.where, error.found, error.allowed) from error
     links = tuple(link.get("name", "") for link in root.findall("link"))
     if root.tag != "robot" or not links:
         raise DescriptionError("robot_description", f"<{root.tag}> with {len(links)} links", "expected a URDF <robot>")

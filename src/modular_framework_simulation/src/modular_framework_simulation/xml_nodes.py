@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_urdf.xml_text import XmlError, refuse_doctype
 
 
 @dataclass(slots=True)
@@ -134,7 +135,7 @@ def parse_xml(text: str, source: str) -> XmlNode:
         The root element.
 
     Raises:
-        DescriptionError: The text is not well-formed XML.
+        DescriptionError: The text is not well-formed XML, or has a DOCTYPE.
     """
     parser = expat.ParserCreate("utf-8")
     document = XmlNode("document", {}, source, 1)
@@ -155,7 +156,10 @@ def parse_xml(text: str, source: str) -> XmlNode:
     parser.EndElementHandler = end
     parser.CharacterDataHandler = characters
     try:
+        refuse_doctype(text, source)
         parser.Parse(text.encode(), True)
+    except XmlError as error:
+        raise DescriptionError(error.where, error.found, error.allowed) from error
     except expat.ExpatError as error:
         where = f"{source}:{error.lineno}"
         raise DescriptionError(where, f"is not well-formed XML ({error})", "mend the file") from error

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
+from modular_framework_urdf import xml_text
+
 _MOST_NODES = 100_000
 _LOOKS = ("library_images", "library_effects", "library_materials")
 
 
-class _NoDocumentType(ET.TreeBuilder):
-    """Refuses a document type: its entities may grow without bound."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise ValueError("it has a DOCTYPE, which COLLADA files do not need; remove it")
-
-
-def parse(content: bytes) -> ET.Element:
+def parse(content: bytes, where: str) -> ET.Element:
     """Returns the root of a COLLADA file; the tags lose their namespace.
 
     Raises:
-        ET.ParseError, ValueError: it is no XML, has a DOCTYPE, or is something else than COLLADA.
+        ValueError: it is no XML, has a DOCTYPE, or is something else than COLLADA.
     """
-    root: ET.Element = ET.fromstring(content, ET.XMLParser(target=_NoDocumentType()))
+    root = xml_text.parse(content, where)
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":

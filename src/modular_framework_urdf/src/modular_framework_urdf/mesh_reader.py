@@ -76,7 +76,7 @@ def _read(path: Path) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64
     try:
         content = path.read_bytes()
         if kind == "dae":
-            root = collada.parse(content)
+            root = collada.parse(content, path.name)
             return collada.triangles(root), collada.unit(root), *_load("dae", collada.without_materials(root))
         declared = declared_triangles(kind, content)
         return declared, 1.0, *_load(kind, with_absolute_indices(content) if kind == "obj" else content)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from modular_framework_urdf import xml_text
 from moveit_commander.exception import RobotModelError
 
 ASSUMED_ROOT_JOINT = "ASSUMED_FIXED_ROOT_JOINT"
@@ -228,9 +229,9 @@ class RobotModel:
 
 def _parse(text: str, kind: str) -> ET.Element:
     try:
-        return ET.fromstring(text)
-    except ET.ParseError as error:
-        raise RobotModelError(f"{kind}: not an XML document ({error}); is it loaded and expanded?") from error
+        return xml_text.parse(text, kind)
+    except xml_text.XmlError as error:
+        raise RobotModelError(f"{error} (is it loaded and expanded?)") from error
 
 
 def _root_joint(semantics: ET.Element, root_link: str) -> Joint:

@@ -5,12 +5,16 @@ import difflib
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import rospkg
 import xacro
 from xacro import substitution_args
 
+from modular_framework_urdf.xml_text import XmlError, refuse_doctype
+
 _IN_ORDER_FLAGS = ("--inorder", "-i")
+_parse = xacro.parse
 
 
 class PackageNotFoundError(substitution_args.SubstitutionException):
@@ -47,14 +51,30 @@ def find_package(package: str) -> str:
         raise PackageNotFoundError(package, difflib.get_close_matches(package, packages.list())) from error
 
 
-def use_rospkg() -> None:
-    """Make the xacro module answer ``$(find pkg)`` through rospkg."""
+def parse_without_doctype(inp: Any, filename: str | None = None) -> Any:
+    """Parse a text or file as ``xacro.parse`` does; a DOCTYPE is refused before any entity is expanded.
+
+    Raises:
+        xacro.XacroException: when there is a DOCTYPE.
+    """
+    source = Path(xacro.root_dir, filename or "text")
+    text = inp if isinstance(inp, str) else source.read_bytes() if inp is None and source.is_file() else ""
+    try:
+        refuse_doctype(text, str(source))
+    except XmlError as error:
+        raise xacro.XacroException(str(error)) from error
+    return _parse(inp, filename)
+
+
+def adapt_xacro() -> None:
+    """Make the xacro module answer ``$(find pkg)`` through rospkg, and refuse a DOCTYPE in every file it reads."""
     if not hasattr(substitution_args, "_eval_find"):
         raise RuntimeError(
             "xacro.substitution_args has no '_eval_find': this version of the PyPI package xacro is not supported. "
             "Install the version pinned in requirements.txt."
         )
     substitution_args._eval_find = find_package
+    xacro.parse = parse_without_doctype
 
 
 def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
@@ -68,7 +88,7 @@ def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
         PackageNotFoundError: when a ``$(find pkg)`` cannot be answered.
         xacro.XacroException: when the file is not valid xacro.
     """
-    use_rospkg()
+    adapt_xacro()
     try:
         document = xacro.process_file(str(path), mappings={key: str(value) for key, value in (mappings or {}).items()})
     except xacro.XacroException as error:
@@ -81,6 +101,6 @@ def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the ``xacro`` command line; ``--inorder`` is accepted and, being the only order there is, ignored."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    use_rospkg()
+    adapt_xacro()
     sys.argv = [sys.argv[0], *(argument for argument in given if argument not in _IN_ORDER_FLAGS)]
     xacro.main()

@@ -16,6 +16,7 @@ from modular_framework_core.grasp_generation.convex_bodies import (
     collision_body,
     column_fronts,
 )
+from modular_framework_urdf import xml_text
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200
@@ -198,9 +199,9 @@ class _Model:
 
     def __init__(self, urdf: str) -> None:
         try:
-            root = ElementTree.fromstring(urdf)
-        except ElementTree.ParseError as error:
-            raise GripperGeometryError(f"the robot description is no XML: {error}") from error
+            root = xml_text.parse(urdf, "robot_description")
+        except xml_text.XmlError as error:
+            raise GripperGeometryError(str(error)) from error
         self.links = {link.get("name", ""): link for link in root.findall("link")}
         self.joints = {joint.get("name", ""): joint for joint in root.findall("joint")
                        if joint.find("child") is not None}

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
-from xml.etree import ElementTree
 
 from modular_framework_core.task_constructor.faults import nearest
+from modular_framework_urdf import xml_text
 
 Bounds = tuple[float, float]
 TOLERANCE = 1e-6  # [rad or m]; numbers rounded in a file may end just outside
@@ -19,12 +19,9 @@ def bounds_from_urdf(text: str) -> Mapping[str, Bounds]:
     """Returns (lower, upper) [rad or m] of every joint that moves; a continuous joint has no bounds.
 
     Raises:
-        ValueError: The text is no XML.
+        ValueError: The text is no XML, or has a DOCTYPE.
     """
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise ValueError(f"the robot's description is no XML: {error}") from error
+    root = xml_text.parse(text, "robot_description")
     bounds: dict[str, Bounds] = {}
     for joint in root.findall("joint"):
         limit = joint.find("limit")

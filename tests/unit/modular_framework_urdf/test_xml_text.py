@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A DOCTYPE is refused by every reader of descriptions, with file and line, before an entity is expanded."""
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from modular_framework_urdf.xml_text import XmlError, parse, refuse_doctype
+
+SOURCES = Path(__file__).parents[3] / "src"
+LEVELS = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 30}">' for n in range(1, 12))
+BOMB = f'<?xml version="1.0"?>\n<!DOCTYPE robot [<!ENTITY e0 "boom">{LEVELS}]>\n'
+"""30 to the power of 11 words, were they expanded."""
+
+
+@pytest.mark.parametrize("kind", [str, str.encode, lambda text: text.encode("utf-16")], ids=["text", "bytes", "utf-16"])
+def test_a_doctype_is_refused_where_it_stands(kind: Callable[[str], Any]) -> None:
+    with pytest.raises(XmlError, match=r"^arm\.urdf:2: got a DOCTYPE; allowed: XML without one, .*; remove it$"):
+        parse(kind(BOMB + "<robot>&e11;</robot>"), "arm.urdf")
+    refuse_doctype(kind("<robot/><!DOCTYPE robot>"), "behind the root it is a fault that the parser names")
+
+
+def test_what_only_looks_like_one_is_read() -> None:
+    root = parse("<!-- <!DOCTYPE a> -->\n<a b='&lt;!DOCTYPE'><![CDATA[<!DOCTYPE a>]]></a>", "x")
+    assert (root.get("b"), root.text) == ("<!DOCTYPE", "<!DOCTYPE a>")
+    with pytest.raises(XmlError, match=r"^x:3: not an XML document .*; well-formed XML is needed; mend it$"):
+        parse("<a>\n\n</b>", "x")
+
+
+def _planning_urdf(text: str, _folder: Path) -> None:
+    from modular_framework_planning.urdf_document import load_urdf
+
+    load_urdf(text)
+
+
+def _planning_srdf(text: str, _folder: Path) -> None:
+    from modular_framework_planning.srdf import parse_srdf
+
+    parse_srdf(text)
+
+
+def _control(text: str, _folder: Path) -> None:
+    from modular_framework_control.urdf_xml import parse_description
+
+    parse_description(text)
+
+
+def _plugins(text: str, folder: Path) -> None:
+    from modular_framework_control.plugins import read_description
+
+    read_description(_file(folder, "plugins.xml", text))
+
+
+def _core_bounds(text: str, _folder: Path) -> None:
+    from modular_framework_core.managers.joint_bounds import bounds_from_urdf
+
+    bounds_from_urdf(text)
+
+
+def _core_groups(text: str, _folder: Path) -> None:
+    from modular_framework_core.robot_groups import read_joints
+
+    read_joints(text)
+
+
+def _core_gripper(text: str, _folder: Path) -> None:
+    from modular_framework_core.grasp_generation.gripper_geometry import measure_gripper
+
+    measure_gripper(text, "palm", "finger")
+
+
+def _simulated_robot(text: str, folder: Path) -> None:
+    from modular_framework_simulation.mesh_files import ConvexParts
+    from modular_framework_simulation.robot_description import read_robot
+
+    read_robot(text, str, ConvexParts(folder), False)
+
+
+def _simulated_sdf(text: str, _folder: Path) -> None:
+    from modular_framework_simulation.sdf_reader import read_model_text
+    from modular_framework_simulation.sdf_resources import Resources
+
+    read_model_text(text, "request", Resources((), str))
+
+
+def _simulated_urdf(text: str, _folder: Path) -> None:
+    from modular_framework_simulation.sdf_resources import Resources
+    from modular_framework_simulation.urdf_model import read_urdf_model
+
+    read_urdf_model(text, "request", Resources((), str))
+
+
+def _world_file(text: str, folder: Path) -> None:
+    from modular_framework_simulation.sdf_reader import read_world
+    from modular_framework_simulation.sdf_resources import Resources
+
+    read_world(_file(folder, "table.world", text), Resources((), str))
+
+
+def _world_to_scene(text: str, folder: Path) -> None:
+    from modular_framework_description.sdf_world import read_world
+
+    read_world(_file(folder, "table.world", text), folder)
+
+
+def _mesh(text: str, folder: Path) -> None:
+    from modular_framework_urdf.mesh_reader import read_mesh
+
+    read_mesh(_file(folder, "hand.dae", text))
+
+
+def _commander(text: str, _folder: Path) -> None:
+    from moveit_commander.robot_model import RobotModel
+
+    RobotModel(text, "<robot/>")
+
+
+def _xacro(text: str, folder: Path) -> None:
+    expand = pytest.importorskip("xacro_rospkg", reason="source the workspace").expand
+    expand(_file(folder, "arm.xacro", text))
+
+
+def _included_xacro(text: str, folder: Path) -> None:
+    expand = pytest.importorskip("xacro_rospkg", reason="source the workspace").expand
+    inner = _file(folder, "hand.xacro", text)
+    expand(_file(folder, "arm.xacro", f'<robot xmlns:xacro="http://x"><xacro:include filename="{inner}"/></robot>'))
+
+
+def _file(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+READERS = (_planning_urdf, _planning_srdf, _control, _plugins, _core_bounds, _core_groups, _core_gripper,
+           _simulated_robot, _simulated_sdf, _simulated_urdf, _world_file, _world_to_scene, _mesh, _commander, _xacro,
+           _included_xacro)
+
+
+@pytest.mark.parametrize("read", READERS, ids=lambda reader: reader.__name__[1:])
+def test_every_reader_refuses_it(read: Callable[[str, Path], None], tmp_path: Path) -> None:
+    with pytest.raises(Exception, match=r"\S+:2: got a DOCTYPE; allowed: .*; remove it"):
+        read(BOMB + "<robot name='r'>&e11;</robot>", tmp_path)
+
+
+def test_no_module_parses_xml_past_the_check() -> None:
+    parsers = re.compile(r"(?:ElementTree|ET)\.(?:parse|fromstring|XML|iterparse)\(|minidom|lxml|ParserCreate\(")
+    found = {path.name for path in SOURCES.rglob("*.py") if parsers.search(path.read_text())}
+    checked = {path.name for path in SOURCES.rglob("*.py") if "refuse_doctype(" in path.read_text()}
+    assert found <= checked and "xml_text.py" in found
