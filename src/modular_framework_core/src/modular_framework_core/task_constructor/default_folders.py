@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
 
 import rospkg
+
+from modular_framework_urdf import xml_text
 
 STATES_PACKAGE = "modular_framework_states.states"
 TEMPLATES_PACKAGE = "modular_framework_core"
@@ -63,7 +64,7 @@ def srdf_file(package: str = "") -> Path | None:
     api = _package(API_PACKAGE)
     launch = None if api is None else api / "launch" / LAUNCH_FILE
     if not package and launch is not None and launch.is_file():
-        args = ElementTree.parse(launch).getroot().findall("arg")
+        args = xml_text.read(launch).findall("arg")
         package = next((item.get("default", "") for item in args if item.get("name") == "moveit_config_package"), "")
     folder = _package(package) if package else None
     found = [] if folder is None else sorted(folder.glob("config/*.srdf"))

@@ -2,7 +2,6 @@
 """Which messages, postures and planning groups a task may name: those of configuration files and of the robot."""
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import yaml
 
 from modular_framework_core.task_constructor import default_folders
+from modular_framework_urdf import xml_text
 
 _FILES = {"joint_state": "named_joint_states.yaml", "trajectory": "named_trajectories.yaml", "pose": "named_poses.yaml"}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
@@ -45,12 +45,9 @@ class KnownNames:
             origin: where it comes from, for messages.
 
         Raises:
-            ValueError: the text is no XML.
+            ValueError: the text is no XML, or has a DOCTYPE.
         """
-        try:
-            robot = ElementTree.fromstring(srdf)
-        except ElementTree.ParseError as error:
-            raise ValueError(f"{origin} is no XML: {error}") from error
+        robot = xml_text.parse(srdf, origin)
         groups = frozenset(item.get("name", "") for item in robot.findall("group"))
         names, origins = {**self.names, "group": groups}, {**self.origins, "group": origin}
         if self.manipulator_group in groups:
