@@ -43,6 +43,14 @@ def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosS
     assert "reach" in log.lower()
 
 
+def test_the_pick_benchmark_says_why_a_launch_died(session: RosSession) -> None:
+    benchmark = Path(__file__).parents[2] / "benchmarks" / "pick_success"
+    run = subprocess.run([benchmark, "--quick", "--launch", "world_file:=no.world"], env=session.env,
+                         capture_output=True, text=True, timeout=TASK_TIMEOUT_S, check=True)
+    assert re.search(r"FAILURE: the launch died: .*no\.world: cannot be read", run.stdout), run.stdout + run.stderr
+    assert "0 of 1 episodes succeeded" in run.stdout
+
+
 @pytest.mark.parametrize("node", NODES)
 def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str) -> None:
     launch = session.run_framework(gui="false", rviz="false")
