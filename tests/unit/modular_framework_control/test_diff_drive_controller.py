@@ -199,7 +199,7 @@ def test_odometry_is_published_at_its_rate(make_base: Callable[..., Base]) -> No
     assert base.controller.frames.pose_covariance == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
-def test_states_of_the_wheels_tell_measured_and_commanded_motion(make_base: Callable[..., Base]) -> None:
+def test_states_of_the_wheels_hold_measured_and_commanded_motion(make_base: Callable[..., Base]) -> None:
     base = make_base(cmd_vel_timeout=60.0)
     base.drive(0.2, 0.0, 1.0)
     left = base.wheels[-1][0]

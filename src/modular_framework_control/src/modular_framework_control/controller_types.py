@@ -43,6 +43,10 @@ BUILT_IN_TYPES: dict[str, str] = {
     "effort_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:EffortJointGroupPositionController",
     "effort_controllers/JointGroupEffortController": f"{_JOINT_COMMAND}:EffortJointGroupEffortController",
     "diff_drive_controller/DiffDriveController": f"{_PACKAGE}.diff_drive_controller:DiffDriveController",
+    "ackermann_steering_controller/AckermannSteeringController":
+        f"{_PACKAGE}.ackermann_steering_controller:AckermannSteeringController",
+    "four_wheel_steering_controller/FourWheelSteeringController":
+        f"{_PACKAGE}.four_wheel_steering_controller:FourWheelSteeringController",
 }
 
 

@@ -182,16 +182,22 @@ class MobileBaseController(Controller):
 
     def update(self, time_s: float, period_s: float) -> None:
         measured = self._follow_wheels(time_s)
-        if self.on_odometry is not None and time_s >= self._next_s:
-            settings, pose = self.settings, self.odometry
-            self._next_s = next_due(self._next_s, period_of(settings.publish_rate), time_s)
-            self.on_odometry(OdometrySnapshot(time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral,
-                                              pose.angular, settings.enable_odom_tf))
+        self._report(time_s)
         if self._refusal:
             self._brake()
         else:
             command = self._in_force(time_s)
             self._drive(command if measured else None, time_s, period_s)
+
+    def _report(self, time_s: float) -> bool:
+        """Hand the odometry out if that is due; answers whether it is."""
+        if self.on_odometry is None or time_s < self._next_s:
+            return False
+        settings, pose = self.settings, self.odometry
+        self._next_s = next_due(self._next_s, period_of(settings.publish_rate), time_s)
+        self.on_odometry(OdometrySnapshot(time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular,
+                                          settings.enable_odom_tf))
+        return True
 
     def _in_force(self, time_s: float) -> Any:
         """The last command; None when it is too old."""
@@ -243,6 +249,13 @@ class TwistLimits:
         self.last = BaseVelocity(self._linear.limit(wanted.linear, last.linear, before.linear, period_s),
                                  self._angular.limit(wanted.angular, last.angular, before.angular, period_s))
         return self.last
+
+    def limit_linear(self, wanted: float, period_s: float) -> float:
+        """The linear velocity to command in this cycle, of a base whose turn is not limited by itself."""
+        last = self.last
+        value = self._linear.limit(wanted, last.linear, self._before_last.linear, period_s)
+        self.last, self._before_last = BaseVelocity(value, last.angular), last
+        return value
 
 
 def read_positive(handle: NodeHandle, key: str, default: float) -> float:

@@ -22,6 +22,7 @@ from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from modular_framework_control import conversions
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.diff_drive_controller import DiffDriveController
+from modular_framework_control.four_wheel_steering_controller import FourWheelSteeringController
 from modular_framework_control.goal_ticket import GoalTicket
 from modular_framework_control.gripper_action_controller import (
     GripperActionController,
@@ -33,10 +34,11 @@ from modular_framework_control.joint_command_controllers import JointCommandCont
 from modular_framework_control.joint_state_controller import JointStateController
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
 from modular_framework_control.loop_time import LoopTime
+from modular_framework_control.mobile_base_controller import MobileBaseController
 from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
 from modular_framework_control.ros_command_edges import JointCommandEdge
-from modular_framework_control.ros_mobile_base import DiffDriveTopics
+from modular_framework_control.ros_mobile_base import DiffDriveTopics, FourWheelSteeringTopics, MobileBaseTopics
 from modular_framework_control.ros_outbox import Outbox
 from modular_framework_control.ros_reconfiguration import Adjustable, Reconfiguration
 from modular_framework_control.ros_sensor_edges import SensorEdge
@@ -168,6 +170,8 @@ _EDGES: tuple[tuple[type[Controller], Any], ...] = (
     (JointCommandController, JointCommandEdge),
     (SensorController, SensorEdge),
     (DiffDriveController, DiffDriveTopics),
+    (FourWheelSteeringController, FourWheelSteeringTopics),
+    (MobileBaseController, MobileBaseTopics),
 )
 
 

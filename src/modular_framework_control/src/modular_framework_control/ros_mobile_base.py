@@ -8,12 +8,18 @@ from typing import Any
 
 import rospy
 from control_msgs.msg import JointTrajectoryControllerState
+from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from geometry_msgs.msg import Quaternion, TransformStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 from modular_framework_control.controller import ControllerError
 from modular_framework_control.diff_drive_controller import DiffDriveController, WheelState
+from modular_framework_control.four_wheel_steering_controller import (
+    FourWheelSteeringController,
+    SteeringCommand,
+    SteeringSnapshot,
+)
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.mobile_base_controller import (
     BaseFrames,
@@ -116,6 +122,22 @@ class DiffDriveTopics(MobileBaseTopics):
         settings.connect()
 
 
+class FourWheelSteeringTopics(MobileBaseTopics):
+    """Subscribes besides `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
+    `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped)."""
+
+    _controller: FourWheelSteeringController
+
+    def _open(self, opened: contextlib.ExitStack) -> None:
+        super()._open(opened)
+        self._subscribe(opened, "cmd_four_wheel_steering", FourWheelSteering, lambda command: SteeringCommand(
+            command.speed, command.front_steering_angle, command.rear_steering_angle))
+        steer = self._advertise(opened, "odom_steer", FourWheelSteeringStamped)
+        frame = self._controller.frames.odom
+        self._controller.on_steering = lambda snapshot: self._outbox.publish(
+            steer, lambda: steering_to_msg(snapshot, frame, self._loop_time.ahead_s))
+
+
 def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> Odometry:
     """Where the base is; the stamp is `ahead_s` [s] ahead of the loop's time."""
     message = Odometry()
@@ -146,6 +168,18 @@ def velocity_to_msg(stamp_s: float, velocity: BaseVelocity) -> TwistStamped:
     message = TwistStamped()
     message.header.stamp = rospy.Time.from_sec(stamp_s)
     message.twist.linear.x, message.twist.angular.z = velocity.linear, velocity.angular
+    return message
+
+
+def steering_to_msg(snapshot: SteeringSnapshot, frame_id: str, ahead_s: float) -> FourWheelSteeringStamped:
+    """Speed of the base and angles of its axles."""
+    message = FourWheelSteeringStamped()
+    message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
+    message.header.frame_id = frame_id
+    data = message.data
+    data.speed, data.acceleration, data.jerk = snapshot.values
+    data.front_steering_angle, data.rear_steering_angle = snapshot.angles
+    data.front_steering_angle_velocity, data.rear_steering_angle_velocity = snapshot.angle_velocities
     return message
 
 

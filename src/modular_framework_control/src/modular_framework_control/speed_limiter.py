@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 
 UNLIMITED = (-math.inf, math.inf)
+JERK_FACTOR = 2.0
+"""How many times the jerk that is given is allowed: that of ros_controllers, by which its users' limits are tuned."""
 
 
 def clamped(value: float, lowest: float, highest: float) -> float:
@@ -41,7 +43,7 @@ class SpeedLimiter:
         value = wanted
         if self.jerk != UNLIMITED:
             change = last - before_last
-            step_s2 = period_s * period_s
+            step_s2 = JERK_FACTOR * period_s * period_s
             value = last + change + clamped(value - last - change, self.jerk[0] * step_s2, self.jerk[1] * step_s2)
         if self.acceleration != UNLIMITED:
             value = last + clamped(value - last, self.acceleration[0] * period_s, self.acceleration[1] * period_s)
