@@ -8,7 +8,6 @@ from typing import Any
 
 import rospy
 from control_msgs.msg import JointTrajectoryControllerState
-from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from geometry_msgs.msg import Quaternion, TransformStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
@@ -129,13 +128,16 @@ class FourWheelSteeringTopics(MobileBaseTopics):
     _controller: FourWheelSteeringController
 
     def _open(self, opened: contextlib.ExitStack) -> None:
+        # Imported here, as no other controller needs this package of messages.
+        from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
+
         super()._open(opened)
         self._subscribe(opened, "cmd_four_wheel_steering", FourWheelSteering, lambda command: SteeringCommand(
             command.speed, command.front_steering_angle, command.rear_steering_angle))
         steer = self._advertise(opened, "odom_steer", FourWheelSteeringStamped)
         frame = self._controller.frames.odom
         self._controller.on_steering = lambda snapshot: self._outbox.publish(
-            steer, lambda: steering_to_msg(snapshot, frame, self._loop_time.ahead_s))
+            steer, lambda: fill_steering(FourWheelSteeringStamped(), snapshot, frame, self._loop_time.ahead_s))
 
 
 def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> Odometry:
@@ -171,9 +173,8 @@ def velocity_to_msg(stamp_s: float, velocity: BaseVelocity) -> TwistStamped:
     return message
 
 
-def steering_to_msg(snapshot: SteeringSnapshot, frame_id: str, ahead_s: float) -> FourWheelSteeringStamped:
-    """Speed of the base and angles of its axles."""
-    message = FourWheelSteeringStamped()
+def fill_steering(message: Any, snapshot: SteeringSnapshot, frame_id: str, ahead_s: float) -> Any:
+    """Write speed of the base and angles of its axles into a FourWheelSteeringStamped; returns it."""
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     message.header.frame_id = frame_id
     data = message.data
