@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 from pathlib import Path
 from xmlrpc.client import ServerProxy
@@ -27,6 +28,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from modular_framework_core import srv
 from modular_framework_core.msg import ManagerChange, StandardisedGrasp
 from modular_framework_core.srv import GetModifiedACMRequest, UpdateACMEntryRequest
+from modular_framework_core.task_constructor import default_folders
 
 JOINT_STATES = """
 up: {a: 1.5707963268, b: 0.1}
@@ -51,6 +53,13 @@ both:
   left: {position: {x: 0.1, y: 0, z: 0}, orientation: {x: 0, y: 0, z: 0, w: 1}}
   right: {position: {x: 0.2, y: 0, z: 0}, orientation: {r: 0, p: 0, y: 0}}
 """
+
+
+def folder() -> Path:
+    """Return the folder of the managers' files."""
+    made = default_folders.framework_home() / "managers"
+    made.mkdir(parents=True, exist_ok=True)
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +261,7 @@ def test_every_change_is_told_in_order(managers):
     assert {action for action, *_ in heard[:-6]} == {change.CLEARED}
 
 
-def test_messages_are_saved_and_loaded_to_the_last_bit(managers, tmp_path):
+def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
     message = RobotTrajectory()
     message.joint_trajectory.joint_names = ["a"]
     point = JointTrajectoryPoint(positions=[0.1 + 0.2], time_from_start=rospy.Duration(1, 999999999))
@@ -261,13 +270,13 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers, tmp_path):
     for name in ("kept", ""):
         call("add_plan", srv.AddMoveitPlan, message, name)
     call("add_grasp", srv.AddStandardisedGrasp, grasp, "g")
-    saved = call("save_plans", srv.MessageFile, str(tmp_path / "plans.yaml"))
+    saved = call("save_plans", srv.MessageFile, "saved/plans.yaml")
     assert (saved.success, saved.count) == (True, 2), saved.message
-    assert call("save_grasps", srv.MessageFile, str(tmp_path / "grasps.yaml")).success
+    assert call("save_grasps", srv.MessageFile, str(folder() / "grasps.yaml")).success
     call("clear_plans", Trigger)
     call("clear_grasps", Trigger)
-    assert call("load_plans", srv.MessageFile, str(tmp_path / "plans.yaml")).count == 2
-    assert call("load_grasps", srv.MessageFile, str(tmp_path / "grasps.yaml")).success
+    assert call("load_plans", srv.MessageFile, "saved/plans.yaml").count == 2
+    assert call("load_grasps", srv.MessageFile, str(folder() / "grasps.yaml")).success
     assert call("get_plan", srv.GetMoveitPlan, "kept").moveit_plan == message
     assert call("get_plan", srv.GetMoveitPlan, "").moveit_plan == message
     grasp.grasp_id = "g"
@@ -279,14 +288,28 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers, tmp_path):
     ("missing.yaml", None, "cannot be read"), ("bad.yaml", "kind: [", "cannot be read"),
     ("kind.yaml", "kind: grasp\nnamed: {}\n", "holds messages of the kind 'grasp'"),
     ("field.yaml", "kind: plan\nnamed:\n  p: {no_such_field: 1}\n", "'p' is no moveit_msgs/RobotTrajectory"),
+    ("a\0.yaml", None, "embedded null byte"), ("~no_such_user/a.yaml", None, "is no path of a file"),
+    ("../a.yaml", None, "is outside of the managers' folder"), ("/etc/a.yaml", None, "is outside of the managers'"),
+    ("deep.yaml", "a: " + "[" * 20000, "nested more than 100 levels deep"),
+    ("nan.yaml", 'kind: plan\nnamed: {p: {joint_trajectory: {points: [{positions: [.nan]}]}}}', "positions[0] is nan"),
     ("type.yaml", "kind: plan\nanonymous:\n- {joint_trajectory: {joint_names: 5}}\n", "anonymous message 1 is no")])
-def test_a_wrong_file_is_refused_and_nothing_is_lost(managers, tmp_path, path, text, reason):
+def test_a_wrong_file_is_refused_and_nothing_is_lost(managers, path, text, reason):
     call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), "stays")
     if text is not None:
-        (tmp_path / path).write_text(text)
-    answer = call("load_plans", srv.MessageFile, str(tmp_path / path) if path else "")
+        (folder() / path).write_text(text)
+    answer = call("load_plans", srv.MessageFile, path)
     assert not answer.success and reason in answer.message
     assert "stays" in lists("plans")[0]
+
+
+def test_a_pipe_is_refused_at_once_and_positions_that_are_not_finite_are_not_taken(managers):
+    os.mkfifo(folder() / "pipe.yaml")
+    for service in ("load_plans", "save_plans", "reload_joint_states"):
+        answer = call(service, srv.MessageFile, "pipe.yaml")
+        assert not answer.success and "no regular file" in answer.message
+    nowhere = JointState(name=["a"], position=[math.nan])
+    assert not call("add_joint_state", srv.AddJointState, nowhere, "nowhere").success
+    assert "nowhere" not in lists("joint_states")[0]
 
 
 def test_reloading_forgets_what_was_added_and_reads_the_file_again(managers):

@@ -29,6 +29,7 @@ from modular_framework_core.scene_file import (
     read_scene_file,
     scene_text,
 )
+from modular_framework_core.whole_files import write_whole
 
 START_TIMEOUT_S = 60.0
 SERVICE_TIMEOUT_S = 10.0
@@ -170,7 +171,7 @@ def export_main() -> int:
     try:
         arguments = _arguments(("--old", "the older layout"))
         scene = scene_of(_call("get_planning_scene", GetPlanningScene, GetPlanningSceneRequest(wanted)).scene)
-        arguments.file.write_text(scene_text(scene, arguments.old), encoding="utf-8")
+        write_whole(arguments.file, scene_text(scene, arguments.old))
     except CallError as error:
         rospy.logfatal("moveit_export_scene_to_text: %s", error)
         return 1

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import smach
+from modular_framework_core.whole_files import write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,5 +215,5 @@ def write_record(
     path = folder / f"{task.replace('/', '_')}_{stamp}_{os.getpid()}.json"
     content = {"task": task, "begun": begun, "outcome": outcome, "succeeded": succeeded, "error": error,
                "states": [asdict(record) for record in records]}
-    path.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    write_whole(path, json.dumps(content, indent=1))
     return path

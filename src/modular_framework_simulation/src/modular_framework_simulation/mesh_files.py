@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -106,16 +107,17 @@ class ConvexParts:
     def _write_atomically(self, folder: Path, parts: list[TriangleMesh]) -> None:
         self._cache_folder.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(dir=self._cache_folder))
-        for index, part in enumerate(parts):
-            (scratch / f"part_{index:03d}.obj").write_text(_obj_text(part), encoding="ascii")
-        scratch.chmod(0o755)
         try:
+            for index, part in enumerate(parts):
+                (scratch / f"part_{index:03d}.obj").write_text(_obj_text(part), encoding="ascii")
+            scratch.chmod(0o755)
             scratch.rename(folder)
-        except OSError:
-            # Another process finished the same mesh first; its result is as good as ours.
-            for file in scratch.iterdir():
-                file.unlink()
-            scratch.rmdir()
+        except OSError as error:
+            if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
+                raise DescriptionError(str(folder), f"cannot be written ({error.strerror})",
+                                       "free space, or set ROS_HOME to a folder that has some") from error
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
 
 
 def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:

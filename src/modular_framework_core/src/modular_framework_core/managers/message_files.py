@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import re
-import tempfile
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
@@ -22,6 +20,9 @@ import genpy.message
 import orjson
 import yaml
 
+from modular_framework_core import shallow_yaml
+from modular_framework_core.whole_files import read_whole, write_whole
+
 SUFFIXES = (".yaml", ".yml")
 
 
@@ -29,19 +30,27 @@ class MessageFileError(ValueError):
     """A file cannot be written, or is no file of a manager's messages; the text says why."""
 
 
-def path_of(text: str, folder: Path) -> Path:
+def path_of(text: str, folder: Path, others: Iterable[Path] = ()) -> Path:
     """Returns the path a request names.
 
     Args:
         text: What was asked for; a relative path starts at ``folder``.
         folder: Where the managers keep files.
+        others: Further folders it may be in.
 
     Raises:
-        MessageFileError: No path was given, or it does not end in .yaml.
+        MessageFileError: No path was given, it does not end in .yaml, or it is in none of the folders.
     """
-    path = folder / Path(text).expanduser()
+    try:
+        path = folder / Path(text).expanduser()
+        inside = any(path.resolve().is_relative_to(allowed.resolve()) for allowed in (folder, *others))
+    except (OSError, RuntimeError, ValueError) as error:  # of a name with a NUL byte, an unknown user, links in a ring
+        raise MessageFileError(f"path {text!r} is no path of a file: {error}; name a file in {folder}") from error
     if not text or path.suffix not in SUFFIXES:
-        raise MessageFileError(f"path '{text}': a file that ends in {' or '.join(SUFFIXES)} is needed")
+        raise MessageFileError(f"path {text!r}: a file that ends in {' or '.join(SUFFIXES)} is needed, in {folder}")
+    if not inside:
+        raise MessageFileError(f"path {text!r} is outside of the managers' folder {folder}; name a file in it, or "
+                               "start the managers with another one (parameter ~file_directory)")
     return path
 
 
@@ -66,10 +75,7 @@ def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[An
                       ",\n".join(waiting), "]}", ""])
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".yaml")
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.replace(temporary, path)
+        write_whole(path, text, mode=0o600)
     except OSError as error:
         raise MessageFileError(f"{path} cannot be written: {error}") from error
     return len(by_name) + len(waiting)
@@ -91,7 +97,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
             every message that does not is named.
     """
     try:
-        content = _parsed(path.read_text(encoding="utf-8"))
+        content = _parsed(read_whole(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:
@@ -124,7 +130,9 @@ def _parsed(text: str) -> Any:
             return parse(text)
         except json.JSONDecodeError:
             continue
-    return yaml.load(text, _YamlLoader)
+        except RecursionError:
+            break
+    return shallow_yaml.load(text, _YamlLoader)
 
 
 def flow_text(message: Any) -> str:
@@ -167,7 +175,7 @@ def _built(message_type: Any, value: Any) -> Any:
     Raises:
         LookupError, TypeError: The value is not the mapping of all fields that ``save`` writes.
     """
-    fields = _fields(message_type)
+    fields = fields_of(message_type)
     if type(value) is not dict or len(value) != len(fields):
         raise TypeError(f"no mapping of all fields of {message_type}")
     message = message_type.__new__(message_type)
@@ -182,7 +190,7 @@ def _built(message_type: Any, value: Any) -> Any:
 
 
 @cache
-def _fields(message_type: Any) -> tuple[tuple[str, Any, bool], ...]:
+def fields_of(message_type: Any) -> tuple[tuple[str, Any, bool], ...]:
     """Returns name, class where it is a message or several, and whether it is a list, of each field."""
     if issubclass(message_type, genpy.TVal):
         return ("secs", None, False), ("nsecs", None, False)

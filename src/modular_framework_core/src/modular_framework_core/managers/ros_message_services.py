@@ -12,6 +12,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core import srv
 from modular_framework_core.managers import message_files
+from modular_framework_core.managers.message_numbers import unusable_position
 from modular_framework_core.managers.message_store import Change, MessageNotFoundError, MessageStore
 from modular_framework_core.managers.yaml_entries import EntryError
 from modular_framework_core.msg import ManagerChange
@@ -93,6 +94,10 @@ class MessageServices:
         ``save_<plural>``, ``load_<plural>`` (MessageFile): all messages to a file and from one.
         ``reload_<plural>`` (MessageFile): forgets everything and reads the file of named messages again, or
             another one.
+    Parameters:
+        ``~file_directory``: folder of the files that are saved and loaded (default:
+            ``$ROS_HOME/modular_framework/managers``); a file elsewhere is refused, but for
+            ``reload_<plural>``, which also takes one beside the node's own.
     Publishers:
         ``manager_changes`` (ManagerChange): every change, in order.
     """
@@ -138,6 +143,10 @@ class MessageServices:
 
     def _add(self, request: Any) -> Any:
         name = getattr(request, self.kind.name_field)
+        wrong = unusable_position(getattr(request, self.kind.message_field))
+        if wrong:
+            rospy.logerr("The %s '%s' is not stored: %s; give finite positions.", self.kind.noun, name, wrong)
+            return self.kind.add_type._response_class(success=False)
         if self.store.add(getattr(request, self.kind.message_field), name):
             rospy.loginfo_throttle(OVERWRITTEN_PERIOD_S, f"The {self.kind.noun} '{name}' was overwritten.")
         return self.kind.add_type._response_class(success=True)
@@ -185,6 +194,12 @@ class MessageServices:
             named, anonymous = message_files.load(path, self.kind.noun, self.kind.message_type)
         except message_files.MessageFileError as error:
             return self._refused(str(error))
+        messages = [*((f"'{name}'", item) for name, item in named.items()),
+                    *((f"anonymous message {number}", item) for number, item in enumerate(anonymous, start=1))]
+        wrong = [f"{path}: {what}: {found}; give finite positions" for what, item in messages
+                 if (found := unusable_position(item))]
+        if wrong:
+            return self._refused("\n".join(wrong))
         self.store.load(named, anonymous)
         return srv.MessageFileResponse(success=True, message=str(path), count=len(named) + len(anonymous))
 
@@ -198,7 +213,8 @@ class MessageServices:
         file = self._file
         try:
             if request.path:
-                file = NamedFile(message_files.path_of(request.path, self._folder()), file.read)
+                path = message_files.path_of(request.path, self._folder(), (file.path.parent,))
+                file = NamedFile(path, file.read)
         except message_files.MessageFileError as error:
             return self._refused(str(error))
         count, faults = self._read(file)
@@ -219,4 +235,5 @@ class MessageServices:
         return srv.MessageFileResponse(success=False, message=reason, count=count)
 
     def _folder(self) -> Path:
-        return default_folders.framework_home() / "managers"
+        given = str(rospy.get_param("~file_directory", "") or "")
+        return Path(given) if given else default_folders.framework_home() / "managers"

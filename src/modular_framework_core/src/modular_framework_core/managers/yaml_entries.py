@@ -9,6 +9,9 @@ from pathlib import Path
 
 import yaml
 
+from modular_framework_core import shallow_yaml
+from modular_framework_core.whole_files import read_whole
+
 _NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: nobody asks for its tag
 
 
@@ -126,7 +129,7 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         EntryError: The file cannot be read, is no YAML, or its top level is no mapping.
     """
     try:
-        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=_NODES)
+        root = shallow_yaml.compose(read_whole(path), _NODES)
     except (OSError, UnicodeDecodeError) as error:
         raise EntryError(path, 1, f"cannot be read ({error}); give the path of a readable YAML file") from error
     except yaml.MarkedYAMLError as error:

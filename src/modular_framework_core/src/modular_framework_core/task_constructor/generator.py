@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import math
-import os
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ import jinja2
 from modular_framework_core.task_constructor import default_folders
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.task_spec import MachineSpec, TaskSpec
+from modular_framework_core.whole_files import write_whole
 
 _HEADER = '''\
 #!/usr/bin/env python3
@@ -140,11 +139,7 @@ def write(task: TaskSpec, text: str, directory: Path) -> Path:
     """
     directory.mkdir(parents=True, exist_ok=True)
     target = module_path(task, directory)
-    handle, temporary = tempfile.mkstemp(dir=directory, prefix=f".{task.name}.", suffix=".py")
-    with os.fdopen(handle, "w", encoding="utf-8") as stream:
-        stream.write(text)
-    os.chmod(temporary, 0o755)
-    os.replace(temporary, target)
+    write_whole(target, text, mode=0o755)
     return target
 
 

@@ -9,7 +9,9 @@ from typing import Any
 
 import yaml
 
+from modular_framework_core import shallow_yaml
 from modular_framework_core.task_constructor import default_folders
+from modular_framework_core.whole_files import read_whole
 from modular_framework_urdf import xml_text
 
 _FILES = {"joint_state": "named_joint_states.yaml", "trajectory": "named_trajectories.yaml", "pose": "named_poses.yaml"}
@@ -97,7 +99,7 @@ def names_of_installation(config: Path | None, moveit_package: str = "") -> Know
 def _mapping_in(file: Path) -> dict[Any, Any] | None:
     """Return the mapping in a YAML file; None when the file is not there."""
     try:
-        content = yaml.load(file.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        content = shallow_yaml.load(read_whole(file))
     except FileNotFoundError:
         return None
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:

@@ -11,6 +11,7 @@ from typing import Any, Union
 import yaml
 
 from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault
+from modular_framework_core.whole_files import read_whole
 
 MAX_NODES = 500_000
 """Largest number of values in a file after its aliases are expanded: a guard against files that blow up."""
@@ -103,7 +104,7 @@ def load(path: Path, faults: FaultList) -> Node:
     """
     start = Place(str(path), 1, 1)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_whole(path)
     except (OSError, UnicodeDecodeError) as error:
         raise TaskFault([Fault(start, f"the file cannot be read: {error}")]) from error
     return loads(text, str(path), faults)

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds positions in a message that are no finite numbers: no robot can go there, and no planner takes them."""
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from modular_framework_core.managers.message_files import fields_of
+
+_LISTS = ("position", "positions")
+_COORDINATES = ("geometry_msgs/Point", "geometry_msgs/Quaternion")
+
+
+def unusable_position(message: Any, where: str = "") -> str:
+    """Says which position of a message is not finite, and what it is; nothing when all are.
+
+    Args:
+        message: Any message; looked at are joint positions, points and orientations at any depth.
+        where: Its own field, for the text.
+    """
+    is_place = message._type in _COORDINATES
+    for name, part, is_list in fields_of(message.__class__):
+        value = getattr(message, name)
+        path = f"{where}.{name}".lstrip(".")
+        if part is not None and is_list:
+            found = next((text for number, item in enumerate(value)
+                          if (text := unusable_position(item, f"{path}[{number}]"))), "")
+        elif part is not None:
+            found = unusable_position(value, path) if hasattr(value, "_type") else ""
+        elif is_list and name in _LISTS:
+            found = _unusable_in(value, path)
+        else:
+            found = f"{path} is {value}" if is_place and not math.isfinite(value) else ""
+        if found:
+            return found
+    return ""
+
+
+def _unusable_in(values: Any, path: str) -> str:
+    if math.isfinite(sum(values)):  # quick, and right for all but sums beyond the greatest number
+        return ""
+    return next((f"{path}[{number}] is {value}" for number, value in enumerate(values) if not math.isfinite(value)), "")

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes files as a whole or not at all, and reads those that others name without waiting for what never comes."""
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+MAX_BYTES = 256 * 1024 * 1024
+"""Largest file that is read."""
+
+
+def write_whole(path: Path, content: str | bytes, mode: int = 0o644) -> None:
+    """Writes a file in one step: it is there as a whole, or stays as it was, and nothing else is left in its folder.
+
+    Args:
+        path: The file, in a folder that is there.
+        content: What it shall have.
+        mode: Its permissions.
+
+    Raises:
+        OSError: It cannot be written; names the file.
+    """
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    temporary = ""
+    try:
+        if path.exists() and not path.is_file():
+            raise OSError(errno.EINVAL, "it is there already, and no regular file")
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".writing_", suffix=path.suffix)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        os.chmod(temporary, mode)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OSError(error.errno, f"{error.strerror}; free space, or name another folder", str(path)) from error
+    except ValueError as error:
+        raise OSError(f"{str(path)!r} is no path of a file: {error}") from error
+    finally:
+        with contextlib.suppress(OSError):  # it is gone when all went well
+            if temporary:
+                os.unlink(temporary)
+
+
+def read_whole(path: Path) -> str:
+    """Reads a text file.
+
+    Raises:
+        OSError: It cannot be read, is no regular file (a pipe would never end), or is too large; names the file.
+        UnicodeDecodeError: It is no UTF-8.
+    """
+    try:
+        status = path.stat()
+    except ValueError as error:
+        raise OSError(f"{str(path)!r} is no path of a file: {error}") from error
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(f"{path} is no regular file; name a file with text in it")
+    if status.st_size > MAX_BYTES:
+        raise OSError(f"{path} has {status.st_size} bytes; allowed are {MAX_BYTES}; split it")
+    return path.read_text(encoding="utf-8")

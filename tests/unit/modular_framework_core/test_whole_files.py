@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files on a full disk, of strange kinds and names, nested without end: a reason at once, and nothing left behind."""
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_core import shallow_yaml
+from modular_framework_core.managers import message_files, yaml_entries
+from modular_framework_core.managers.message_files import MessageFileError
+from modular_framework_core.managers.message_numbers import unusable_position
+from modular_framework_core.managers.named_joint_states import load_joint_states
+from modular_framework_core.srv import AddMoveitPlanRequest, AddStandardisedGraspRequest
+from modular_framework_core.task_constructor import generator
+from modular_framework_core.task_record import StateRecord, write_record
+from modular_framework_core.whole_files import read_whole, write_whole
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_urdf.mesh_reader import TriangleMesh
+
+
+@pytest.fixture()
+def full_disk() -> Iterator[None]:
+    """A disk that takes 100 bytes of a file: what a full one answers, without one."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def left_in(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_failed_save_leaves_the_old_file_alone_and_names_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "kept.yaml"
+    path.write_text("old")
+    with pytest.raises(MessageFileError, match="kept.yaml cannot be written: .*free space.*kept.yaml"):
+        message_files.save(path, "joint state", {"a": JointState(name=["a" * 200])}, [])
+    assert (path.read_text(), left_in(tmp_path)) == ("old", ["kept.yaml"])
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_state_machine_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
+    class Task:
+        name = "pick"
+
+    with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick.py'"):
+        generator.write(Task(), "x" * 200, tmp_path)
+    assert left_in(tmp_path) == []
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_record_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
+    record = StateRecord("A" * 200, 0.0)
+    with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick_.*json'"):
+        write_record(tmp_path, "pick", 0.0, "done", True, "", (record,))
+    assert left_in(tmp_path) == []
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_cache_of_meshes_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
+    solid = TriangleMesh([[0.123456789] * 3] * 8, [[0, 2, 1], [0, 1, 3]])
+    parts = ConvexParts(tmp_path)
+    with pytest.raises(DescriptionError, match="block-hull.*cannot be written.*free space, or set ROS_HOME"):
+        parts._write_atomically(tmp_path / "block-hull", [solid])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_there_and_no_file_is_not_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(OSError, match="no regular file.*pipe.yaml"):
+        write_whole(tmp_path / "pipe.yaml", "text")
+    assert left_in(tmp_path) == [] and (tmp_path / "pipe.yaml").is_fifo()
+
+
+@pytest.mark.parametrize(("path", "reason"), [
+    ("a\0.yaml", "is no path of a file: embedded null byte; name a file in"),
+    ("~no_such_user/a.yaml", "is no path of a file: Could not determine home directory.; name a file in"),
+    ("../a.yaml", "is outside of the managers' folder"), ("/etc/a.yaml", "is outside of the managers' folder"),
+    ("link/a.yaml", "is outside of the managers' folder"), ("ring/a.yaml", "is no path of a file"),
+    ("x.txt", "a file that ends in .yaml"), ("", "a file that ends in .yaml"), ("a.yaml/..", "a file that ends in"),
+    ("\udcff.txt", "a file that ends in .yaml")])
+def test_a_path_that_is_none_or_elsewhere_is_refused(tmp_path: Path, path: str, reason: str) -> None:
+    folder = tmp_path / "managers"
+    folder.mkdir()
+    (folder / "link").symlink_to(tmp_path)
+    (folder / "ring").symlink_to(folder / "ring")
+    with pytest.raises(MessageFileError) as refused:
+        message_files.path_of(path, folder)
+    assert reason in str(refused.value)
+
+
+def test_a_path_in_the_managers_folder_or_beside_the_configuration_is_taken(tmp_path: Path) -> None:
+    assert message_files.path_of("sub/a.yaml", tmp_path) == tmp_path / "sub" / "a.yaml"
+    assert message_files.path_of(str(tmp_path / "a.yml"), tmp_path) == tmp_path / "a.yml"
+    other = tmp_path / "config"
+    assert message_files.path_of(str(other / "a.yaml"), tmp_path / "managers", [other]) == other / "a.yaml"
+
+
+DEEP = {"json": "[" * 20000 + "]" * 20000, "flow": "a: " + "[" * 20000 + "]" * 20000, "open": "{a: " * 20000,
+        "block": "\n".join(f"{' ' * number}a:" for number in range(300)), "dashes": "- " * 20000}
+
+
+@pytest.mark.parametrize("text", DEEP.values(), ids=DEEP)
+def test_what_is_nested_without_end_is_refused_with_its_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "deep.yaml"
+    path.write_text(text)
+    with pytest.raises(MessageFileError, match=r"deep.yaml cannot be read: line \d+ is nested more than 100 levels"):
+        message_files.load(path, "joint state", JointState)
+    assert "nested more than 100 levels deep" in str(load_joint_states(path)[1][0])
+    with pytest.raises(shallow_yaml.TooDeepError):
+        shallow_yaml.load(text)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(MessageFileError, match="pipe.yaml is no regular file; name a file"):
+        message_files.load(tmp_path / "pipe.yaml", "joint state", JointState)
+    faults = yaml_entries.take_entries(tmp_path / "pipe.yaml", lambda entry: None)
+    assert "is no regular file" in str(faults[0])
+    with pytest.raises(OSError, match="is no path of a file"):
+        read_whole(Path("a\0b"))
+
+
+def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() -> None:
+    state = JointState(name=["a", "b"], position=[0.0, float("nan")], velocity=[float("nan")])
+    assert unusable_position(state) == "position[1] is nan"
+    state.position = [1e308, 1e308]
+    assert unusable_position(state) == ""
+    plan = AddMoveitPlanRequest().moveit_plan
+    plan.joint_trajectory.points = [JointTrajectoryPoint(positions=[0.0], accelerations=[float("nan")]),
+                                    JointTrajectoryPoint(positions=[float("-inf")])]
+    assert unusable_position(plan) == "joint_trajectory.points[1].positions[0] is -inf"
+    grasp = AddStandardisedGraspRequest().grasp_message
+    grasp.grasp.pose.pose.orientation.w = float("inf")
+    assert unusable_position(grasp) == "grasp.pose.pose.orientation.w is inf"
