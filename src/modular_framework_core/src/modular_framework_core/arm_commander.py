@@ -35,6 +35,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_control.ros_start_up import start_timeout, wait_for_start
 from modular_framework_core.commander_results import ExecutionResult, IkResult, PlanResult
 from modular_framework_core.moveit_requests import (
     StartState,
@@ -104,11 +105,11 @@ class ArmCommander:
         self._others: dict[str, ArmCommander] = {}
         self._others_lock = threading.Lock()
 
-    def connect(self, timeout_s: float = 60.0) -> None:
+    def connect(self, timeout_s: float | None = None) -> None:
         """Reads the robot model and waits for move_group; does nothing when connected already.
 
         Args:
-            timeout_s: Longest wait for each thing needed [s].
+            timeout_s: Longest wait for each thing needed [s]; None takes the parameter ``/start_timeout``.
 
         Raises:
             CommanderError: Something needed is missing; the text names it.
@@ -116,6 +117,7 @@ class ArmCommander:
         with self._connect_lock:
             if self._group is not None:
                 return
+            limit_s = start_timeout() if timeout_s is None else timeout_s
             self._plan_service = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
             self._ik_service = rospy.ServiceProxy("compute_ik", GetPositionIK)
             self._validity_service = rospy.ServiceProxy("check_state_validity", GetStateValidity)
@@ -125,15 +127,16 @@ class ArmCommander:
             try:
                 group = self._read_group()
                 for proxy in (self._plan_service, self._ik_service):
-                    wait_for_service(proxy, timeout_s)
-                wait_for_action(self._execute_client, EXECUTE_ACTION, timeout_s)
+                    wait_for_service(proxy, limit_s)
+                wait_for_action(self._execute_client, EXECUTE_ACTION, limit_s)
             except (CallError, RobotModelError) as error:
                 raise CommanderError(f"Arm commander of group '{self.group_name}': {error}") from error
-            missing = self._missing_joints(group)
-            if not wait_until(lambda: not self._missing_joints(group), timeout_s):
-                raise CommanderError(f"Arm commander of group '{self.group_name}': topic "
-                                     f"'{rospy.resolve_name('joint_states')}' did not deliver the joints "
-                                     f"{list(missing)} within {timeout_s:.1f} s; start the joint state controller.")
+            topic = rospy.resolve_name("joint_states")
+            if not wait_for_start(lambda: not self._missing_joints(group), lambda: (
+                    f"the joints {list(self._missing_joints(group))} on topic '{topic}'"), limit_s):
+                raise CommanderError(f"Arm commander of group '{self.group_name}': topic '{topic}' did not deliver the "
+                                     f"joints {list(self._missing_joints(group))} within {limit_s:.1f} s; start the "
+                                     "joint state controller.")
             self._group = group
 
     @property

@@ -15,6 +15,7 @@ import rospy
 from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
+from modular_framework_control.ros_start_up import WaitReport, wait_for_start
 from modular_framework_core.stop_requests import stop_requested
 
 POLL_PERIOD_S = 0.01
@@ -45,7 +46,9 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
         CallError: It was not advertised in time, or what needs it was asked to stop.
     """
     end = time.monotonic() + timeout_s
+    report = WaitReport(f"service '{proxy.resolved_name}'", timeout_s)
     while True:
+        report.remind()
         if stop_requested():
             raise _given_up(f"service '{proxy.resolved_name}'")
         try:
@@ -115,7 +118,8 @@ def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: 
         ends = (inner.pub_goal, inner.pub_cancel, inner.result_sub, inner.feedback_sub)
         return inner.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
 
-    there = wait_until(lambda: connected() or stop_requested(), timeout_s)
+    there = wait_for_start(lambda: connected() or stop_requested(), f"action server '{rospy.resolve_name(name)}'",
+                           timeout_s)
     if stop_requested():
         raise _given_up(f"action server '{rospy.resolve_name(name)}'")
     if not there:

@@ -20,13 +20,13 @@ from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
 from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.arm_commander import ArmCommander
 from modular_framework_core.msg import GraspAction
 from modular_framework_core.ros_calls import call_service, wait_for_service
 from modular_framework_core.srv import SetInitACM, SetInitACMRequest
 from modular_framework_core.userdata_parameters import UserdataParameters, manipulator_links, read_parameters
 
-START_TIMEOUT_S = 60.0
 SERVICE_TIMEOUT_S = 10.0
 SELECTED_KEYS = ("selected_grasp", "selected_joint_state", "selected_trajectory", "selected_pose", "selected_plan")
 
@@ -68,7 +68,7 @@ def initialise_acm(manipulator_prefix: str) -> None:
     get_scene = rospy.ServiceProxy("/get_planning_scene", GetPlanningScene)
     set_acm = rospy.ServiceProxy("set_init_acm", SetInitACM)
     for proxy in (get_scene, set_acm):
-        wait_for_service(proxy, START_TIMEOUT_S)
+        wait_for_service(proxy, start_timeout())
     wanted = PlanningSceneComponents.ALLOWED_COLLISION_MATRIX | PlanningSceneComponents.SCENE_SETTINGS
     request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=wanted))
     acm = call_service(get_scene, request, SERVICE_TIMEOUT_S).scene.allowed_collision_matrix
@@ -93,5 +93,5 @@ def make_arm_commander(parameters: UserdataParameters) -> ArmCommander:
     commander.set_planner_id(parameters.planner_name)
     commander.set_num_planning_attempts(parameters.number_plan_attempt)
     commander.set_planning_time(parameters.planning_max_time)
-    commander.connect(timeout_s=START_TIMEOUT_S)
+    commander.connect()
     return commander

@@ -8,6 +8,7 @@ from typing import Any
 import rospy
 
 from modular_framework_control.ros_action_server import SteadyActionServer
+from modular_framework_control.ros_start_up import start_timeout, wait_for_start
 from modular_framework_core.grasp_server import (
     GraspCommandError,
     Outcome,
@@ -22,12 +23,11 @@ from modular_framework_core.grasp_server import (
 )
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_core.robot_groups import Group, RobotModelError, read_group
-from modular_framework_core.ros_calls import CallError, wait_until
+from modular_framework_core.ros_calls import CallError
 from modular_framework_core.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
 from modular_framework_core.stall_evidence import Attempt, StallEvidence
 
 FEEDBACK_PERIOD_S = 0.1
-MODEL_TIMEOUT_S = 60.0
 STAGE_FIELDS = {Stage.PREGRASP: ("pregrasp", "pregrasped"), Stage.GRASP: ("grasp", "grasped"),
                 Stage.POSTGRASP: ("postgrasp", "postgrasped")}
 
@@ -145,10 +145,10 @@ def read_manipulator() -> Group:
         RobotModelError: A parameter is not set, or the group has no active joint.
     """
     names = ("manipulator_group_name", "robot_description", "robot_description_semantic")
-    wait_until(lambda: all(rospy.has_param(name) for name in names), MODEL_TIMEOUT_S, 0.1)
+    wait_for_start(lambda: all(rospy.has_param(name) for name in names), f"the parameters {', '.join(names)}")
     missing = [rospy.resolve_name(name) for name in names if not rospy.has_param(name)]
     if missing:
-        raise RobotModelError(f"the parameters {missing} were not set within {MODEL_TIMEOUT_S} s; "
+        raise RobotModelError(f"the parameters {missing} were not set within {start_timeout():g} s; "
                               "load the robot and manipulator_controller_parameters.yaml first")
     name, urdf, srdf = (str(rospy.get_param(parameter)) for parameter in names)
     group = read_group(urdf, srdf, name)
@@ -164,12 +164,12 @@ def read_controllers() -> list[dict[str, Any]]:
         RobotModelError: Neither is set.
     """
     names = ("~controller_list", "/move_group/controller_list", "controller_list")
-    wait_until(lambda: any(rospy.has_param(name) for name in names), MODEL_TIMEOUT_S, 0.1)
+    wait_for_start(lambda: any(rospy.has_param(name) for name in names), f"one of the parameters {', '.join(names)}")
     for name in names:
         if rospy.has_param(name):
             return list(rospy.get_param(name))
     raise RobotModelError(f"none of the parameters {[rospy.resolve_name(name) for name in names]} was set within "
-                          f"{MODEL_TIMEOUT_S} s; load the controllers.yaml of the MoveIt config package")
+                          f"{start_timeout():g} s; load the controllers.yaml of the MoveIt config package")
 
 
 def main() -> int:

@@ -19,6 +19,7 @@ from controller_manager_msgs.srv import (
 )
 from std_msgs.msg import Bool
 
+from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.robot_controllers_spawner import (
     ControllerFileError,
     SpawnPlan,
@@ -39,9 +40,10 @@ class SpawnError(Exception):
 class RobotControllersSpawner:
     """Node `custom_controller_spawner`.
 
-    Parameters: `~timeout` [s] 10: how long to wait before each warning about what is missing; `~give_up_after` [s] 120:
-    how long to wait for the hardware and for the controller manager; `~stay_alive` false: keep the node alive after
-    success (for launch files that require it). Read besides: `/robot_hardware`, `/<hardware>/topic_to_wait_for`.
+    Parameters: `~timeout` [s] 10: how long to wait before each warning about what is missing; `~give_up_after` [s],
+    default `/start_timeout`: how long to wait for the hardware and for the controller manager; `~stay_alive` false:
+    keep the node alive after success (for launch files that require it). Read besides: `/robot_hardware`,
+    `/<hardware>/topic_to_wait_for`.
     Subscribes those topics (std_msgs/Bool). Calls `controller_manager/{list_controllers, load_controller,
     switch_controller}`. Uploads the controller file to the parameter server's root.
 
@@ -52,7 +54,7 @@ class RobotControllersSpawner:
 
     def __init__(self, robot_package: str, controller_file: str) -> None:
         self._warn_after_s = _seconds("~timeout", 10.0)
-        self._give_up_after_s = _seconds("~give_up_after", 120.0)
+        self._give_up_after_s = _seconds("~give_up_after", start_timeout())
         try:
             folder = Path(rospkg.RosPack().get_path(robot_package))
         except rospkg.ResourceNotFound as error:

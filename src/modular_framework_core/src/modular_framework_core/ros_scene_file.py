@@ -18,6 +18,7 @@ from moveit_msgs.srv import (
 )
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
+from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_core.scene_file import (
     NO_COLOR,
@@ -31,7 +32,6 @@ from modular_framework_core.scene_file import (
 )
 from modular_framework_core.whole_files import write_whole
 
-START_TIMEOUT_S = 60.0
 SERVICE_TIMEOUT_S = 10.0
 PRIMITIVES = {"box": SolidPrimitive.BOX, "sphere": SolidPrimitive.SPHERE, "cylinder": SolidPrimitive.CYLINDER,
               "cone": SolidPrimitive.CONE}
@@ -111,7 +111,7 @@ def _arguments(*options: tuple[str, str]) -> argparse.Namespace:
 
 def _call(service: str, kind: Any, request: Any) -> Any:
     proxy = rospy.ServiceProxy(service, kind)
-    wait_for_service(proxy, START_TIMEOUT_S)
+    wait_for_service(proxy, start_timeout())
     return call_service(proxy, request, SERVICE_TIMEOUT_S)
 
 

@@ -10,11 +10,11 @@ import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from std_srvs.srv import Trigger, TriggerResponse
 
+from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.managers.named_poses import NamedPose, Placement
+from modular_framework_core.ros_calls import CallError, wait_for_service
 from modular_framework_core.sensor_frames import SensorFrame, load_sensor_frames
 from modular_framework_core.srv import GetPoseStamped
-
-POSE_SERVICE_TIMEOUT_S = 30.0
 
 
 def transform_message(frame: SensorFrame) -> TransformStamped:
@@ -32,11 +32,10 @@ def stored_pose(name: str) -> NamedPose | None:
     """Asks the pose manager for a pose; None when it has none of that name, or does not answer (which is logged)."""
     get_pose = rospy.ServiceProxy("get_pose", GetPoseStamped)
     try:
-        get_pose.wait_for_service(POSE_SERVICE_TIMEOUT_S)
+        wait_for_service(get_pose, start_timeout())
         answer = get_pose(name)
-    except (rospy.ROSException, rospy.ServiceException) as error:
-        rospy.logerr("Service '%s' did not give the pose '%s' within %.0f s: %s", get_pose.resolved_name, name,
-                     POSE_SERVICE_TIMEOUT_S, error)
+    except (CallError, rospy.ROSException, rospy.ServiceException) as error:
+        rospy.logerr("Service '%s' did not give the pose '%s': %s", get_pose.resolved_name, name, error)
         return None
     if not answer.success:
         return None

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,9 @@ import rospy
 from gazebo_msgs import srv
 from std_srvs.srv import Empty
 
+from modular_framework_control.ros_start_up import start_timeout, wait_for_start
 from modular_framework_simulation import conversions, ros_names
 from modular_framework_simulation.spawn_model_command import Format, Source, SpawnCommand, parse_spawn_command
-
-_SERVICE_TIMEOUT_S = 30.0
-_MODEL_TIMEOUT_S = 120.0
-_POLL_PERIOD_S = 0.2
 
 
 class SpawnError(Exception):
@@ -75,17 +71,28 @@ def _description(command: SpawnCommand) -> str:
 
 
 def _wait_for_model(model: str) -> None:
-    end = time.monotonic() + _MODEL_TIMEOUT_S
-    rospy.wait_for_service(ros_names.GET_WORLD_PROPERTIES, _SERVICE_TIMEOUT_S)
+    _wait_for_service(ros_names.GET_WORLD_PROPERTIES)
     world = rospy.ServiceProxy(ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties)
-    while model not in world().model_names:
-        if time.monotonic() > end or rospy.is_shutdown():
-            raise SpawnError(f"model '{model}' did not appear within {_MODEL_TIMEOUT_S:g} s")
-        time.sleep(_POLL_PERIOD_S)
+    if not wait_for_start(lambda: model in world().model_names, f"model '{model}' of the simulation"):
+        raise SpawnError(f"model '{model}' did not appear within {start_timeout():g} s (parameter /start_timeout); "
+                         "spawn it first, or correct the name after -wait")
+
+
+def _wait_for_service(name: str) -> None:
+    def advertised() -> bool:
+        try:
+            rospy.wait_for_service(name, 0.2)
+        except rospy.ROSException:
+            return False
+        return True
+
+    if not wait_for_start(advertised, f"service '{name}' of the simulation"):
+        raise SpawnError(f"service '{name}' was not advertised within {start_timeout():g} s (parameter "
+                         "/start_timeout); start the simulation")
 
 
 def _call(name: str, kind: Any, *values: Any) -> Any:
-    rospy.wait_for_service(name, _SERVICE_TIMEOUT_S)
+    _wait_for_service(name)
     answer = rospy.ServiceProxy(name, kind)(*values)
     if not getattr(answer, "success", True):
         raise SpawnError(answer.status_message)

@@ -11,6 +11,7 @@ from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
+from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
@@ -31,7 +32,6 @@ from modular_framework_core.ros_calls import CallError, call_service, wait_for_s
 
 SIGNAL_TOPIC = "grasp_generated"
 SERVICE_TIMEOUT_S = 10.0
-START_TIMEOUT_S = 60.0
 SCENE_PERIOD_S = 0.25
 WAITING_PERIOD_S = 10.0
 
@@ -67,8 +67,8 @@ class TopDownGraspGenerator:
         self._stored = StoredGrasps()
         self._generating = threading.Lock()
 
-    def connect(self, timeout_s: float = START_TIMEOUT_S) -> None:
-        """Measures the gripper and waits for the nodes it needs.
+    def connect(self) -> None:
+        """Measures the gripper and waits for the nodes it needs, at most ``/start_timeout`` for each.
 
         Raises:
             NoGraspError: Something needed is missing; the text names it.
@@ -79,9 +79,9 @@ class TopDownGraspGenerator:
         settings = read_settings()
         self._commander = ArmCommander(settings.arm_group)
         try:
-            self._commander.connect(timeout_s)
-            wait_for_service(self._scene, timeout_s)
-            self._stored.connect(timeout_s)
+            self._commander.connect()
+            wait_for_service(self._scene, start_timeout())
+            self._stored.connect(start_timeout())
             tip = self._commander.group.tip_link
             self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
         except (CommanderError, CallError, GripperGeometryError) as error:

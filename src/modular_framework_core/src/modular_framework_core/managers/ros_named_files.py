@@ -19,6 +19,7 @@ from modular_framework_core.managers.named_trajectories import JointLookup, Time
 from modular_framework_core.managers.ros_message_services import MessageServices
 from modular_framework_core.managers.yaml_entries import EntryError
 from modular_framework_core.msg import RobotPose
+from modular_framework_core.ros_calls import CallError, wait_for_service
 from modular_framework_core.srv import GetJointState
 
 NamedMessages = tuple[dict[str, Any], list[EntryError]]
@@ -116,10 +117,9 @@ def lookup_over_service(timeout_s: float) -> JointLookup:
     """
     get_joint_state = rospy.ServiceProxy("get_joint_state", GetJointState)
     try:
-        get_joint_state.wait_for_service(timeout_s)
-    except rospy.ROSException:
-        rospy.logerr("Service '%s' did not appear within %.1f s; start the joint state manager. "
-                     "No trajectory can be loaded.", get_joint_state.resolved_name, timeout_s)
+        wait_for_service(get_joint_state, timeout_s)
+    except CallError as error:
+        rospy.logerr("%s (the joint state manager). No trajectory can be loaded.", error)
         return lambda name: None
 
     def lookup(name: str) -> Mapping[str, float] | None:

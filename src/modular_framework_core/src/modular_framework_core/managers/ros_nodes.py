@@ -9,6 +9,7 @@ from pathlib import Path
 
 import rospy
 
+from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.managers import ros_message_services as kinds
 from modular_framework_core.managers.ros_acm_services import AcmServices
 from modular_framework_core.managers.ros_message_services import MessageKind, MessageServices, NamedFile
@@ -23,7 +24,6 @@ from modular_framework_core.managers.ros_named_files import (
 )
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
 
-JOINT_STATE_SERVICE_TIMEOUT_S = 30.0
 TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
 COLLECT_AFTER = 50_000  # objects; messages are freed by their counts, and five plans are some thousand objects
 
@@ -47,7 +47,7 @@ def run_message_manager(kind: MessageKind, node_name: str) -> None:
     arguments = [argument for argument in start(node_name) if argument]
     readers = {kinds.JOINT_STATE: read_joint_states, kinds.POSE: read_poses, kinds.ROBOT_POSE: read_robot_poses}
     if kind is kinds.TRAJECTORY and arguments:
-        readers[kind] = trajectory_reader(lookup_over_service(JOINT_STATE_SERVICE_TIMEOUT_S))
+        readers[kind] = trajectory_reader(lookup_over_service(start_timeout()))
     named = NamedFile(Path(arguments[0]), readers[kind]) if arguments and kind in readers else None
     MessageServices(kind, named).connect()
     rospy.spin()

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Waits for what other nodes bring at the start: as long as a slow machine needs, and never without saying for what."""
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import rospy
+
+START_TIMEOUT_PARAMETER = "/start_timeout"
+DEFAULT_START_TIMEOUT_S = 300.0
+"""Longest wait of a node for another one [s, wall time]. A node that died ends the launch that requires it, so this is
+for nodes that were never started."""
+REPORT_PERIOD_S = 10.0
+POLL_PERIOD_S = 0.05
+
+
+def start_timeout() -> float:
+    """Returns the longest wait of a node for another one at the start [s]: the parameter ``/start_timeout``."""
+    value = rospy.get_param(START_TIMEOUT_PARAMETER, DEFAULT_START_TIMEOUT_S)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+        rospy.logerr_throttle(REPORT_PERIOD_S, f"Parameter '{START_TIMEOUT_PARAMETER}' is {value!r}, allowed are "
+                                               f"seconds above 0; {DEFAULT_START_TIMEOUT_S:g} is used instead.")
+        return DEFAULT_START_TIMEOUT_S
+    return float(value)
+
+
+class WaitReport:
+    """Says every ten seconds what is waited for.
+
+    Args:
+        what: Name of what is missing, or what gives it.
+        timeout_s: Longest wait [s].
+    """
+
+    def __init__(self, what: str | Callable[[], str], timeout_s: float) -> None:
+        self._what, self._timeout_s = what, timeout_s
+        self._begun_s = self._said_s = time.monotonic()
+
+    def remind(self) -> None:
+        """Says it when ten seconds have passed since the last time."""
+        now_s = time.monotonic()
+        if now_s - self._said_s >= REPORT_PERIOD_S:
+            self._said_s = now_s
+            what = self._what if isinstance(self._what, str) else self._what()
+            rospy.logwarn("still waiting for %s after %.0f s (of %.0f s at most)", what, now_s - self._begun_s,
+                          self._timeout_s)
+
+
+def wait_for_start(condition: Callable[[], bool], what: str | Callable[[], str],
+                   timeout_s: float | None = None) -> bool:
+    """Waits for a condition that another node brings about [wall time].
+
+    Args:
+        condition: Asked again and again.
+        what: Name of what is missing, or what gives it.
+        timeout_s: Longest wait [s]; None takes the parameter ``/start_timeout``.
+
+    Returns:
+        False when it did not hold in time, or ROS shuts down.
+    """
+    limit_s = start_timeout() if timeout_s is None else timeout_s
+    report, end_s = WaitReport(what, limit_s), time.monotonic() + limit_s
+    while not condition():
+        if rospy.is_shutdown() or time.monotonic() >= end_s:
+            return False
+        report.remind()
+        time.sleep(POLL_PERIOD_S)
+    return True
