@@ -18,12 +18,14 @@ from moveit_msgs.msg import (
     AttachedCollisionObject,
     CollisionObject,
     Constraints,
+    JointConstraint,
+    MotionPlanRequest,
     MoveItErrorCodes,
     PlanningScene,
     PlanningSceneComponents,
     RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetStateValidity
+from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetStateValidity
 from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
@@ -111,6 +113,29 @@ def test_the_hand_closes_and_arm_and_hand_move_together(demo: Any) -> None:
                                  "panda_finger_joint1": 0.02})
     assert both.go()
     assert both.get_current_joint_values() == pytest.approx([*READY, 0.02, 0.02], abs=1e-3)
+
+
+def test_both_fingers_may_be_named_in_a_goal(demo: Any) -> None:
+    hand = commander("hand")
+    ask = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
+
+    def plan(**fingers: float) -> Any:
+        request = MotionPlanRequest(group_name="hand", num_planning_attempts=1, allowed_planning_time=20.0)
+        request.start_state.is_diff = True
+        request.goal_constraints = [Constraints(joint_constraints=[
+            JointConstraint(name, position, 1e-4, 1e-4, 1.0) for name, position in fingers.items()])]
+        return ask(request).motion_plan_response
+
+    for fingers in ({"panda_finger_joint1": 0.01, "panda_finger_joint2": 0.01}, {"panda_finger_joint2": 0.01}):
+        answer = plan(**fingers)
+        assert answer.error_code.val == MoveItErrorCodes.SUCCESS
+        assert answer.trajectory.joint_trajectory.joint_names == ["panda_finger_joint1"]
+        assert answer.trajectory.joint_trajectory.points[-1].positions == pytest.approx([0.01], abs=2e-4)
+    assert plan(panda_finger_joint1=0.01, panda_finger_joint2=0.02).error_code.val == \
+        MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
+    hand.set_joint_value_target({"panda_finger_joint2": 0.025})
+    assert hand.go()
+    assert hand.get_current_joint_values() == pytest.approx([0.025, 0.025], abs=1e-3)
 
 
 def test_a_stop_leaves_the_robot_on_its_way(arm: MoveGroupCommander) -> None:

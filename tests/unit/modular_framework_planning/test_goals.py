@@ -25,6 +25,7 @@ from modular_framework_planning.planning_scene import CollisionObject, PlanningS
 from modular_framework_planning.regions import BoxSolid
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.shapes import Box
+from modular_framework_urdf.mimics import Mimic
 
 GROUP, TIP = "arm_and_manipulator", "eg_manipulator"
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -157,3 +158,17 @@ def test_of_several_goals_those_that_can_be_reached_count(resolve: Resolve) -> N
 def test_the_same_random_numbers_give_the_same_goal_states(model: RobotModel, resolve: Resolve) -> None:
     goal = ConstraintGoal(pose_constraints(model, 0.4, (0.3, 0.3, 7.0)))
     assert (resolve(goal) == resolve(goal)).all()
+
+
+MIMICS = {"right": Mimic("left", -2.0, 0.1)}
+
+
+def test_a_joint_that_mimics_asks_its_leader() -> None:
+    goal = JointGoal({"right": 0.05}, {"right": 0.02}, {"right": 0.04}).of_independent_joints(MIMICS)
+    assert goal.positions == pytest.approx({"left": 0.025})
+    assert (goal.below["left"], goal.above["left"]) == pytest.approx((0.02, 0.01)), "the multiplier turns them round"
+    both = JointGoal({"left": 0.025, "right": 0.05}, {"left": 0.005}, {"left": 0.01}).of_independent_joints(MIMICS)
+    assert both.positions == pytest.approx({"left": 0.025})
+    assert (both.below["left"], both.above["left"]) == pytest.approx((0.0, 0.0)), "the narrower range counts"
+    with pytest.raises(PlanningError, match="'right' at 0.3000 asks 'left', which it mimics, to be at -0.1000"):
+        JointGoal({"left": 0.025, "right": 0.3}).of_independent_joints(MIMICS)

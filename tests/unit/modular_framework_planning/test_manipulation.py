@@ -15,9 +15,11 @@ from modular_framework_planning.manipulation import Translation, allowing
 from modular_framework_planning.manipulation_messages import Hand, posture, translation
 from modular_framework_planning.planning_scene import PlanningScene, empty_scene
 from modular_framework_planning.robot_model import RobotModel
+from modular_framework_urdf.mimics import Mimic
 
 EFFECTOR = "ezgripper_finger_1_ee"
-HAND = Hand("ee_link", ("ezgripper_palm_link",), frozenset({"ezgripper_knuckle_palm_L1_1"}))
+HAND = Hand("ee_link", ("ezgripper_palm_link",), frozenset({"ezgripper_knuckle_palm_L1_1"}),
+            {"ezgripper_knuckle_palm_L1_2": Mimic("ezgripper_knuckle_palm_L1_1", 2.0, 0.1)})
 
 
 @pytest.fixture
@@ -81,6 +83,11 @@ def test_the_last_point_of_a_posture_counts() -> None:
     points = [SimpleNamespace(positions=[0.1]), SimpleNamespace(positions=[0.2])]
     assert posture(SimpleNamespace(joint_names=[joint], points=points), HAND, "grasp") == {joint: 0.2}
     assert posture(SimpleNamespace(joint_names=[], points=[]), HAND, "grasp") == {}
+    both = [joint, *HAND.mimics]
+    two = [SimpleNamespace(positions=[0.2, 0.4])]
+    assert posture(SimpleNamespace(joint_names=both, points=two), HAND, "grasp") == {joint: 0.2}
+    assert posture(SimpleNamespace(joint_names=both[1:], points=[SimpleNamespace(positions=[0.5])]), HAND,
+                   "grasp") == pytest.approx({joint: 0.2}), "0.5 is twice 0.2, and 0.1"
     for names, given in ((["elbow_joint"], points), ([joint], []), ([joint, joint], points)):
         with pytest.raises(PlanningError, match="grasp"):
             posture(SimpleNamespace(joint_names=names, points=given), HAND, "grasp")

@@ -275,6 +275,9 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
          "<child link='b'/><limit lower='x'/></joint></robot>", "joint 'j'.*got 'x'"),
         ("<robot name='r'><link name='a'/><joint name='j' type='revolute'><parent link='a'/></joint></robot>",
          "joint 'j'.*has no <child"),
+        (lift_robot_urdf().replace("<mimic joint=\"slide_1\"", "<mimic joint=\"slide_2\""),
+         "'slide_2': it mimics itself through slide_2 -> slide_2; a joint may mimic one of lift, slide_1"),
+        (lift_robot_urdf().replace("<mimic joint=\"slide_1\"", "<mimic joint=\"knee\""), "'knee', which is no joint"),
     ],
 )
 def test_a_faulty_robot_description_is_refused(urdf: str, said: str, tmp_path: Path) -> None:

@@ -75,6 +75,18 @@ def test_mimic_joints_follow(model: RobotModel) -> None:
     assert model.random_values(model.group("hand"), random.Random(1)).keys() == {"d_left", "e_right"}
 
 
+def test_mimic_joints_follow_through_others_and_a_fixed_one_follows_none() -> None:
+    chain = URDF.replace('<mimic joint="d_left" multiplier="2"', '<mimic joint="a_shoulder" multiplier="2"')
+    chain = chain.replace('<joint name="d_left" type="prismatic">',
+                          '<joint name="d_left" type="prismatic"><mimic joint="e_right" multiplier="3"/>')
+    found = RobotModel(chain, SRDF.replace("VIRTUAL", ""))
+    assert found.complete({"a_shoulder": 0.5}) == pytest.approx({"a_shoulder": 0.5, "e_right": 1.01, "d_left": 3.03})
+    mount = '<joint name="c_mount" type="fixed">'
+    fixed = URDF.replace(mount, f'{mount}<mimic joint="d_left"/>')
+    assert fixed != URDF
+    assert "c_mount" not in RobotModel(fixed, SRDF.replace("VIRTUAL", "")).complete({"d_left": 0.02})
+
+
 def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> None:
     hand = model.group("hand")
     assert group_values(hand, [0.01, 0.03]) == {"d_left": 0.01, "e_right": 0.03}
@@ -88,6 +100,8 @@ def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> N
     (URDF, "no xml", "SRDF:1: not an XML document"),
     (URDF.replace('<link name="base"/>', '<link name="base"/><link name="alone"/>'), SRDF, "2 links have no parent"),
     (URDF.replace('lower="0.5"', 'lower="low"'), SRDF, "joint 'a_shoulder'"),
+    (URDF.replace('<mimic joint="d_left"', '<mimic joint="e_right"'), SRDF, "mimics itself through e_right -> e_right"),
+    (URDF.replace('<mimic joint="d_left"', '<mimic joint="knee"'), SRDF, "'knee', which is no joint that moves"),
     (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),
     (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "'nowhere' is not a link"),
     (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="nobody"/></group>'), "'nobody', which is not"),

@@ -100,6 +100,7 @@ class GoalResolver:
 
     def _joint_ranges(self, goal: JointGoal) -> tuple[Array, Array, Array]:
         """Returns target, lowest and highest allowed values of the group's joints; a turn without ends is nearest."""
+        goal = goal.of_independent_joints(self._model.document.mimics)
         values = np.array(self._start)
         low, high = values.copy(), values.copy()
         for name, wanted in goal.positions.items():

@@ -13,6 +13,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownN
 from modular_framework_planning.manipulation import Manoeuvre, SceneChange, Translation, allowing
 from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene
 from modular_framework_planning.spatial import Transform
+from modular_framework_urdf.mimics import Mimic, with_leaders
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,12 +23,13 @@ class Hand:
     Attributes:
         link: what it is fixed to; poses of grasps are poses of this link.
         links: its own.
-        joints: its own, which postures may name.
+        joints: its own, which postures may name; mimics: those that follow one of them, which they may name too.
     """
 
     link: str
     links: tuple[str, ...]
     joints: frozenset[str]
+    mimics: Mapping[str, Mimic]
 
 
 def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Translation:
@@ -67,22 +69,25 @@ def _rigid(scene: PlanningScene, first: str, second: str) -> bool:
 def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
     """Reads a posture of the fingers: the last point of the trajectory; none where it names no joint.
 
+    A joint that mimics another counts only where that one is not named: the other one moves it, as in MoveIt.
+
     Raises:
         PlanningError: a joint is not the end effector's, or there is no finite position for each joint.
     """
     if not message.joint_names:
         return {}
-    foreign = [name for name in message.joint_names if name not in hand.joints]
+    known = hand.joints | hand.mimics.keys()
+    foreign = [name for name in message.joint_names if name not in known]
     if foreign:
         raise UnknownNameError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint of the end effector", foreign[0],
-                               hand.joints)
+                               known)
     points = message.points
     values = list(points[-1].positions) if points else []
     if len(values) != len(message.joint_names) or not np.isfinite(values).all():
         raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: {len(points)} points, the last with "
                             f"{len(values)} positions for {len(message.joint_names)} joints; one finite position for "
                             "each joint is needed")
-    return dict(zip(message.joint_names, (float(value) for value in values), strict=True))
+    return with_leaders(dict(zip(message.joint_names, map(float, values), strict=True)), hand.mimics)
 
 
 def _allowance(hand: Hand, target: str, surface: str, hand_on_surface: bool, touched: Sequence[str]) -> SceneChange:

@@ -6,14 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.spatial import Array, Transform
 from modular_framework_planning.trajectory import Trajectory
+from modular_framework_urdf.mimics import Mimic
 
 if TYPE_CHECKING:
     from modular_framework_planning.constraints import KinematicConstraints
 
 PARTS_OF_MOTION_STEP = 16
+SAME_POSITION = 1.0e-4  # [rad or m]; positions of joints that follow each other need not agree better
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +28,31 @@ class JointGoal:
     positions: Mapping[str, float]
     below: Mapping[str, float] = field(default_factory=dict)
     above: Mapping[str, float] = field(default_factory=dict)
+
+    def of_independent_joints(self, mimics: Mapping[str, Mimic]) -> JointGoal:
+        """Returns the goal in which mimic joints are replaced by what they ask of their leaders.
+
+        Raises:
+            PlanningError: no position of a leader satisfies all that is asked of it.
+        """
+        targets = {name: value for name, value in self.positions.items() if name not in mimics}
+        low = {name: value - self.below.get(name, 0.0) for name, value in targets.items()}
+        high = {name: value + self.above.get(name, 0.0) for name, value in targets.items()}
+        for name in self.positions.keys() & mimics.keys():
+            mimic, value = mimics[name], self.positions[name]
+            ends = sorted(mimic.leads_to(end) for end in (value - self.below.get(name, 0.0),
+                                                          value + self.above.get(name, 0.0)))
+            leader = mimic.leader
+            low[leader], high[leader] = max(low.get(leader, -np.inf), ends[0]), min(high.get(leader, np.inf), ends[1])
+            targets.setdefault(leader, mimic.leads_to(value))
+            if low[leader] > high[leader] + SAME_POSITION:
+                raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal: joint '{name}' at {value:.4f} asks "
+                                    f"'{leader}', which it mimics, to be at {mimic.leads_to(value):.4f}; the goal asks "
+                                    f"another position of '{leader}', too; give positions that fit, or leave joints "
+                                    "that mimic out")
+        inside = {name: max(low[name], min(target, high[name])) for name, target in targets.items()}
+        return JointGoal(inside, {name: max(target - low[name], 0.0) for name, target in inside.items()},
+                         {name: max(high[name] - target, 0.0) for name, target in inside.items()})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

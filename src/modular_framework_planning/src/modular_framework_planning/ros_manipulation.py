@@ -129,8 +129,9 @@ class Manipulation:
         task, begun = self._task, time.monotonic()
         model = self._context.model
         group, effector = choose_end_effector(model, task.group, task.end_effector)
-        hand = Hand(effector.parent_link, hand_links(model, effector),
-                    frozenset(model.group(effector.group).joints))
+        fingers = frozenset(model.group(effector.group).joints)
+        hand = Hand(effector.parent_link, hand_links(model, effector), fingers,
+                    {name: mimic for name, mimic in model.document.mimics.items() if mimic.leader in fingers})
         task.check(scene)
         ways = [(way, task.read(scene, way, hand)) for way in task.ways]
         planner = self._planner(scene, group, hand)

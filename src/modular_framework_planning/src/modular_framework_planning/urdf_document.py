@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +15,13 @@ from modular_framework_planning.shapes import Box, Capsule, Cylinder, Mesh, Shap
 from modular_framework_planning.spatial import Transform
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
+from modular_framework_urdf.mimics import Mimic, resolved
 
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
 PlacedShape = tuple[Shape, Transform]  # shape, pose in the link
 CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
 MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
-
-
-@dataclass(frozen=True, slots=True)
-class Mimic:
-    """A joint that follows another: position = multiplier * leader + offset."""
-
-    leader: str
-    multiplier: float
-    offset: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +104,11 @@ def _read_joints(root: ET.Element) -> _Joints:
         result.parents[name], result.children[name] = parent.get("link", ""), child.get("link", "")
         result.kinds[name] = kind
         _prepare_joint(joint, name, result)
-    for name, mimic in result.mimics.items():
-        if result.kinds.get(mimic.leader, "fixed") == "fixed":
-            movable = ", ".join(joint for joint, kind in result.kinds.items() if kind != "fixed")
-            raise ModelError(f"URDF joint '{name}': it mimics '{mimic.leader}', which is no joint that moves; allowed "
-                             f"are {movable}")
-    return result
+    try:
+        mimics = resolved(result.mimics, [name for name, kind in result.kinds.items() if kind != "fixed"])
+    except ValueError as error:
+        raise ModelError(str(error)) from error
+    return replace(result, mimics=mimics)
 
 
 def _prepare_joint(joint: ET.Element, name: str, result: _Joints) -> None:

@@ -8,7 +8,7 @@ a fraction of the time and computes contacts faster.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
@@ -16,17 +16,9 @@ from modular_framework_simulation.mesh_files import ConvexParts
 from modular_framework_simulation.sdf_resources import PackageFinder
 from modular_framework_simulation.sdf_specs import Mesh
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.mimics import Mimic, resolved
 
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
-
-
-@dataclass(frozen=True, slots=True)
-class Mimic:
-    """A joint that follows another: position = multiplier * leader + offset."""
-
-    leader: str
-    multiplier: float
-    offset: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +92,23 @@ def read_robot(
     joints = tuple(
         _joint(joint, transmissions) for joint in root.findall("joint") if joint.get("type") in MOVABLE_TYPES
     )
+    joints = _with_leaders(joints)
     _rewrite_meshes(root, find_package, convex_parts, with_visuals)
     _give_frames_no_weight(root)
     engine_urdf = ElementTree.tostring(root, encoding="unicode")
     parents = {_link_of(joint, "child"): _link_of(joint, "parent") for joint in root.findall("joint")}
     return RobotDescription(root.get("name", "robot"), joints, links, parents, engine_urdf)
+
+
+def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
+    """Lets every mimic joint follow the joint that drives its chain of mimic joints."""
+    try:
+        mimics = resolved({joint.name: joint.mimic for joint in joints if joint.mimic is not None},
+                          [joint.name for joint in joints])
+    except ValueError as error:
+        where, _, problem = str(error).partition(": ")
+        raise DescriptionError(f"robot_description: {where}", *problem.split("; ", 1)) from error
+    return tuple(replace(joint, mimic=mimics.get(joint.name)) for joint in joints)
 
 
 def _transmissions(root: ElementTree.Element) -> dict[str, tuple[str, ...]]:

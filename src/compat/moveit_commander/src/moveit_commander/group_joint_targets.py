@@ -12,6 +12,7 @@ from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetPositionIK, GetPositionIKRequest
 from sensor_msgs.msg import JointState
 
+from modular_framework_urdf.mimics import with_leaders
 from moveit_commander import conversions
 from moveit_commander.approximate_kinematics import nearest_values, rotation_and_position
 from moveit_commander.exception import MoveItCommanderException
@@ -134,7 +135,8 @@ class GroupJointTargets(GroupSettings):
                 raise MoveItCommanderException(
                     f"Error setting joint target. Is the target within bounds? Joint '{name}': got {value}, allowed "
                     f"is [{joints[name].lower:.6g}, {joints[name].upper:.6g}]")
-        target = self._joint_target | {name: float(value) for name, value in values.items()}
+        mimics = {name: mimic for name, mimic in self._model.mimics.items() if mimic.leader in joints}
+        target = self._joint_target | with_leaders({name: float(value) for name, value in values.items()}, mimics)
         self._joint_target = {**target, **{name: value for name, value in self._model.complete(target).items()
                                            if name in joints}}
         self._active_target = Target.JOINT

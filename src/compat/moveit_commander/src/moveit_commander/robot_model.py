@@ -6,10 +6,11 @@ import math
 import random
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.mimics import Mimic, resolved
 from moveit_commander.exception import RobotModelError
 
 ASSUMED_ROOT_JOINT = "ASSUMED_FIXED_ROOT_JOINT"
@@ -115,8 +116,10 @@ class RobotModel:
         self.urdf_root = _parse(urdf, "URDF")
         semantics = _parse(srdf, "SRDF")
         self.name = self.urdf_root.get("name", "")
-        tree = {joint.child: joint for joint in (_joint(element, limits or {}) for element in
-                                                 self.urdf_root.findall("joint"))}
+        found = _with_leaders([_joint(element, limits or {}) for element in self.urdf_root.findall("joint")])
+        self.mimics = {joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in found
+                       if joint.leader}
+        tree = {joint.child: joint for joint in found}
         links = [link.get("name", "") for link in self.urdf_root.findall("link")]
         roots = [link for link in links if link not in tree]
         if len(roots) != 1:
@@ -232,6 +235,19 @@ def _parse(text: str, kind: str) -> ET.Element:
         return xml_text.parse(text, kind)
     except xml_text.XmlError as error:
         raise RobotModelError(f"{error} (is it loaded and expanded?)") from error
+
+
+def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
+    """Lets every mimic joint follow the joint that drives its chain of mimic joints; a fixed joint follows none."""
+    moving = [joint for joint in joints if joint.movable]
+    try:
+        mimics = resolved({joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in moving
+                           if joint.leader}, [joint.name for joint in moving])
+    except ValueError as error:
+        raise RobotModelError(str(error)) from error
+    none = Mimic("", 1.0, 0.0)
+    return [replace(joint, leader=mimic.leader, multiplier=mimic.multiplier, offset=mimic.offset)
+            for joint in joints for mimic in (mimics.get(joint.name, none),)]
 
 
 def _root_joint(semantics: ET.Element, root_link: str) -> Joint:
