@@ -18,6 +18,7 @@ from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
 
 from modular_framework_planning.ros_interactive_goal import InteractiveGoal
+from modular_framework_planning.ros_move_group_client import planners_of_group
 
 NODE = "/interactive_goal"
 LAUNCH_FILE = "$(find modular_framework_planning)/launch/interactive_goal.launch"
@@ -78,6 +79,9 @@ class Rviz:
     def select(self, title: str) -> None:
         entry = next(item for item in self.marker.menu_entries if item.title.lstrip("[x ]") == title)
         self._say(event_type=InteractiveMarkerFeedback.MENU_SELECT, menu_entry_id=entry.id, pose=self.marker.pose)
+
+    def entries(self) -> list[str]:
+        return [item.title.lstrip("[x ]") for item in self.marker.menu_entries]
 
     def goal_is_at(self, *place: float) -> bool:
         """Whether the words above the goal are above this place [m]."""
@@ -212,6 +216,24 @@ def test_the_topics_of_moveits_panel_are_honoured(rviz: Rviz, arm: FakeArm) -> N
     until(lambda: not rviz.ghosts["start"], "no ghost of the start")
 
 
+def test_the_menu_lists_the_planners_of_the_group(rviz: Rviz) -> None:
+    entries = rviz.entries()
+    assert "ompl: BITstar" in entries, "a planner the group lists"
+    assert "ompl: TRRT" not in entries, "one of the pipeline that the group does not list"
+    assert len(entries) == len(set(entries)) and not [entry for entry in entries if "[" in entry], entries
+    rviz.select("arm")
+    until(lambda: rviz.status == "group: arm", "the other group")
+    rviz.select("arm_and_manipulator")
+    until(lambda: rviz.status == "group: arm_and_manipulator", "the first group")
+    until(lambda: sorted(rviz.entries()) == sorted(entries), "the menu of the first group")
+
+
+def test_planners_of_a_group_without_a_list_are_those_for_any_group() -> None:
+    ids = ["RRT", "PRM", "arm[PRM]", "arm[mine]", "arm_2[RRT]"]
+    assert planners_of_group(ids, "arm") == ["PRM", "mine"]
+    assert planners_of_group(ids, "hand") == ["RRT", "PRM"]
+
+
 def test_the_chosen_planner_is_asked_for(rviz: Rviz) -> None:
     title = next(item.title for item in rviz.marker.menu_entries if "RRTstar" in item.title and "Inf" not in item.title)
     rviz.select(title.lstrip("[x ]"))
@@ -220,6 +242,7 @@ def test_the_chosen_planner_is_asked_for(rviz: Rviz) -> None:
     until(lambda: rviz.goal_is_at(*NEAR), "the dragged goal")
     _, report = report_of(lambda: rviz.select("Plan"), "plan")
     assert "RRTstar" in report["planner_id"]
+    until(lambda: rviz.status.startswith("planned"), "the plan")
 
 
 class WatchedLock:

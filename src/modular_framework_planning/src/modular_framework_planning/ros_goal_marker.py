@@ -44,7 +44,8 @@ class GoalMarker:
         self._on_drag = on_drag
 
     def fill_menu(self, commands: Sequence[tuple[str, Callable[[], None]]], choices: Sequence[Choice]) -> None:
-        """Sets what the menu offers; to be called once, before `show`."""
+        """Sets what the menu offers, in place of what it offered before; the first entry of each choice is ticked."""
+        self._menu = MenuHandler()
         for title, command in commands:
             self._menu.insert(title, callback=lambda _, run=command: run())
         for choice in choices:
@@ -55,12 +56,18 @@ class GoalMarker:
                 handles[handle] = entry
                 self._menu.setCheckState(handle, MenuHandler.CHECKED if number == 0 else MenuHandler.UNCHECKED)
 
+        if self._server.get(NAME) is not None:
+            self._menu.apply(self._server, NAME)
+            self._server.applyChanges()
+
     def _ticker(self, choice: Choice, handles: dict[int, str]) -> Callable[[Any], None]:
+        menu = self._menu
+
         def tick(feedback: Any) -> None:
             for handle in handles:
-                self._menu.setCheckState(handle, MenuHandler.CHECKED if handle == feedback.menu_entry_id
-                                         else MenuHandler.UNCHECKED)
-            self._menu.reApply(self._server)
+                menu.setCheckState(handle, MenuHandler.CHECKED if handle == feedback.menu_entry_id
+                                   else MenuHandler.UNCHECKED)
+            menu.reApply(self._server)
             self._server.applyChanges()
             choice.select(handles[feedback.menu_entry_id])
 

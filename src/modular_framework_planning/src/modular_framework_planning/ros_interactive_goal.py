@@ -73,16 +73,7 @@ class InteractiveGoal:
         """Waits for move_group, then shows the marker; raises PlanningError."""
         self._client.connect(float(rospy.get_param("~connection_timeout", 60.0)))
         self._goal = self._positions_of(self._client.state())
-        planners = [f"{pipeline}: {planner}" if pipeline else planner for pipeline, planner in self._client.planners()]
-        commands = {"Plan": self.plan, "Execute": self.execute, "Plan and execute": self.plan_and_execute,
-                    "Stop": self.stop, "Random valid goal": self.set_random_goal,
-                    "Goal: current state": self.set_goal_to_current, "Start: current state": self.set_start_to_current,
-                    "Start: follow the robot": self.follow_robot}
-        choices = [Choice("Planner", [DEFAULT_PLANNER, *planners], self._choose_planner)]
-        if len(self._groups) > 1:
-            order = [self._group.name, *(name for name in self._groups if name != self._group.name)]
-            choices.append(Choice("Group", order, self._choose_group))
-        self._marker.fill_menu(list(commands.items()), choices)
+        self._fill_menu()
         self._show_goal()
         self._marker.show(self._model.planning_frame, self._tip_pose(), float(rospy.get_param("~marker_scale", 0.25)))
         for topic, command in (("plan", self.plan), ("execute", self.execute), ("stop", self.stop),
@@ -95,6 +86,20 @@ class InteractiveGoal:
         threading.Thread(target=self._follow_drags, daemon=True).start()
 
     # ---------------------------------------------------------------- what the menu does
+    def _fill_menu(self) -> None:
+        """Offers commands, the planners of the group and the groups."""
+        planners = [f"{pipeline}: {planner}" if pipeline else planner
+                    for pipeline, planner in self._client.planners(self._group.name)]
+        commands = {"Plan": self.plan, "Execute": self.execute, "Plan and execute": self.plan_and_execute,
+                    "Stop": self.stop, "Random valid goal": self.set_random_goal,
+                    "Goal: current state": self.set_goal_to_current, "Start: current state": self.set_start_to_current,
+                    "Start: follow the robot": self.follow_robot}
+        choices = [Choice("Planner", [DEFAULT_PLANNER, *planners], self._choose_planner)]
+        if len(self._groups) > 1:
+            order = [self._group.name, *(name for name in self._groups if name != self._group.name)]
+            choices.append(Choice("Group", order, self._choose_group))
+        self._marker.fill_menu(list(commands.items()), choices)
+
     def plan(self) -> None:
         """Plans from the start to the goal."""
         self._begin("planning", self._plan)
@@ -136,6 +141,8 @@ class InteractiveGoal:
 
     def _choose_group(self, name: str) -> None:
         self._group, self._trajectory = self._model.group(name), None
+        self._options = replace(self._options, pipeline_id="", planner_id="")
+        self._guarded(self._fill_menu)
         self._marker.move(self._tip_pose())
         self._tell(f"group: {name}")
 

@@ -2,7 +2,7 @@
 """What a user interface asks of a move_group node, over the wire only, so that any move_group will do."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,6 +43,14 @@ class MotionOptions:
     planner_id: str = ""
 
 
+def planners_of_group(planner_ids: Sequence[str], group: str) -> list[str]:
+    """Returns a pipeline's planners for a group: those of entries `group[planner]` or, where the group has none, the
+    entries for any group. So MoveIt's panel in RViz reads the list.
+    """
+    own = [name[len(group) + 1:-1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")]
+    return own or [name for name in planner_ids if not name.endswith("]")]
+
+
 class MoveGroupClient:
     """Calls services get_planning_scene, compute_ik, check_state_validity and query_planner_interface, actions
     move_group and execute_trajectory; publishes trajectory_execution_event."""
@@ -75,10 +83,10 @@ class MoveGroupClient:
                                         | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         return self._scene(parts).scene.robot_state
 
-    def planners(self) -> list[tuple[str, str]]:
-        """Returns pairs of pipeline_id and planner_id."""
+    def planners(self, group: str) -> list[tuple[str, str]]:
+        """Returns pairs of pipeline_id and planner_id that a group may ask for."""
         return [(item.pipeline_id, planner) for item in self._planners().planner_interfaces
-                for planner in item.planner_ids]
+                for planner in planners_of_group(item.planner_ids, group)]
 
     def solve_ik(self, group: str, link: str, target: PoseStamped, seed: RobotState,
                  avoid_collisions: bool) -> dict[str, float] | None:
