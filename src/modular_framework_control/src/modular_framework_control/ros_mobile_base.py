@@ -80,9 +80,10 @@ class MobileBaseTopics:
     def _subscribe(self, opened: contextlib.ExitStack, topic: str, kind: Any, command_of: Any) -> None:
         """Hands each message of a topic to the controller, as what `command_of` makes of it."""
         name = self._topic(topic)
+        subscribers: list[rospy.Subscriber] = []    # a message may come before there is anything to ask
 
         def on_message(message: Any) -> None:
-            publishers = subscriber.get_num_connections()
+            publishers = sum(subscriber.get_num_connections() for subscriber in subscribers)
             if publishers > 1 and not self._controller.allows_several_publishers:
                 self._controller.drop_command()
                 rospy.logerr_throttle(1.0, f"{name}: {publishers} publishers; only one is allowed, as "
@@ -94,8 +95,8 @@ class MobileBaseTopics:
             except ControllerError as error:
                 rospy.logwarn_throttle(1.0, f"{name} ignored: {error}")
 
-        subscriber = rospy.Subscriber(name, kind, on_message, queue_size=1)
-        opened.callback(subscriber.unregister)
+        subscribers.append(rospy.Subscriber(name, kind, on_message, queue_size=1))
+        opened.callback(subscribers[0].unregister)
 
 
 class DiffDriveTopics(MobileBaseTopics):
