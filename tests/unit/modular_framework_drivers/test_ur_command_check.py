@@ -174,8 +174,8 @@ def test_the_limits_are_those_of_the_description_and_of_joint_limits_but_never_m
       </joint></robot>"""
     root = MappingNodeHandle({"robot_description": description, "joint_limits": {"elbow": {
         "has_position_limits": True, "min_position": -0.5, "max_position": 0.5, "has_acceleration_limits": True,
-        "max_acceleration": 3.0, "soft_lower_limit": -0.4, "soft_upper_limit": 0.4, "k_position": 10.0,
-        "k_velocity": 1.0}}})
+        "max_acceleration": 3.0, "has_soft_limits": True, "soft_lower_limit": -0.4, "soft_upper_limit": 0.4,
+        "k_position": 10.0, "k_velocity": 1.0}}})
     shoulder, elbow = read_checked_joints(["shoulder", "elbow"], root)
     assert (shoulder.limits.min_position, shoulder.limits.max_position) == (pytest.approx(-2.0 * math.pi), 1.0)
     assert (shoulder.limits.max_velocity, shoulder.limits.max_acceleration) == (pytest.approx(math.pi), 40.0)
