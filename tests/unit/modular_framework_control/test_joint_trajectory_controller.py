@@ -302,6 +302,25 @@ def test_a_partial_goal_moves_its_joints_and_lets_the_others_finish(start: Calla
     assert commands(loop) == pytest.approx([0.0, 0.3, 0.2], abs=1e-9)
 
 
+def test_a_partial_goal_may_have_values_for_more_joints_than_it_names(start: Callable[..., Any],
+                                                                      caplog: pytest.LogCaptureFixture) -> None:
+    loop = start(allow_partial_joints_goal=True)
+    ticket = send(loop, (0.3, (0.4, 0.1)), (0.6, (0.2, 0.3)), names=("b",))
+    loop.run(0.7)
+    assert ticket.status is GoalStatus.SUCCEEDED
+    assert commands(loop) == pytest.approx([0.0, 0.2, 0.0], abs=1e-9)
+    assert "points have 2 values each, only the first 1 are used, for: b" in caplog.text
+
+
+@pytest.mark.parametrize("points", [
+    [(0.3, (0.4, 0.1)), (0.6, (0.2,))], [(0.3, (0.4,)), (0.6, (0.2, 0.1))], [(0.3, ()), (0.6, ())]])
+def test_partial_goals_with_points_of_different_or_too_small_sizes_are_refused(start: Callable[..., Any],
+                                                                               points: list[Any]) -> None:
+    loop = start(allow_partial_joints_goal=True)
+    with pytest.raises(GoalRejectedError, match="positions; expected 1"):
+        send(loop, *points, names=("b",))
+
+
 def test_joints_may_be_named_in_any_order(loop: Any) -> None:
     send(loop, (0.5, (0.3, 0.2, 0.1)), names=("c", "b", "a"))
     loop.run(0.6)

@@ -38,6 +38,7 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
+from modular_framework_control.trajectory_check import without_surplus
 from modular_framework_control.trajectory_limits import MotionLimits, excess_of_first_way
 from modular_framework_control.trajectory_order import GoalRules, TrajectoryOrder, order_of
 from modular_framework_control.trajectory_plan import TrajectoryPlan
@@ -105,9 +106,13 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
-        unused = foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance)
-        if unused:
-            LOGGER.warning("%s: %s", self._namespace, unused)
+        warnings = [foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance)]
+        if self._rules.allow_partial:
+            trajectory, surplus = without_surplus(goal.trajectory)
+            goal = replace(goal, trajectory=trajectory)
+            warnings.append(surplus)
+        for warning in filter(None, warnings):
+            LOGGER.warning("%s: %s", self._namespace, warning)
         here = np.array([handle.position for handle in self._handles])
         self._mailbox.put(order_of(goal, ticket, replace(self._rules, limits=self._limits.with_positions(here))))
         if not self._running:

@@ -33,6 +33,25 @@ def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool
     return f"{_told(iter(faults))}; joints of the controller: {', '.join(known)}" if faults else ""
 
 
+def without_surplus(trajectory: JointTrajectory) -> tuple[JointTrajectory, str]:
+    """Leave out values of points beyond those of the joints that are named, which ros_controllers allows goals for some
+    of the joints to have.
+
+    Returns:
+        The trajectory with one value a joint, and what was left out, or "".
+    """
+    count = len(trajectory.joint_names)
+    sizes = {len(values) for point in trajectory.points
+             for values in (point.positions, point.velocities, point.accelerations) if values}
+    if len(sizes) != 1 or max(sizes) <= count:
+        return trajectory, ""
+    points = tuple(TrajectoryPoint(point.time_s, point.positions[:count], point.velocities[:count],
+                                   point.accelerations[:count]) for point in trajectory.points)
+    return (JointTrajectory(trajectory.joint_names, points, trajectory.stamp_s),
+            f"points have {max(sizes)} values each, only the first {count} are used, for: "
+            f"{', '.join(trajectory.joint_names)}; send one value a joint")
+
+
 def check_points(trajectory: JointTrajectory) -> None:
     """Check sizes, numbers and times of a trajectory.
 
