@@ -305,8 +305,8 @@ def test_a_partial_goal_moves_its_joints_and_lets_the_others_finish(start: Calla
 def test_a_partial_goal_may_have_values_for_more_joints_than_it_names(start: Callable[..., Any],
                                                                       caplog: pytest.LogCaptureFixture) -> None:
     loop = start(allow_partial_joints_goal=True)
-    ticket = send(loop, (0.3, (0.4, 0.1)), (0.6, (0.2, 0.3)), names=("b",))
-    loop.run(0.7)
+    ticket = send(loop, (0.5, (0.1, 0.4)), (1.0, (0.2, 0.3)), names=("b",))
+    loop.run(1.1)
     assert ticket.status is GoalStatus.SUCCEEDED
     assert commands(loop) == pytest.approx([0.0, 0.2, 0.0], abs=1e-9)
     assert "points have 2 values each, only the first 1 are used, for: b" in caplog.text

@@ -30,6 +30,7 @@ from modular_framework_control.trajectory import (
     Track,
     splice,
 )
+from modular_framework_control.trajectory_check import without_surplus
 from modular_framework_control.trajectory_clock import TrajectoryClock
 from modular_framework_control.trajectory_goal import (
     GoalRejectedError,
@@ -38,7 +39,6 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
-from modular_framework_control.trajectory_check import without_surplus
 from modular_framework_control.trajectory_limits import MotionLimits, excess_of_first_way
 from modular_framework_control.trajectory_order import GoalRules, TrajectoryOrder, order_of
 from modular_framework_control.trajectory_plan import TrajectoryPlan
