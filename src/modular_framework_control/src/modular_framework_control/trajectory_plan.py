@@ -30,7 +30,7 @@ class TrajectoryPlan:
         joints: how many there are.
 
     Attributes:
-        end_s: when the newest trajectory ends [s].
+        end_s: when the motion of all joints has ended [s].
     """
 
     __slots__ = ("end_s", "_everything", "_stages")
@@ -57,8 +57,9 @@ class TrajectoryPlan:
         earlier = tuple(stage for stage in self._stages if stage.from_s < from_s) or self._stages[:1]
         moved = [joint for track in tracks for joint in track.joints]
         others = (old.without(moved) for old in earlier[-1].tracks)
-        self._stages = (*earlier, _Stage(from_s, (*(other for other in others if other is not None), *tracks)))
-        self.end_s = max(track.end_s for track in tracks)
+        in_force = (*(other for other in others if other is not None), *tracks)
+        self._stages = (*earlier, _Stage(from_s, in_force))
+        self.end_s = max(track.end_s for track in in_force)
 
     def forget_before(self, time_s: float) -> None:
         """Drop the stages that are over at `time_s` [s]."""
