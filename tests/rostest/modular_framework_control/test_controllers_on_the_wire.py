@@ -38,7 +38,7 @@ LAUNCH = """
   <rosparam>
     joint_limits:
       # its soft limits let the elbow move at about 1 rad/s, so that it falls behind
-      elbow: {soft_lower_limit: -20.0, soft_upper_limit: 20.0, k_position: 0.05, k_velocity: 0.0}
+      elbow: {has_soft_limits: true, soft_lower_limit: -20.0, soft_upper_limit: 20.0, k_position: 0.05, k_velocity: 0.0}
       finger: {has_position_limits: true, min_position: 0.0, max_position: 0.5,
                has_velocity_limits: true, max_velocity: 2.0}
     joint_state_controller: {type: joint_state_controller/JointStateController, publish_rate: 50}
