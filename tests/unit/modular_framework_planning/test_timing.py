@@ -148,7 +148,8 @@ def checked_problem(colliding_state: Callable[[np.ndarray, float], np.ndarray | 
         def contacts(self, _: np.ndarray, include_fixed: bool) -> list[object]:
             return []
 
-    return SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=Checker(), motion=SimpleNamespace(
+    return SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=Checker(), end_s=np.inf,
+                           cancelled=lambda: False, group=SimpleNamespace(joints=("a",)), motion=SimpleNamespace(
         colliding_state=colliding_state, whole=lambda values: values))
 
 

@@ -7,8 +7,6 @@ keeps it while it comes nearer; then the other tree tries to reach what was adde
 """
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
@@ -76,17 +74,18 @@ class _Tree:
 class ConstrainedSearch:
     """One search."""
 
-    def __init__(self, problem: PlanningProblem, step: float) -> None:
-        """Args: the problem, with constraints; the distance of collision checks along an edge [rad or m]."""
-        self._problem, self._step = problem, step
+    def __init__(self, problem: PlanningProblem, step: float, goals: Array | None = None) -> None:
+        """Args: the problem, with constraints; the distance of collision checks along an edge [rad or m]; other goals.
+        """
+        self._problem, self._step, self._goals = problem, step, goals
         self._low, self._high = _search_bounds(problem)
         self._states = 0
 
     def run(self) -> PlannedPath:
         """Returns a path whose edges satisfy the constraints; raises PlanningError when the time is over."""
-        begun = time.monotonic()
         problem = self._problem
-        grown, other = _Tree(problem.start_values[None, :]), _Tree(problem.goal_states())
+        grown, other = _Tree(problem.start_values[None, :]), _Tree(
+            problem.goal_states() if self._goals is None else self._goals)
         forward = True
         while not problem.interrupted():
             target = problem.rng.uniform(self._low, self._high)
@@ -98,7 +97,7 @@ class ConstrainedSearch:
                     first, last = last, first
                 return PlannedPath(np.vstack([first, last[::-1][1:]]), planner_id=NAME)
             grown, other, forward = other, grown, not forward
-        raise no_path(problem, begun, NAME, self._states)
+        raise no_path(problem, NAME, self._states)
 
     def _grow(self, tree: _Tree, target: Array) -> int:
         """Steps from the nearest vertex to a target as far as that goes; returns the last vertex."""

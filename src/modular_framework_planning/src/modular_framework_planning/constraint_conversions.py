@@ -19,6 +19,7 @@ from modular_framework_planning.constraint_kinds import (
 )
 from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, GeometryError, PlanningError, UnknownNameError
+from modular_framework_planning.joint_limits import BEYOND_BOUND
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.regions import BoxSolid, ConeSolid, CylinderSolid, HullSolid, Solid, SphereSolid
 from modular_framework_planning.spatial import Transform, make_transform
@@ -114,7 +115,10 @@ class _Reader:
             raise UnknownNameError(self._code, f"{where}: joint", message.joint_name, model.joint_names)
         self._finite(where, position=message.position)
         number = model.index[message.joint_name]
-        return JointConstraint(message.joint_name, number, float(message.position),
+        target = min(max(message.position, model.lower[number]), model.upper[number])
+        if abs(target - message.position) > BEYOND_BOUND:
+            target = message.position  # whoever uses the constraint says that it cannot be met
+        return JointConstraint(message.joint_name, number, float(target),
                                self._tolerance(where, "tolerance_below", message.tolerance_below),
                                self._tolerance(where, "tolerance_above", message.tolerance_above),
                                model.is_continuous(number), self._weight(where, message.weight))

@@ -13,6 +13,7 @@ from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.contact_report import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.joint_limits import BEYOND_BOUND
 from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool
 from modular_framework_planning.motion_check import MotionChecker
 from modular_framework_planning.planning_request import ConstraintGoal, JointGoal, PlanningRequest, PoseGoal
@@ -112,10 +113,12 @@ class GoalResolver:
                 wanted += 2.0 * np.pi * np.round((values[place] - wanted) / (2.0 * np.pi))
             least = max(self._model.lower[number], wanted - goal.below.get(name, 0.0))
             most = min(self._model.upper[number], wanted + goal.above.get(name, 0.0))
-            if least > most + 1e-6:
-                raise PlanningError(ErrorCode.GOAL_STATE_INVALID, f"goal: joint '{name}' at {wanted:.4f} is outside "
-                                    f"[{self._model.lower[number]:.4f}, {self._model.upper[number]:.4f}]")
-            low[place], high[place] = min(least, most), max(least, most)
+            if least > most + BEYOND_BOUND:
+                raise PlanningError(ErrorCode.GOAL_STATE_INVALID, f"goal: joint '{name}' at {wanted:.6f} is outside "
+                                    f"[{self._model.lower[number]:.6f}, {self._model.upper[number]:.6f}]; give a "
+                                    f"position at most {BEYOND_BOUND} beyond a bound")
+            bounds = self._model.lower[number], self._model.upper[number]
+            low[place], high[place] = np.clip((min(least, most), max(least, most)), *bounds)
             values[place] = np.clip(wanted, low[place], high[place])
         return values, low, high
 

@@ -11,6 +11,7 @@ from modular_framework_planning.errors import ModelError
 
 DEFAULT_VELOCITY = 1.0  # [rad/s] or [m/s] where no source names one
 DEFAULT_ACCELERATION = 1.0  # [rad/s^2] or [m/s^2] where no source names one
+BEYOND_BOUND = 1.0e-4  # [rad or m]; a goal no further beyond a joint's bound means the bound: 3.1416 is half a turn
 DEFAULT_JERK = 1000.0  # [rad/s^3] or [m/s^3] where no source names one
 
 

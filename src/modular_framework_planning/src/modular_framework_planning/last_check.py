@@ -2,12 +2,19 @@
 """The check every returned motion has passed, whatever planner and adapters made it."""
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.contact_report import describe_contacts
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.path_repair import describe_state
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem
 from modular_framework_planning.spatial import Array
+
+SAMPLES_AT_ONCE = 200  # of a motion, between two looks at the clock
+GRACE_S = 0.2  # after the allowed time, in which a check that has begun may end
 
 
 class LastCheck:
@@ -25,6 +32,9 @@ class LastCheck:
         Args:
             problem: what was planned; its checker and constraints are asked.
             path: with a trajectory.
+
+        Raises:
+            PlanningError: the check takes longer than the request allows.
         """
         assert path.trajectory is not None
         motion = path.trajectory
@@ -60,11 +70,23 @@ def _not_in_order(path: PlannedPath) -> str:
 
 def _collision(problem: PlanningProblem, samples: Array) -> str:
     step = problem.settings.finest_step
-    hit = problem.motion.colliding_state(samples, step)
-    if hit is None:
-        return ""
-    contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)
-    return f"{describe_contacts(contacts)} (checked at {step} rad steps)"
+    for begin in range(0, max(1, len(samples) - 1), SAMPLES_AT_ONCE):
+        _require_time(problem)
+        hit = problem.motion.colliding_state(samples[begin:begin + SAMPLES_AT_ONCE + 1], step)
+        if hit is not None:
+            contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)
+            return f"{describe_contacts(contacts)}, at {describe_state(problem, hit)} (checked at {step} rad steps)"
+    return ""
+
+
+def _require_time(problem: PlanningProblem) -> None:
+    over = time.monotonic() - problem.end_s
+    if problem.cancelled() or over > GRACE_S:
+        raise PlanningError(
+            ErrorCode.PREEMPTED if problem.cancelled() else ErrorCode.TIMED_OUT,
+            "planning was cancelled during the check of the motion found" if problem.cancelled() else
+            f"a motion was found, but its check was not done {over:.2f} s after the allowed "
+            f"{problem.request.allowed_time_s:.2f} s; an unchecked motion is not returned: allow more time")
 
 
 def _violation(problem: PlanningProblem, samples: Array) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,12 @@ from modular_framework_planning.ompl_planners import (
     stages,
 )
 from modular_framework_planning.ompl_projection import projection_evaluator
+from modular_framework_planning.path_repair import repaired
 from modular_framework_planning.path_shortening import path_length
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.spatial import Array
 
+CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_S = 500, 0.5  # of the search for a way round one edge
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
@@ -51,7 +54,6 @@ class OmplPlanner:
         Raises:
             PlanningError: no path was found, a setting is wrong, or the planner cannot do what is asked.
         """
-        begun = time.monotonic()
         start, goals = problem.start_values, problem.goal_states()
         step = edge_step(problem)
         for goal in goals:
@@ -75,8 +77,30 @@ class OmplPlanner:
             if problem.interrupted():
                 break
         if not paths:
-            raise no_path(problem, begun, problem.planner_id, states)
+            raise no_path(problem, problem.planner_id, states)
         return PlannedPath(min(paths, key=path_length))
+
+    @staticmethod
+    def repaired(problem: PlanningProblem, vertices: Array) -> Array:
+        """Returns the path with every edge valid at the steps of the last check; raises EdgeError."""
+        return repaired(problem, vertices, connection)
+
+
+def connection(problem: PlanningProblem, first: Array, second: Array) -> Array | None:
+    """Returns a way between two free states, its edges looked at as finely as the last check looks; None for none.
+
+    The search ends after a number of iterations, or with the allowed time of the request.
+    """
+    near = replace(problem.with_start(problem.motion.whole(first)), planner_id="RRTConnect", planner_parameters={},
+                   deadline_s=problem.end_s)
+    fine = problem.settings.finest_step
+    if problem.constraints is not None and constraints_are_tight(problem):
+        near = replace(near, deadline_s=min(problem.end_s, time.monotonic() + CONSTRAINED_CONNECTION_S))
+        try:
+            return ConstrainedSearch(near, fine, second[None]).run().vertices
+        except PlanningError:
+            return None
+    return _Search(near, second[None], fine, DEFAULT_RANGE, CONNECTION_ITERATIONS).run()
 
 
 def edge_step(problem: PlanningProblem) -> float:

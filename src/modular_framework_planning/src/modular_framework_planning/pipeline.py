@@ -18,6 +18,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.last_check import LastCheck
 from modular_framework_planning.motion_check import MotionChecker
+from modular_framework_planning.path_repair import EdgeError
 from modular_framework_planning.path_shortening import shorten
 from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, make_adapters, make_planner
 from modular_framework_planning.planner_configurations import PlannerConfigurations
@@ -29,8 +30,11 @@ from modular_framework_planning.spatial import Array
 from modular_framework_planning.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
+SHORTENING_SHARE = 0.3  # of the time left where a planner used all of its own
+RESERVED_S, RESERVED_SHARE = 0.25, 0.2  # of the allowed time, for what follows the search
 BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
+COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 CheckerSource = Callable[..., CollisionChecker]
 
 
@@ -97,19 +101,42 @@ class PlanningPipeline:
         Raises:
             PlanningError: with the code and the reason; nothing is returned by halves.
         """
+        try:
+            return self._plan(request, repeatable)
+        except PlanningError as error:
+            code = getattr(self._planner, "collision_code", error.code)
+            if error.code in COLLISIONS and code != error.code:
+                raise PlanningError(code, error.reason, error.contacts) from error
+            raise
+
+    def _plan(self, request: PlanningRequest, repeatable: bool) -> PlanningAnswer:
+        """Searches, and repairs what the check of the motion finds, until the motion passes or the time is over."""
         begun = time.monotonic()
         problem = replace(self._problem(request, begun), repeatable=repeatable)
-        run = chain(self._adapters_for(request), self._search)
-        fault = ""
-        for step in self._steps():
-            path = run(replace(problem, step=step, _goals=[]))
-            fault, answer = self._checked(problem, path, begun)
-            if answer is not None:
-                return answer
-            if path.is_short:
-                break
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion found fails the last check: {fault}; move "
-                            "the goal or the start away from contact")
+        adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
+        search = _Search(self._planner)
+        while steps:
+            problem = replace(problem, step=steps.pop(0), _goals=[])
+            try:
+                path = chain(adapters, search)(problem)
+                fault, answer = self._checked(problem, path, begun)
+            except EdgeError as error:
+                fault, search = error.reason, _Search(self._planner)  # the next search looks at its edges more finely
+                if problem.interrupted():
+                    break
+            except PlanningError as error:
+                raise _with_fault(error, fault) from error
+            else:
+                if answer is not None:
+                    return answer
+                if path.is_short or problem.cancelled() or time.monotonic() > problem.end_s:
+                    break
+                if search.repairs:  # what the check saw between two samples of the repair, with finer ones
+                    problem = replace(problem, settings=replace(problem.settings,
+                                                                motion_step=problem.settings.motion_step / 4.0))
+                else:
+                    search = _Search(self._planner)
+        raise _failed(problem, fault)
 
     def _adapters_for(self, request: PlanningRequest) -> tuple[RequestAdapter, ...]:
         """Returns the adapters; a speed limit that is asked for is kept even where no parameter names its adapter."""
@@ -119,7 +146,7 @@ class PlanningPipeline:
         return LimitMaxCartesianLinkSpeed(), *self._adapters
 
     def _steps(self) -> tuple[float, ...]:
-        """Edge steps of the search; a motion that fails the last check is searched again with the next."""
+        """Edge steps of the search: the next one counts where an edge of a path could not be repaired."""
         finest = self.settings.finest_step
         return self.settings.search_step, 0.4 * self.settings.search_step, finest, finest
 
@@ -136,18 +163,6 @@ class PlanningPipeline:
         return "", PlanningAnswer(path.trajectory, start, problem.motion.whole(path.vertices[-1]), path.vertices,
                                   path.planner_id or problem.planner_id, path.found_s - begun,
                                   time.monotonic() - begun)
-
-    def _search(self, problem: PlanningProblem) -> PlannedPath:
-        """The innermost step: checks the start, runs the planner, shortens its path."""
-        _require_start(problem)
-        found = self._planner.plan(problem)
-        now = time.monotonic()
-        if isinstance(found, Trajectory):
-            return PlannedPath(found.positions, found, found_s=now, is_short=True)
-        path = replace(found, found_s=now)
-        if path.is_short or path.trajectory is not None or not problem.settings.sampling.simplify_solutions:
-            return path
-        return replace(path, vertices=_shortened(problem, path.vertices))
 
     def checker(self, scene: PlanningScene, group: JointGroup, start: Array) -> CollisionChecker:
         """Returns the collision world of a motion, with shallow contacts of held bodies tolerated.
@@ -190,7 +205,8 @@ class PlanningPipeline:
         return PlanningProblem(
             request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
             self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
-            begun + request.allowed_time_s, LastCheck(), planner_id, parameters, request.path_constraints)
+            begun, begun + request.allowed_time_s - _reserved(request.allowed_time_s), begun + request.allowed_time_s,
+            LastCheck(), planner_id, parameters, request.path_constraints)
 
     def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner's name and settings; raises PlanningError with the names there are."""
@@ -227,6 +243,56 @@ class PlanningPipeline:
                 self._model.max_acceleration[group.indices] * factors[1])
 
 
+class _Search:
+    """The innermost step: checks the start, runs the planner once, lets it repair its path, shortens that."""
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner = planner
+        self._found: PlannedPath | None = None
+        self.repairs = hasattr(planner, "repaired")
+
+    def __call__(self, problem: PlanningProblem) -> PlannedPath:
+        """Returns the path; that of the first call, repaired once more, where it is called again."""
+        _require_start(problem)
+        if self._found is None:
+            found = self._planner.plan(problem)
+            now = time.monotonic()
+            self._found = (PlannedPath(found.positions, found, found_s=now, is_short=True)
+                           if isinstance(found, Trajectory) else replace(found, found_s=now))
+        path = self._found
+        if path.is_short or path.trajectory is not None:
+            return path
+        vertices = self._planner.repaired(problem, path.vertices) if self.repairs else path.vertices  # type: ignore
+        if problem.settings.sampling.simplify_solutions:
+            vertices = _shortened(problem, vertices)
+        self._found = replace(path, vertices=vertices)
+        return self._found
+
+
+def _reserved(allowed_time_s: float) -> float:
+    """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""
+    return min(RESERVED_S, RESERVED_SHARE * allowed_time_s)
+
+
+def _with_fault(error: PlanningError, fault: str) -> PlanningError:
+    """Adds what an earlier path of the same request failed by."""
+    if not fault:
+        return error
+    return PlanningError(error.code, f"{error.reason}; a path was found before, but {fault}", error.contacts)
+
+
+def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
+    """Says why paths were found and no motion is returned."""
+    if problem.cancelled():
+        return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled; a path was found, but {fault}")
+    spent = time.monotonic() - problem.begun_s
+    if problem.interrupted():
+        return PlanningError(ErrorCode.TIMED_OUT, f"a path was found, but {fault}; time ran out after "
+                             f"{spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s): allow more time")
+    return PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion found in {spent:.2f} s fails the last check: "
+                         f"{fault}; move the goal or the start away from contact")
+
+
 def _require_start(problem: PlanningProblem) -> None:
     """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
     faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
@@ -247,7 +313,7 @@ def _require_start(problem: PlanningProblem) -> None:
 def _shortened(problem: PlanningProblem, path: Array) -> Array:
     """Shortens a path; what it accepts was looked at as finely as the last check looks."""
     now = time.monotonic()
-    limit = min(max(problem.deadline_s, now + 0.05), now + MAX_SHORTENING_S)
+    limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
     if problem.repeatable:
         limit = math.inf
     fine = problem.settings.finest_step

@@ -36,7 +36,8 @@ class PlanningProblem:
         checker, motion: answer whether states and edges are free of collisions.
         max_velocity, max_acceleration: limits of the group's joints, scaling applied, shape (joints,).
         rng: the only source of random numbers a planner uses, so that a seed repeats its plan.
-        deadline_s: time.monotonic() at which the planner gives up.
+        begun_s, end_s: time.monotonic() at which the request came, and at which its allowed time ends.
+        deadline_s: time.monotonic() at which the planner gives up: what is left then is for the check of the motion.
         planner_id: the planner chosen (without "group[...]" around it); planner_parameters: its entry in
             planner_configs.
         constraints: path constraints every state must satisfy, or None.
@@ -56,7 +57,9 @@ class PlanningProblem:
     max_velocity: Array
     max_acceleration: Array
     rng: np.random.Generator
+    begun_s: float
     deadline_s: float
+    end_s: float
     last_check: LastCheck
     planner_id: str = ""
     planner_parameters: Mapping[str, Any] = field(default_factory=dict)
@@ -158,6 +161,9 @@ class Planner(Protocol):
         configure(model, settings): class method that makes it; without one it is made without arguments.
         auxiliary_constraints: names of path constraints that are input of the planner (such as the interim point of
             a circle), which then need not be kept by the motion.
+        collision_code: the error code for a start or goal in collision, where it is not the one of that name.
+        repaired(problem, vertices): the path with every edge valid at the steps of the last check, or EdgeError. The
+            pipeline mends nothing by itself: a motion that fails the check counts as the planner's failure.
     """
 
     def plan(self, problem: PlanningProblem) -> PlannedPath | Trajectory:
@@ -168,22 +174,22 @@ class Planner(Protocol):
 PlanNext = Callable[[PlanningProblem], PlannedPath]
 
 
-def no_path(problem: PlanningProblem, begun_s: float, what: str, states: int | None = None) -> PlanningError:
+def no_path(problem: PlanningProblem, what: str, states: int | None = None) -> PlanningError:
     """Says why a search ended without a path: cancelled, time over, or nothing left to try.
 
     Args:
         problem: what was searched.
-        begun_s: time.monotonic() when the search began.
         what: name of the planner.
         states: how many states were looked at, where that is known.
     """
-    spent = time.monotonic() - begun_s
+    spent = time.monotonic() - problem.begun_s
     looked = "" if states is None else f" after {states} states"
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s{looked}")
     timed_out = time.monotonic() > problem.deadline_s
     return PlanningError(
         ErrorCode.TIMED_OUT if timed_out else ErrorCode.PLANNING_FAILED,
-        f"{what} found no path in {spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s)"
-        f"{': time ran out' if timed_out else ''}{looked}; start and goal are free, so the way between them is "
-        "blocked or narrow: allow more time or choose another goal")
+        f"{what} found no path in {spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s, the last "
+        f"{problem.end_s - problem.deadline_s:.2f} s of them for the check of a motion)"
+        f"{': time ran out' if timed_out else ': nothing was left to try'}{looked}; start and goal are free, so the "
+        "way between them is blocked or narrow: allow more time or choose another goal")

@@ -43,6 +43,7 @@ class CommandPlanner:
 
     planner_ids = ("PTP", "LIN", "CIRC")
     auxiliary_constraints = (CENTRE, INTERIM)
+    collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators look at no collisions themselves
 
     def __init__(self, cartesian_limits: Mapping[str, Any] | None, sampling_time_s: float = DEFAULT_SAMPLING_TIME_S
                  ) -> None:

@@ -2,7 +2,6 @@
 """The planner of the pipeline `stomp`: several attempts to bend a straight motion round what is in its way."""
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 
 import numpy as np
@@ -42,7 +41,6 @@ class StompPlanner:
         Raises:
             PlanningError: no attempt gave a valid path; says how many states of the best one are invalid and why.
         """
-        begun = time.monotonic()
         settings = self._settings.get(problem.group.name, StompSettings())
         goals = problem.goal_states()
         best: Array | None = None
@@ -57,12 +55,12 @@ class StompPlanner:
             if problem.interrupted():
                 break
         assert best is not None
-        raise _failure(problem, settings, begun, best)
+        raise _failure(problem, settings, best)
 
 
-def _failure(problem: PlanningProblem, settings: StompSettings, begun: float, motion: Array) -> PlanningError:
+def _failure(problem: PlanningProblem, settings: StompSettings, motion: Array) -> PlanningError:
     """Says why there is no path: how many states of the best motion are invalid, and what is wrong with one of them."""
-    reason = no_path(problem, begun, "STOMP") if problem.interrupted() else PlanningError(
+    reason = no_path(problem, "STOMP") if problem.interrupted() else PlanningError(
         ErrorCode.PLANNING_FAILED, f"STOMP found no path in {settings.num_attempts} attempts of "
         f"{settings.num_iterations} iterations; allow more or choose another goal")
     invalid = [row for row in motion if not problem.state_is_valid(row)]

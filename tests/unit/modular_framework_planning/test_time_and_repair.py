@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A path that collides between the states a search looked at is repaired; messages name what failed."""
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from independent_checker import IndependentChecker, box
+
+from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.kinematics import KinematicsPool
+from modular_framework_planning.last_check import GRACE_S, LastCheck
+from modular_framework_planning.ompl_planning import OmplPlanner
+from modular_framework_planning.path_repair import EdgeError, repaired
+from modular_framework_planning.pilz.command_planner import CommandPlanner
+from modular_framework_planning.pipeline import PlanningPipeline
+from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
+from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.shapes import Box
+from modular_framework_planning.time_parameterization import parameterize
+from modular_framework_planning.urdf_document import package_resolver
+
+GROUP = "arm_and_manipulator"
+START = (1.57, -1.57, 1.2, -1.2, -1.57, 0.0)
+GOAL = (-0.4, -1.57, 1.2, -1.2, -1.57, 0.0)
+THIN = np.array([0.01, 0.8, 0.5])  # [m]; a board the arm swings through between two coarse samples
+BOARD_AT = np.array([0.35, 0.5, 1.25])
+
+
+@pytest.fixture(scope="module")
+def pool(model: RobotModel) -> KinematicsPool:
+    return KinematicsPool(model)
+
+
+def at_start(model: RobotModel, scene: PlanningScene) -> PlanningScene:
+    return scene.with_positions(model.merge(scene.positions, dict(zip(model.group(GROUP).joints, START, strict=True))))
+
+
+def request(model: RobotModel, values: tuple[float, ...] = GOAL, board: bool = True) -> PlanningRequest:
+    scene = empty_scene(model)
+    if board:
+        scene = scene.with_object(CollisionObject("board", pin.SE3(np.eye(3), BOARD_AT), (
+            (Box(*THIN), pin.SE3.Identity()),)))
+    goal = JointGoal(dict(zip(model.group(GROUP).joints, values, strict=True)))
+    return PlanningRequest(at_start(model, scene), GROUP, (goal,), "RRTConnect", 1, 60.0)
+
+
+class Coarse(OmplPlanner):
+    """Goes straight through everything, as a search whose samples all miss the board."""
+
+    def __init__(self) -> None:
+        self.asked: list[PlanningProblem] = []
+
+    def plan(self, problem: PlanningProblem) -> PlannedPath:
+        self.asked.append(problem)
+        return PlannedPath(np.vstack([problem.start_values, problem.goal_states()[0]]))
+
+
+class Stubborn(Coarse):
+    """Finds no way round."""
+
+    @staticmethod
+    def repaired(problem: PlanningProblem, vertices: np.ndarray) -> np.ndarray:
+        return repaired(problem, vertices, lambda *_: None)
+
+
+def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
+        model: RobotModel, robot: object, pool: KinematicsPool) -> None:
+    planner, asked = Coarse(), request(model)
+    answer = PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(asked)
+    assert len(planner.asked) == 1 and len(answer.path) > 2
+    second = IndependentChecker(robot.urdf, robot.srdf, package_resolver)
+    second.set_world([("board", box(*THIN), pin.SE3(np.eye(3), BOARD_AT).homogeneous)])
+    rest = dict(zip(model.joint_names, answer.start.tolist(), strict=True))
+    motion = answer.trajectory
+    assert second.colliding_states(motion.joint_names, np.array([START, GOAL]), rest), "the straight way is blocked"
+    assert not second.colliding_states(motion.joint_names, motion.positions, rest, 0.005)
+    assert np.allclose(motion.positions[-1], GOAL)
+
+
+def test_what_could_not_be_repaired_is_named_with_bodies_and_state(model: RobotModel, pool: KinematicsPool) -> None:
+    with pytest.raises(PlanningError) as caught:
+        PlanningPipeline(model, pool, PipelineSettings(seed=1), Stubborn()).plan(request(model))
+    assert caught.value.code == ErrorCode.INVALID_MOTION_PLAN
+    for word in ("edge 1 of 1", "'board'", "mm deep", "shoulder_pan_joint"):
+        assert word in caught.value.reason, caught.value.reason
+
+
+def test_a_later_search_without_a_path_does_not_hide_what_the_first_one_failed_by(
+        model: RobotModel, pool: KinematicsPool) -> None:
+    class Once(Stubborn):
+        def plan(self, problem: PlanningProblem) -> PlannedPath:
+            if self.asked:
+                raise no_path(problem, "Once", 7)
+            return super().plan(problem)
+
+    with pytest.raises(PlanningError, match="Once found no path.*a path was found before, but edge 1 of 1.*'board'"):
+        PlanningPipeline(model, pool, PipelineSettings(seed=1), Once()).plan(request(model))
+
+
+def test_the_planner_leaves_time_for_the_check_and_no_message_counts_from_a_later_begin(
+        model: RobotModel, pool: KinematicsPool) -> None:
+    planner = Coarse()
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(request(model, board=False))
+    problem = planner.asked[0]
+    assert problem.begun_s < problem.deadline_s < problem.end_s == pytest.approx(problem.begun_s + 60.0)
+    late = replace(problem, begun_s=time.monotonic() - 60.0, deadline_s=time.monotonic() - 0.3)
+    error = no_path(late, "BITstar", 5)
+    assert error.code == ErrorCode.TIMED_OUT and "in 60.0" in error.reason and "time ran out after 5" in error.reason
+    early = no_path(problem, "FMT", 5)
+    assert early.code == ErrorCode.PLANNING_FAILED and "time ran out" not in early.reason
+
+
+def test_a_check_does_not_go_on_long_after_the_allowed_time() -> None:
+    motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), np.ones(1), np.ones(1))
+    looked: list[float] = []
+    problem = SimpleNamespace(
+        settings=PipelineSettings(), constraints=None, checker=None, cancelled=lambda: False,
+        end_s=time.monotonic() - GRACE_S - 1.0, request=SimpleNamespace(allowed_time_s=2.0),
+        motion=SimpleNamespace(colliding_state=lambda line, step: looked.append(step)))
+    with pytest.raises(PlanningError, match="unchecked motion is not returned") as caught:
+        LastCheck().fault(problem, PlannedPath(motion.positions, motion))
+    assert caught.value.code == ErrorCode.TIMED_OUT and not looked
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_goal_a_hair_beyond_a_bound_ends_on_the_bound(model: RobotModel, pool: KinematicsPool, side: float) -> None:
+    joint = model.group(GROUP).indices[-1]
+    bound = float(model.upper[joint] if side > 0.0 else model.lower[joint])
+    pipeline = PlanningPipeline(model, pool, PipelineSettings(seed=1))
+    for beyond in (5.0e-7, 9.0e-5):
+        answer = pipeline.plan(request(model, (*START[:5], bound + side * beyond), board=False))
+        assert answer.trajectory.positions[-1, 5] == bound
+    with pytest.raises(PlanningError, match="wrist_3_joint.*is outside") as caught:
+        pipeline.plan(request(model, (*START[:5], bound + side * 3.0e-4), board=False))
+    assert caught.value.code == ErrorCode.GOAL_STATE_INVALID
+
+
+def test_industrial_motions_in_collision_are_invalid_motion_plans(model: RobotModel, pool: KinematicsPool) -> None:
+    pipeline = PlanningPipeline(model, pool, PipelineSettings(), CommandPlanner(None), ())
+    inside = request(model)
+    tip = model.link_transforms(model.merge(inside.scene.positions, dict(zip(
+        model.group(GROUP).joints, GOAL, strict=True))))["wrist_2_link"].translation
+    start = model.link_transforms(inside.scene.positions)["wrist_2_link"].translation
+    for where, words in ((tip, "goal in collision"), (start, "start state in collision"), (BOARD_AT, "last check")):
+        block = CollisionObject("block", pin.SE3(np.eye(3), where), ((Box(0.05, 0.05, 0.05), pin.SE3.Identity()),))
+        scene = empty_scene(model, inside.scene.positions)
+        scene = scene.with_object(block) if words != "last check" else inside.scene
+        with pytest.raises(PlanningError, match=words) as caught:
+            pipeline.plan(replace(inside, scene=scene, planner_id="PTP"))
+        assert caught.value.code == ErrorCode.INVALID_MOTION_PLAN, words
+
+
+def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: KinematicsPool) -> None:
+    planner = Coarse()
+    asked = request(model)
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(asked)
+    problem = planner.asked[0]
+    way = OmplPlanner.repaired(problem, np.array([START, GOAL, START]))
+    checker = CollisionChecker(asked.scene, problem.group.indices)
+    assert checker.path_is_free(problem.motion.whole_path(way), problem.settings.finest_step)
+    assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
+    with pytest.raises(EdgeError, match="edge 1 of 2"):
+        Stubborn.repaired(problem, np.array([START, GOAL, START]))
