@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
+import pytest
 from ros_session import RosSession
 
 TASK_TIMEOUT_S = 180.0
@@ -42,6 +44,7 @@ def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSessi
     assert exit_code == 0, launch.log()
     assert "Task 'simulation_pick' ended with outcome 'successful_pipeline': SUCCEEDED" in launch.log()
     assert launch.log().splitlines()[-1] == "run_framework: the task succeeded"
+    assert "REQUIRED process" not in launch.log() and "Traceback" not in launch.log(), launch.log()
     lifted = {name: last - first for name, (first, last) in heights.items()}
     assert max(lifted.values()) > LIFTED_M, lifted
     assert sum(height > LIFTED_M for height in lifted.values()) == 1, lifted
@@ -51,3 +54,15 @@ def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None
     launch = session.run_framework(robot_packag="ur5_ezgripper_robot")
     assert launch.wait(90.0) == 2
     assert "unknown argument 'robot_packag'; did you mean 'robot_package'" in launch.log()
+
+
+@pytest.mark.parametrize(("name", "value", "code", "cause"), [
+    ("simulation", "flase", 2, "argument 'simulation' is 'flase', allowed are true and false"),
+    ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: the file cannot be read"),
+    ("world_file", "no.world", 3, "node 'gazebo' died .*no.world: cannot be read")])
+def test_the_last_lines_say_what_is_wrong_and_no_interrupted_node_prints_a_traceback(
+        session: RosSession, name: str, value: str, code: int, cause: str) -> None:
+    launch = session.run_framework(gui="false", rviz="false", **{name: value})
+    assert launch.wait(TASK_TIMEOUT_S) == code, launch.log()
+    assert re.search(cause, "\n".join(launch.log().splitlines()[-2:])), launch.log()
+    assert "Traceback" not in launch.log(), launch.log()

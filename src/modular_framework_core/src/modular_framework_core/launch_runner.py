@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import rosgraph
 import roslaunch
@@ -19,13 +20,14 @@ import roslaunch.pmon
 import roslaunch.rlutil
 import rospkg
 
+from modular_framework_core.launch_causes import cause_of_death
+
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
-ENDINGS = {  # by exit code of the task
-    0: "the task succeeded",
-    1: "the task did not succeed; the line that begins with 'Task', and those before it, say why",
-    2: "the task could not be run; a message above says why",
-}
+ENDINGS = {0: "the task succeeded", 1: "the task did not succeed", 2: "the task could not be run"}
+"""By exit code of the task."""
+BOOLEANS = ("true", "false", "1", "0")
+"""What roslaunch takes for a bool, in any case."""
 
 
 @dataclass
@@ -36,11 +38,13 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
         task_name: name of the node whose exit code is the launch's own.
         task_exit_code: exit code of that node; None while it runs.
         dead_node: name and exit code of the first other node that died; None if none did.
+        last_process: roslaunch's name of the process that ended the launch.
     """
 
     task_name: str
     task_exit_code: int | None = None
     dead_node: tuple[str, int | None] | None = None
+    last_process: str = ""
     parent: roslaunch.parent.ROSLaunchParent | None = field(default=None, repr=False)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
@@ -52,7 +56,10 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
             self.task_exit_code = exit_code
         elif exit_code != 0 or self._is_required(name):
             self.dead_node = (name, exit_code)
-            self._end_launch()
+        else:
+            return
+        self.last_process = process_name
+        self._end_launch()
 
     def _is_required(self, name: str) -> bool:
         nodes = self.parent.config.nodes if self.parent is not None and self.parent.config is not None else []
@@ -64,12 +71,12 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
 
 
 def run_launch_file(package: str, launch_file: str, arguments: list[str], task_name: str) -> int:
-    """Runs a launch file until its task or one of its nodes ends.
+    """Runs a launch file until its task or one of its nodes ends, and prints last why it ended.
 
     Args:
         package: ROS package of the launch file.
         launch_file: name of the file in the package's folder `launch`.
-        arguments: launch arguments, `name:=value`.
+        arguments: launch arguments, `name:=value`; the launch file has `end_with_task`.
         task_name: name of the node that runs the task.
 
     Returns:
@@ -82,16 +89,19 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         _check_arguments(path, arguments)
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
         roslaunch.configure_logging(uuid)
+        # The task is not a required node here: the watcher ends the launch, without roslaunch's banner of a death.
+        given = [*arguments, "end_with_task:=false"]
         parent = roslaunch.parent.ROSLaunchParent(
-            uuid, [(path, arguments)], process_listeners=[watcher], port=_master_port(), show_summary=False
+            uuid, [(path, given)], process_listeners=[watcher], port=_master_port(), show_summary=False
         )
         watcher.parent = parent
         parent.start()
         parent.spin()
-    except (roslaunch.core.RLException, rospkg.ResourceNotFound) as error:
+    except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError) as error:  # ValueError: of a value
         print(f"run_framework: {error}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
-    return _verdict(watcher)
+    log_file = Path(rospkg.get_log_dir()) / uuid / f"{watcher.last_process}.log"
+    return _verdict(watcher, cause_of_death(log_file))
 
 
 def _check_arguments(path: str, arguments: list[str]) -> None:
@@ -103,13 +113,15 @@ def _check_arguments(path: str, arguments: list[str]) -> None:
     known = roslaunch.arg_dump.get_args([path])
     faults = []
     for argument in arguments:
-        name, assignment, _ = argument.partition(":=")
+        name, assignment, value = argument.partition(":=")
         if not assignment:
             faults.append(f"argument '{argument}' is not of the form name:=value")
         elif name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"; did you mean '{near[0]}'" if near else ""
             faults.append(f"unknown argument '{name}'{hint}; allowed: {', '.join(sorted(known))}")
+        elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
+            faults.append(f"argument '{name}' is '{value}', allowed are true and false; correct it")
     if faults:
         raise roslaunch.core.RLException(f"{path}: " + "; ".join(faults))
 
@@ -118,16 +130,19 @@ def _master_port() -> int | None:
     return rosgraph.network.parse_http_host_and_port(rosgraph.get_master_uri())[1]
 
 
-def _verdict(watcher: EndWatcher) -> int:
+def _verdict(watcher: EndWatcher, cause: str) -> int:
+    """Prints how it ended, below what roslaunch says of the nodes it stops; returns the exit code."""
+    because = f": {cause.removeprefix('The task could not be run: ')}" if cause else ""
     if watcher.dead_node is not None:
         name, exit_code = watcher.dead_node
         killed = exit_code is not None and exit_code < 0
         how = f"was killed by signal {-exit_code}" if killed else f"exited with {exit_code}"
-        print(f"run_framework: node '{name}' died ({how}); everything was stopped", file=sys.stderr)
+        print(f"run_framework: node '{name}' died ({how}), and everything was stopped{because}", file=sys.stderr)
         return EXIT_NODE_DIED
     if watcher.task_exit_code is None:
         print("run_framework: stopped before the task ended", file=sys.stderr)
         return 1
     ending = ENDINGS.get(watcher.task_exit_code, f"the task's node ended with exit code {watcher.task_exit_code}")
-    print(f"run_framework: {ending}")  # last, below what roslaunch says of the nodes it stops
+    failed = watcher.task_exit_code != 0
+    print(f"run_framework: {ending}{because if failed else ''}", file=sys.stderr if failed else sys.stdout, flush=True)
     return watcher.task_exit_code

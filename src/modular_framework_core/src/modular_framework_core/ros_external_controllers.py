@@ -2,7 +2,12 @@
 """Starts the node that drives the manipulator, and ends with an error when that node dies."""
 from __future__ import annotations
 
-import roslaunch
+import contextlib
+import signal
+import subprocess
+
+import roslib.packages
+import rospkg
 import rospy
 
 from modular_framework_core.external_controllers import (
@@ -15,7 +20,8 @@ from modular_framework_core.external_controllers import (
 )
 
 POLL_PERIOD_S = 0.2
-END_WITH_SPAWNER = "setpriv --pdeathsig TERM"
+STOP_TIMEOUT_S = 5.0
+END_WITH_SPAWNER = ("setpriv", "--pdeathsig", "TERM")
 """Put before the node's command: the node is told to end when the spawner is killed, which could not stop it itself."""
 
 
@@ -43,20 +49,31 @@ def main() -> int:
 
 def run_until_it_ends(node: ControllerNode) -> int:
     """Runs a node; 0 when ROS shuts down first, 1 when the node cannot start or dies."""
-    launch = roslaunch.scriptapi.ROSLaunch()
-    launch.start()
+    what = f"Node '{node.name}' ({node.package}/{node.node_type})"
     try:
-        process = launch.launch(roslaunch.core.Node(node.package, node.node_type, name=node.name, output="screen",
-                                                    launch_prefix=END_WITH_SPAWNER))
+        found = roslib.packages.find_node(node.package, node.node_type)
+        if not found:
+            raise OSError(f"package '{node.package}' has no executable '{node.node_type}'")
+        process = subprocess.Popen([*END_WITH_SPAWNER, found[0], f"__name:={node.name}"])
+    except (OSError, rospkg.ResourceNotFound) as error:
+        rospy.logfatal("%s cannot be started: %s; correct %s and %s", what, error, PACKAGE_KEY, TYPE_KEY)
+        return 1
+    try:
         while not rospy.is_shutdown():
-            if not process.is_alive():
-                rospy.logfatal("Node '%s' (%s/%s) ended with exit code %s; the manipulator cannot be driven any more.",
-                               node.name, node.package, node.node_type, process.exit_code)
+            if process.poll() is not None:
+                rospy.logfatal("%s ended with exit code %s; the manipulator cannot be driven any more.", what,
+                               process.returncode)
                 return 1
             rospy.rostime.wallsleep(POLL_PERIOD_S)
-    except roslaunch.RLException as error:
-        rospy.logfatal("Node '%s' (%s/%s) cannot be started: %s", node.name, node.package, node.node_type, error)
-        return 1
     finally:
-        launch.stop()
+        _stop(process)
     return 0
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        if process.poll() is not None:
+            return
+        process.send_signal(number)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(STOP_TIMEOUT_S)

@@ -170,7 +170,7 @@ def main() -> int:
     try:
         RobotControllersSpawner(*arguments).run()
     except SpawnError as error:
-        rospy.logfatal("controllers not spawned: %s", error)
+        (rospy.loginfo if rospy.is_shutdown() else rospy.logfatal)("controllers not spawned: %s", error)
         return 1
     if rospy.get_param("~stay_alive", False):
         rospy.spin()

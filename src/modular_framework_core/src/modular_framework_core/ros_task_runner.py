@@ -22,6 +22,7 @@ Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when
 from __future__ import annotations
 
 import json
+import logging
 import signal
 import sys
 import threading
@@ -142,6 +143,10 @@ class TaskReporter:
             }
         )
         print("\n".join(result.lines()), flush=True)
+        if not result.succeeded:  # for run_framework, which prints it last; not on the screen twice
+            reasons = "; ".join([*map(str, result.failures), *([result.error] if result.error else [])])
+            logging.getLogger("modular_framework_core.task").critical(
+                "outcome '%s'%s", result.outcome, f": {reasons}" if reasons else "")
 
 
 def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:
@@ -228,7 +233,7 @@ def main() -> int:
     try:
         name, factory = prepare(rospy.myargv()[1:])
     except TaskNotRun as error:
-        print(f"The task could not be run: {error}", file=sys.stderr, flush=True)
+        rospy.logfatal("The task could not be run: %s", error)
         return _finish(EXIT_NOT_RUN)
     return _finish(run_machine(name, factory))
 

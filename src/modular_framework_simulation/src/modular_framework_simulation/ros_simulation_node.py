@@ -174,7 +174,7 @@ class SimulationNode:
 
     def _stop_loop(self) -> None:
         self._loop.stop()
-        if threading.current_thread() is not self._thread:
+        if threading.current_thread() is not self._thread and self._thread.is_alive():
             self._thread.join(timeout=_STOP_TIMEOUT_S)
 
     def close(self) -> None:

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Begins a node so that a launch that ends meanwhile does not print where its import was interrupted."""
+from __future__ import annotations
+
+import importlib
+import signal
+import sys
+from typing import NoReturn
+
+
+def run_node(module: str, function: str = "main") -> NoReturn:
+    """Imports a module, runs a function of it and exits with what that returns.
+
+    An interrupt (SIGINT) before the node handles signals itself ends the process at once, without a traceback:
+    roslaunch sends it to all nodes when one of them died, and the reason of that death is what the user needs to see.
+
+    Args:
+        module: Full name of the module.
+        function: Name of the function; it takes no argument and returns the exit code.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    sys.exit(getattr(importlib.import_module(module), function)())

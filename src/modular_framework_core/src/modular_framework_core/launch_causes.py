@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds in the log file of a node why it ended."""
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+_RECORD = re.compile(r"^\[[\w.]+\]\[(\w+)\] [\d-]+ [\d:,]+: ")
+
+
+def cause_of_death(log_file: Path) -> str:
+    """Returns the last fatal message of a node's log file.
+
+    Args:
+        log_file: As rospy writes it.
+
+    Returns:
+        The message; empty when there is none, or no such file.
+    """
+    try:
+        lines = log_file.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    message: list[str] = []
+    in_fatal = False
+    for line in lines:
+        record = _RECORD.match(line)
+        if record is not None:
+            in_fatal = record[1] == "CRITICAL"
+            if in_fatal:
+                message = []
+        if in_fatal:
+            message.append(line[record.end():] if record is not None else line)
+    return "\n".join(message).strip()

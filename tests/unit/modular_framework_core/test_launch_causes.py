@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Why a node ended is found in its log file, and a wrong launch argument is refused before anything starts."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import roslaunch.core
+
+from modular_framework_core.launch_causes import cause_of_death
+from modular_framework_core.launch_runner import EndWatcher, _check_arguments, _verdict
+
+LAUNCH = """<launch><arg name="simulation" default="true"/><arg name="gui" default="$(eval 1 == 2)"/>
+<arg name="world_file" default="a.world"/></launch>"""
+LOG = """[rospy.client][INFO] 2026-11-22 13:21:26,514: init_node, name[/gazebo], pid[28214]
+[rosout][ERROR] 2026-11-22 13:21:26,520: a bad day
+[rosout][CRITICAL] 2026-11-22 13:21:26,834: The task could not be run: 1 fault in the task:
+  pick.yaml:3:1: unknown key 'sorce'
+[rospy.core][INFO] 2026-11-22 13:21:26,842: signal_shutdown [atexit]
+"""
+
+
+def test_the_last_fatal_message_is_the_cause_with_all_its_lines(tmp_path: Path) -> None:
+    (tmp_path / "task-10.log").write_text(LOG)
+    assert cause_of_death(tmp_path / "task-10.log") == (
+        "The task could not be run: 1 fault in the task:\n  pick.yaml:3:1: unknown key 'sorce'")
+    (tmp_path / "quiet.log").write_text(LOG.replace("CRITICAL", "WARNING"))
+    assert cause_of_death(tmp_path / "quiet.log") == ""
+    assert cause_of_death(tmp_path / "none.log") == ""
+
+
+@pytest.mark.parametrize(("argument", "hint"), [
+    ("simulation:=flase", "argument 'simulation' is 'flase', allowed are true and false"),
+    ("gui:=", "argument 'gui' is ''"), ("worldfile:=b", "did you mean 'world_file'"),
+    ("b.world", "not of the form name:=value")])
+def test_a_wrong_argument_is_refused_with_what_is_allowed(tmp_path: Path, argument: str, hint: str) -> None:
+    (tmp_path / "a.launch").write_text(LAUNCH)
+    with pytest.raises(roslaunch.core.RLException, match=hint):
+        _check_arguments(str(tmp_path / "a.launch"), [argument])
+    _check_arguments(str(tmp_path / "a.launch"), ["simulation:=False", "gui:=1", "world_file:=true.world"])
+
+
+@pytest.mark.parametrize(("died", "code", "last"), [
+    (("task-10", 0), 0, "run_framework: the task succeeded"),
+    (("task-10", 1), 1, "run_framework: the task did not succeed: because"),
+    (("task-10", 2), 2, "run_framework: the task could not be run: because"),
+    (("gazebo-2", 1), 3, "run_framework: node 'gazebo' died (exited with 1), and everything was stopped: because"),
+    (("gazebo-2", -9), 3,
+     "run_framework: node 'gazebo' died (was killed by signal 9), and everything was stopped: because")])
+def test_the_cause_is_the_last_line(capsys: pytest.CaptureFixture[str], died: tuple[str, int], code: int,
+                                    last: str) -> None:
+    watcher = EndWatcher("task")
+    watcher.process_died(*died)
+    watcher.process_died("late-3", 1)
+    assert watcher.last_process == died[0]
+    assert _verdict(watcher, "because") == code
+    printed = capsys.readouterr()
+    assert (printed.out + printed.err).splitlines() == [last]
