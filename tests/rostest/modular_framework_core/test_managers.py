@@ -321,6 +321,18 @@ def test_reloading_forgets_what_was_added_and_reads_the_file_again(managers):
     assert call("get_joint_state", srv.GetJointState, "up").joint_state.position == (1.5707963268, 0.1)
 
 
+def test_managers_are_reinitialised_by_the_name_that_grip_gave_it(managers):
+    call("add_joint_state", srv.AddJointState, JointState(name=["a"], position=[9.0]), "added")
+    call("reinitialise_joint_state_manager", srv.ReinitManager, "")
+    assert lists("joint_states") == (["down", "up"], 0)
+    (folder() / "other.yaml").write_text("mine: {a: 1.0}\n")
+    assert call("reinitialise_joint_state_manager", srv.ReinitManager, "other.yaml").success
+    assert lists("joint_states") == (["mine"], 0)
+    call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), "p")
+    assert call("reinitialise_plan_manager", srv.ReinitManager, "").success and lists("plans") == ([], 0)
+    call("reload_joint_states", srv.MessageFile, "")
+
+
 def test_poses_of_the_file_are_poses_of_things_and_of_robots(managers):
     assert not call("reload_poses", srv.MessageFile, "").success
     pose = call("get_pose", srv.GetPoseStamped, "table").pose_stamped

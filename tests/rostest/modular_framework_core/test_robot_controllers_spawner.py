@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import rospy
 from controller_manager_msgs.srv import ListControllers, LoadController, SwitchController
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 HARDWARE = """
@@ -35,7 +36,8 @@ def robot_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (package / "package.xml").write_text("<package format='2'><name>some_robot</name><version>0.1.0</version>"
                                          "<description>d</description><maintainer email='a@b.c'>m</maintainer>"
                                          "<license>BSD</license></package>")
-    files = {"good.yaml": CONTROLLERS, "unsafe.yaml": "arm: !!python/object/apply:os.getpid []",
+    files = {"good.yaml": CONTROLLERS, "arm_only.yaml": CONTROLLERS.splitlines()[2],
+             "unsafe.yaml": "arm: !!python/object/apply:os.getpid []",
              "wrong_joint.yaml": "leg: {type: position_controllers/JointTrajectoryController, joints: [knee]}"}
     for name, text in files.items():
         (package / "controllers" / name).write_text(text)
@@ -72,7 +74,7 @@ def states() -> dict[str, str]:
 
 def test_a_missing_package_file_or_unsafe_file_is_named(spawn: Callable[..., Any]) -> None:
     faulty = {("no_such_robot", "good.yaml"): "robot package 'no_such_robot' is not found",
-              ("some_robot", "absent.yaml"): "beside it: good.yaml",
+              ("some_robot", "absent.yaml"): "beside it: arm_only.yaml, good.yaml",
               ("some_robot", "unsafe.yaml"): "not valid YAML"}
     processes = {words: spawn(*arguments) for arguments, words in faulty.items()}
     for words, process in processes.items():
@@ -80,6 +82,17 @@ def test_a_missing_package_file_or_unsafe_file_is_named(spawn: Callable[..., Any
         assert code == 1
         assert words in output
     assert states() == {}
+
+
+def test_a_file_without_joint_state_controller_gets_one_and_says_so(spawn: Callable[..., Any]) -> None:
+    code, output = result(spawn("some_robot", "arm_only.yaml"))
+    assert code == 0, output
+    assert "lists no joint state controller; 'joint_state_controller'" in output
+    assert states() == {"joint_state_controller": "running", "arm": "running"}
+    heard = rospy.wait_for_message("joint_states", JointState, timeout=60.0)
+    assert set(heard.name) == {"shoulder", "elbow"}
+    code, output = result(spawn("some_robot", "arm_only.yaml"))
+    assert (code, "lists no joint state controller" in output) == (0, False)
 
 
 def test_it_waits_for_every_hardware_and_names_the_missing_topic(spawn: Callable[..., Any]) -> None:

@@ -12,6 +12,7 @@ from modular_framework_core.robot_controllers_spawner import (
     plan_spawn,
     read_controller_file,
     ready_topics,
+    with_joint_states,
 )
 
 
@@ -26,6 +27,16 @@ def test_keys_with_a_type_are_controllers_and_everything_is_kept_as_parameters(t
     read = read_controller_file(path)
     assert read.controllers == ("arm", "hand")
     assert read.parameters["joint_limits"] == {"x": {"max_velocity": 1.0}}
+
+
+def test_a_joint_state_controller_is_added_only_where_there_is_none(tmp_path: Path) -> None:
+    arm = read_controller_file(write(tmp_path, "arm: {type: a/B, joints: [x]}\n"))
+    added = with_joint_states(arm, ["a/B"])
+    assert added.controllers == ("joint_state_controller", "arm")
+    assert added.parameters["joint_state_controller"]["type"] == "joint_state_controller/JointStateController"
+    assert with_joint_states(arm, ["joint_state_controller/JointStateController"]) is arm
+    own = read_controller_file(write(tmp_path, "state: {type: mine/JointStateController}\n"))
+    assert with_joint_states(own, []) is own
 
 
 @pytest.mark.parametrize(("text", "words"), [

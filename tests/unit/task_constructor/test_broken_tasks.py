@@ -89,6 +89,22 @@ states:
     assert all(wanted in fault for fault, wanted in zip(faults, expected, strict=True)), faults
 
 
+def test_a_template_of_the_original_framework_is_refused_with_what_is_written_for_its_names(tmp_path: Path) -> None:
+    (tmp_path / "mine.template").write_text("""{% for state_to_import in state_machine.states_source %}
+{% endfor %}
+class {{ state_machine.type }}(smach.StateMachine):
+    def __init__(self, outcomes={{ state_machine.parameters.outcomes }}):
+        {% for name, state in state_machine.components.items() %}{% endfor %}
+""")
+    faults = World(tmp_path, tmp_path).faults(GOOD_TASK.replace("source: state_machine", "source: mine"))
+    assert len(faults) == 1
+    for said in ("t.yaml:2:9: 'tiny': the template 'mine' cannot be used",
+                 "mine.template:1: state_machine.states_source",
+                 "mine.template:4: state_machine.parameters is now fields of state_machine",
+                 "mine.template:5: state_machine.components is now state_machine.states, which children.add writes"):
+        assert said in faults[0]
+
+
 def test_the_good_tasks_have_no_fault(world: World) -> None:
     shared = NESTED.replace("outcomes: [done, gave_up]\n      states", "outcomes: [done, gave_up]\n      userdata: "
                             "self.userdata\n      states")

@@ -2,12 +2,16 @@
 """What a controller file asks for: which controllers, with which parameters, and what is still to do for them."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
+
+JOINT_STATES_NAME = "joint_state_controller"
+JOINT_STATES_TYPE = "joint_state_controller/JointStateController"
+JOINT_STATES_RATE_HZ = 50.0
 
 
 class ControllerFileError(Exception):
@@ -68,6 +72,21 @@ def read_controller_file(path: Path) -> ControllerFile:
     if faults:
         raise ControllerFileError(f"controller file {path}: {'; '.join(faults)}")
     return ControllerFile(path, content, names)
+
+
+def with_joint_states(file: ControllerFile, running_types: Iterable[str]) -> ControllerFile:
+    """Returns the file with a joint state controller, where neither it nor the controller manager has one.
+
+    Args:
+        file: what was read.
+        running_types: types of the controllers that are loaded already.
+    """
+    types = [file.parameters[name]["type"] for name in file.controllers]
+    if any(kind.rpartition("/")[2] == JOINT_STATES_TYPE.rpartition("/")[2] for kind in (*types, *running_types)):
+        return file
+    settings = {"type": JOINT_STATES_TYPE, "publish_rate": JOINT_STATES_RATE_HZ}
+    return ControllerFile(file.path, {**file.parameters, JOINT_STATES_NAME: settings},
+                          (JOINT_STATES_NAME, *file.controllers))
 
 
 def _is_type(value: object) -> bool:

@@ -21,11 +21,15 @@ from std_msgs.msg import Bool
 
 from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.robot_controllers_spawner import (
+    JOINT_STATES_NAME,
+    JOINT_STATES_RATE_HZ,
+    JOINT_STATES_TYPE,
     ControllerFileError,
     SpawnPlan,
     plan_spawn,
     read_controller_file,
     ready_topics,
+    with_joint_states,
 )
 from modular_framework_core.ros_calls import CallError, call_service
 
@@ -73,6 +77,7 @@ class RobotControllersSpawner:
         for name, value in self._file.parameters.items():
             rospy.set_param(f"/{name}", value)
         self._wait_for_hardware()
+        self._add_joint_states()
         plan = plan_spawn(self._file.controllers, self._states())
         self._carry_out(plan)
         states = self._states()
@@ -83,6 +88,17 @@ class RobotControllersSpawner:
                              "controller manager says why")
         rospy.loginfo("controllers running: %s (loaded now: %s)", ", ".join(self._file.controllers),
                       ", ".join(plan.load) or "none")
+
+    def _add_joint_states(self) -> None:
+        """Adds a joint state controller where there is none: without one nobody knows where the joints are."""
+        loaded = self._call("list_controllers", ListControllers).controller
+        completed = with_joint_states(self._file, [entry.type for entry in loaded])
+        if completed is not self._file:
+            self._file = completed
+            rospy.set_param(f"/{JOINT_STATES_NAME}", completed.parameters[JOINT_STATES_NAME])
+            rospy.loginfo("%s lists no joint state controller; '%s' (%s, %.0f Hz) is started, so that the joints' "
+                          "positions are published", completed.path, JOINT_STATES_NAME, JOINT_STATES_TYPE,
+                          JOINT_STATES_RATE_HZ)
 
     def _carry_out(self, plan: SpawnPlan) -> None:
         for name in plan.load:

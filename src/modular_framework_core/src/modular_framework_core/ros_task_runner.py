@@ -3,7 +3,7 @@
 
 Node ``run_task``. Arguments: optionally the path of a task script (``.yaml``) or of a state machine (``.py``).
 Parameters (used where there is no argument):
-    ``~task_constructor_script``: path of the task script.
+    ``~task_constructor_script``: path of the task script, or its name in the API package's folder of scripts.
     ``~state_machine_to_load``: path of an existing state machine, or its name in the folder of generated ones; when it
         is not empty, nothing is generated.
     ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
@@ -258,7 +258,7 @@ def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
         )
     if machine or given.suffix == ".py":
         return _prepare_machine(given)
-    return _prepare_task(given)
+    return _prepare_task(default_folders.task_script(given))
 
 
 def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:

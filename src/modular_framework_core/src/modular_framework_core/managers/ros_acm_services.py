@@ -23,6 +23,8 @@ from modular_framework_core.srv import (
     UpdateACMEntry,
     UpdateACMEntryRequest,
     UpdateACMEntryResponse,
+    UpdateAndPublishACMEntry,
+    UpdateAndPublishACMEntryResponse,
 )
 
 INDICES_PARAMETER = "manipulator_links_indices"
@@ -72,6 +74,7 @@ class AcmServices:
         ``manipulator_links_indices`` (list of int): rows of the manipulator's links in the matrix of ``set_init_acm``.
         ``manipulator_prefix`` (string): text in the names of the manipulator's links; used without the indices.
         Both are read each time a reference matrix is set.
+        ``~grip_interfaces`` (bool, false): serves ``update_acm_entry`` with GRIP's type, which has a field ``publish``.
         ``simulation`` (bool): True adds the loose objects of the simulation before a request about objects is served.
 
     Services:
@@ -88,8 +91,9 @@ class AcmServices:
 
     def connect(self) -> None:
         """Advertises the services."""
+        entry_type = UpdateAndPublishACMEntry if rospy.get_param("~grip_interfaces", False) else UpdateACMEntry
         self._services = [rospy.Service("set_init_acm", SetInitACM, self._set_init),
-                          rospy.Service("update_acm_entry", UpdateACMEntry, self._update_entry),
+                          rospy.Service("update_acm_entry", entry_type, self._update_entry),
                           rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified),
                           rospy.Service("modify_acm", ModifyACM, self._modify_links)]
 
@@ -112,20 +116,25 @@ class AcmServices:
             rospy.logerr("set_init_acm: %s", error)
             return SetInitACMResponse(success=False)
 
-    def _update_entry(self, request: Any) -> UpdateACMEntryResponse:
-        before = self.manager.permissions()
+    def _update_entry(self, request: Any) -> Any:
+        before, publish = self.manager.permissions(), bool(getattr(request, "publish", False))
+        response = UpdateACMEntryResponse if isinstance(request, UpdateACMEntryRequest) else (
+            UpdateAndPublishACMEntryResponse)
         try:
             warning = self._apply_update(request.action, request.entry_name)
-            if before - self.manager.permissions():
+            if publish or before - self.manager.permissions():
                 apply_matrix(matrix_to_message(self.manager.current().matrix), APPLY_TIMEOUT_S)
         except AcmError as error:
             rospy.logerr("update_acm_entry: %s", error)
-            return UpdateACMEntryResponse(success=False)
+            return response(success=False)
         except CallError as error:
+            if publish:
+                rospy.logerr("update_acm_entry: the matrix was to be published: %s", error)
+                return response(success=False)
             warning = f"move_group still has the collision matrix it had: {error}"
         if warning:
             rospy.logwarn("update_acm_entry: %s", warning)
-        return UpdateACMEntryResponse(success=True)
+        return response(success=True)
 
     def _apply_update(self, action: int, entry_name: str) -> str:
         match action:

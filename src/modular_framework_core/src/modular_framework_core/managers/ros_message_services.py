@@ -93,7 +93,7 @@ class MessageServices:
             all messages; ``clear_anonymous_<plural>`` (std_srvs/Trigger): those that wait to be read.
         ``save_<plural>``, ``load_<plural>`` (MessageFile): all messages to a file and from one.
         ``reload_<plural>`` (MessageFile): forgets everything and reads the file of named messages again, or
-            another one.
+            another one. ``reinitialise_<suffix>_manager`` (ReinitManager): GRIP's name for that.
     Parameters:
         ``~file_directory``: folder of the files that are saved and loaded (default:
             ``$ROS_HOME/modular_framework/managers``); a file elsewhere is refused, but for
@@ -127,6 +127,7 @@ class MessageServices:
         self._serve(f"clear_anonymous_{kind.plural}", Trigger, self._clear_anonymous)
         for verb, work in (("save", self._save), ("load", self._load), ("reload", self._reload)):
             self._serve(f"{verb}_{kind.plural}", srv.MessageFile, work)
+        self._serve(f"reinitialise_{last}_manager", srv.ReinitManager, self._reinitialise)
 
     def _serve(self, name: str, service_type: Any, work: Callable[[Any], Any]) -> None:
         self._services.append(rospy.Service(name, service_type, work))
@@ -221,6 +222,10 @@ class MessageServices:
         if faults:
             return self._refused("\n".join(map(str, faults)), count)
         return srv.MessageFileResponse(success=True, message=str(file.path), count=count)
+
+    def _reinitialise(self, request: Any) -> Any:
+        answer = self._reload(srv.MessageFileRequest(path=request.argument))
+        return srv.ReinitManagerResponse(success=answer.success)
 
     def _read(self, file: NamedFile) -> tuple[int, list[EntryError]]:
         """Replaces what is stored by what is usable of a file."""

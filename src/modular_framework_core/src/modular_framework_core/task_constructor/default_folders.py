@@ -14,6 +14,7 @@ from modular_framework_urdf import xml_text
 STATES_PACKAGE = "modular_framework_states.states"
 TEMPLATES_PACKAGE = "modular_framework_core"
 API_PACKAGE = "modular_framework_api"
+SCRIPTS_FOLDER = "task_constructor_scripts"
 LAUNCH_FILE = "start_framework.launch"
 
 
@@ -54,6 +55,14 @@ def config_folder() -> Path | None:
     """Return the configuration folder of the API package; None when that package is not there."""
     folder = _package(API_PACKAGE)
     return None if folder is None else folder / "config"
+
+
+def task_script(name: Path) -> Path:
+    """Return the path of a task script: as given, or in the API package's folder when it is only the name of one."""
+    folder = _package(API_PACKAGE)
+    if name.exists() or name.name != str(name) or folder is None:
+        return name
+    return folder / SCRIPTS_FOLDER / name
 
 
 def srdf_file(package: str = "") -> Path | None:

@@ -54,6 +54,8 @@ class HeaderReader:
                                          f"{listing(self._templates.names())}")
         elif template is None:
             self._faults.add_unknown(node.place, "template", name, self._templates.names())
+        elif template.fault:
+            self._faults.add(node.place, f"'{label}': the template '{name}' cannot be used: {template.fault}")
         return template
 
     def outcomes(self, header: Mapping) -> tuple[str, ...] | None:

@@ -86,12 +86,13 @@ def main(arguments: Sequence[str]) -> int:
         if given.explain or given.schema:
             print(_about_language(given, catalogue, TemplateCatalogue(templates)))
             return 0
+        script = default_folders.task_script(given.script)
         known = names_of_installation(given.config, given.moveit_config)
         if given.check or given.graph:
-            print(_checked(given, check_task(given.script, states, templates, known)))
+            print(_checked(given, check_task(script, states, templates, known)))
         else:
             output = given.output or generator.default_output_directory()
-            print(construct_task(given.script, states, templates, output, known)[1])
+            print(construct_task(script, states, templates, output, known)[1])
     except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownNameError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1

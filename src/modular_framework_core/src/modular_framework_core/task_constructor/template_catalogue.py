@@ -12,6 +12,14 @@ SUFFIX = ".template"
 _OPTION = re.compile(r"\boptions\.(\w+)|\boptions\[['\"](\w+)['\"]\]")
 _TAKES_KEYS = re.compile(r"\bchildren\.keys\b|\binput_keys\b")
 _DOC = re.compile(r'^class\b.*:\s*\n\s*"""(.*?)"""', re.MULTILINE | re.DOTALL)
+_RENAMED = {
+    "states_source": "nothing: the imports of states are written above all classes",
+    "components": "state_machine.states, which children.add writes",
+    "parameters": "fields of state_machine (outcomes, default_outcome, outcome_map, shares_userdata), and "
+                  "options.<key>",
+}
+"""What templates of the original framework read of ``state_machine``, and what stands for it here."""
+_OLD_NAME = re.compile(rf"\bstate_machine\.({'|'.join(_RENAMED)})\b")
 _PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
 
 
@@ -28,6 +36,7 @@ class TemplateSource:
         userdata: keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
             None when it does not say.
         doc: docstring of its class.
+        fault: why no machine can be written with it; "" for one that is in order.
     """
 
     name: str
@@ -37,6 +46,7 @@ class TemplateSource:
     takes_keys: bool
     userdata: frozenset[str] | None
     doc: str
+    fault: str = ""
 
 
 class TemplateCatalogue:
@@ -75,4 +85,16 @@ def _read_template(name: str, file: Path) -> TemplateSource:
     concurrent, takes_keys = re.search(r"\bConcurrence\b", text), _TAKES_KEYS.search(text)
     doc = _DOC.search(text)
     return TemplateSource(name, file, concurrent is not None, options, takes_keys is not None, provided,
-                          "" if doc is None else inspect.cleandoc(doc.group(1)))
+                          "" if doc is None else inspect.cleandoc(doc.group(1)), _original_names(text, file))
+
+
+def _original_names(text: str, file: Path) -> str:
+    """Say which names of the original framework a template reads, and what is written for them here."""
+    lines: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        for name in _OLD_NAME.findall(line):
+            lines.setdefault(name, number)
+    if not lines:
+        return ""
+    said = "; ".join(f"{file}:{number}: state_machine.{name} is now {_RENAMED[name]}" for name, number in lines.items())
+    return f"it is written for the original framework: {said}; 'Templates' in modular_framework_core's README shows one"
