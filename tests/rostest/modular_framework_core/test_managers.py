@@ -2,6 +2,7 @@
 """The managers answer on the wire as clients of the original expect, without its defects."""
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import threading
@@ -19,7 +20,12 @@ from moveit_msgs.msg import (
     CollisionObject,
     RobotTrajectory,
 )
-from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneResponse
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    ApplyPlanningSceneResponse,
+    GetPlanningScene,
+    GetPlanningSceneResponse,
+)
 from ros_session import until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -71,7 +77,9 @@ def managers(ros_launch, tmp_path_factory: pytest.TempPathFactory):
     session = ros_launch(f"""<launch>
       <rosparam param="manipulator_links_indices">[1, 2]</rosparam>
       <node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"
-            args="{folder}/states.yaml {folder}/trajectories.yaml {folder}/poses.yaml"/></launch>""")
+            args="{folder}/states.yaml {folder}/trajectories.yaml {folder}/poses.yaml"/>
+      <node name="acm_of_grip" pkg="modular_framework_core" type="acm_manager_server" ns="grip">
+        <param name="grip_interfaces" value="true"/></node></launch>""")
     session.wait_for_service("/get_object_type", 60)
     session.wait_for_service("/set_init_acm", 60)
     return session
@@ -171,6 +179,26 @@ def test_the_collision_matrix_serves_allow_and_restore(managers):
     assert not call("update_acm_entry", srv.UpdateACMEntry, 9, "x").success
     assert not call("update_acm_entry", srv.UpdateACMEntry, UpdateACMEntryRequest.ADD_ENTRY, "").success
     assert not call("get_modified_acm", srv.GetModifiedACM, 9, [], True).success
+
+
+def test_an_entry_is_published_for_clients_of_grip_where_its_interfaces_are_asked_for(managers):
+    request = "uint8 ADD_ENTRY=0\nuint8 DELETE_ENTRY=1\nuint8 REINIT=2\nuint8 action\nstring entry_name\nbool publish"
+    kind = srv.UpdateAndPublishACMEntry
+    assert kind._md5sum == hashlib.md5(f"{request}bool success".encode()).hexdigest()
+    assert srv.ReinitManager._md5sum == hashlib.md5(b"string argumentbool success").hexdigest()
+    given: list[AllowedCollisionMatrix] = []
+
+    def apply(request):
+        given.append(request.scene.allowed_collision_matrix)
+        return ApplyPlanningSceneResponse(True)
+
+    assert call("grip/set_init_acm", srv.SetInitACM, matrix(["arm", "palm"], [])).success
+    assert not call("grip/update_acm_entry", kind, 0, "cup", True).success
+    service = rospy.Service("grip/apply_planning_scene", ApplyPlanningScene, apply)
+    assert call("grip/update_acm_entry", kind, 0, "mug", False).success and given == []
+    assert call("grip/update_acm_entry", kind, 0, "can", True).success
+    assert given[0].entry_names == ["arm", "palm", "cup__link", "mug__link", "can__link"]
+    service.shutdown()
 
 
 def test_the_links_of_the_manipulator_are_read_again_with_every_reference_matrix(managers):
