@@ -187,3 +187,34 @@ def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any
     assert active.status is GoalStatus.CANCELED
     assert taken_up.status is behind.status is GoalStatus.REJECTED
     assert "nobody listens" in taken_up.text and "nobody listens" in behind.text
+
+
+def test_a_gripper_on_its_way_stops_with_its_controller_and_one_that_holds_something_goes_on_squeezing(
+        loop: Any) -> None:
+    moving = send(loop, 0.4)
+    loop.run(0.2)
+    assert loop.switch([], ["gripper"]) is None
+    assert moving.status is GoalStatus.CANCELED
+    stopped = handle(loop).position
+    loop.run(0.5)
+    assert handle(loop).position == pytest.approx(stopped, abs=0.02)
+    assert loop.switch(["gripper"], []) is None
+    squeezing = send(loop, 0.8)
+    loop.run(1.5)
+    assert squeezing.status is GoalStatus.ABORTED and handle(loop).position == 0.5
+    assert loop.switch([], ["gripper"]) is None
+    loop.manager.update(loop.time_s, 0.01)
+    assert handle(loop).command == 0.5, "the end of the range, as the limits gave it"
+
+
+def test_a_canceled_gripper_does_not_push_on_against_what_holds_it_up(loop: Any) -> None:
+    ticket = send(loop, 0.4)
+    for _ in range(30):
+        loop.step()
+        handle(loop).state.position = 0.1
+    loop.controllers["gripper"].cancel(ticket)
+    loop.robot_hw.read(loop.time_s, 0.01)
+    handle(loop).state.position = 0.1
+    loop.manager.update(loop.time_s, 0.01)
+    loop.robot_hw.write(loop.time_s, 0.01)
+    assert handle(loop).command == 0.1

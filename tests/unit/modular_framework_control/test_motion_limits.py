@@ -13,7 +13,7 @@ from scipy.interpolate import BPoly
 from modular_framework_control.joint_limit_parameters import JointLimits
 from modular_framework_control.trajectory import JointTrajectory, Spline, Track, TrajectoryPoint
 from modular_framework_control.trajectory_limits import MotionLimits, excesses_of
-from modular_framework_control.trajectory_stop import FOLLOWING_LAG_S, StopMotion
+from modular_framework_control.trajectory_stop import COMMAND_S, FOLLOWING_LAG_S, StopMotion
 
 FREE = MotionLimits.of([JointLimits()])
 BOUND = MotionLimits.of([JointLimits(-2.0, 2.0, 3.0, max_acceleration=20.0)])
@@ -101,12 +101,13 @@ def test_a_ramp_begins_where_the_joint_is_brakes_as_it_may_and_stays_in_its_rang
     track = StopMotion(duration_s, BOUND).tracks(np.array([[desired], [desired_velocity]]), actual, 5.0, rate)[0]
     rows = sampled(track, 5.0)
     way = np.abs(rows[:, 0] - position)
-    assert abs(rows[0, 0] - position) <= 3.0 * FOLLOWING_LAG_S + 1e-9
+    under_way = min(abs(velocity), 3.0) * FOLLOWING_LAG_S + 3.0 * COMMAND_S
+    assert abs(rows[0, 0] - position) <= under_way + 1e-9
     assert np.abs(rows[:, 1]).max() * rate <= 3.0 + 1e-9
     assert rows[:, 0].min() >= -2.0 - 1e-9 and rows[:, 0].max() <= 2.0 + 1e-9
     assert rows[-1, 1] == 0.0 and (np.diff(rows[:, 0]) * math.copysign(1.0, velocity) > -1e-9).all()
     braked_s = max(duration_s, 1.5 * min(abs(velocity), 3.0) / 20.0)
-    assert way.max() <= 3.0 * FOLLOWING_LAG_S + 0.5 * min(abs(velocity), 3.0) * braked_s + 1e-9
+    assert way.max() <= under_way + 0.5 * min(abs(velocity), 3.0) * braked_s + 1e-9
     if abs(rows[-1, 0]) < 2.0 - 1e-9:       # the end of the range asks for more
         assert np.abs(rows[:, 2]).max() * rate ** 2 <= max(1.5 * min(abs(velocity), 3.0) / duration_s, 20.0) + 0.2
 

@@ -283,3 +283,19 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
 def test_a_faulty_robot_description_is_refused(urdf: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=said):
         read_robot(urdf, no_packages, ConvexParts(tmp_path), False)
+
+
+def test_a_joint_that_fell_behind_catches_up_no_faster_than_its_limit(lifter: Lifter) -> None:
+    begin, behind, fastest = lifter.world.time_ns * 1e-9, 0.0, 0.0
+    lift = lifter.commands["lift"]
+
+    def hold_up_then_let_go(time_s: float) -> None:
+        nonlocal behind, fastest
+        lift.max_effort = 2.2 * 9.81 if time_s - begin < 0.2 else 0.0
+        behind = max(behind, lift.command - lift.position)
+        fastest = max(fastest, lift.velocity)
+        lift.command = 0.5
+
+    lifter.run(1.0, hold_up_then_let_go)
+    assert behind > 0.1 and lift.position == pytest.approx(0.5, abs=1e-3)
+    assert 0.9 < fastest < 1.05

@@ -204,6 +204,7 @@ class GripperActionController(Controller):
     def _hold(self) -> None:
         """Stay, with no more effort than before: there may be something between the fingers."""
         self._command = self._handle.position
+        self._handle.held = True
 
     def _apply(self, period_s: float) -> None:
         """Command the joint; `period_s` [s] is the time since the last call, 0 at a start."""

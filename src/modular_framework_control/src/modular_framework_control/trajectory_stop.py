@@ -19,8 +19,11 @@ from modular_framework_control.trajectory import (
 from modular_framework_control.trajectory_limits import MotionLimits
 
 FOLLOWING_LAG_S = 0.05
-"""How late a joint that follows well may be [s]: the commands of so long are on their way, and a ramp goes on from
-them. Set by an arm that follows over a network 0.03 s late; a slower one is brought back a little as it brakes."""
+"""How late a moving joint may follow [s]: at its measured velocity it is that far behind commands on their way, and a
+ramp goes on from them. Set by an arm that follows over a network 0.03 s late; a slower one is brought back a little as
+it brakes."""
+COMMAND_S = 0.01
+"""How old the last command is at most [s]; so much of the desired motion a joint has not begun to follow."""
 FOLLOWING_SHARE = 0.1
 """How different the measured velocity of a joint that follows may be, as a share of the desired one, which a ramp then
 goes on from: measured velocities are late and noisy."""
@@ -59,7 +62,8 @@ class StopMotion:
             return [Track.hold(list(joints), actual[POSITION], time_s)]
         follows = np.abs(desired[VELOCITY] - actual[VELOCITY]) <= FOLLOWING_SHARE * np.abs(desired[VELOCITY])
         velocity = np.clip(np.where(follows, desired[VELOCITY], actual[VELOCITY]), -limits.fastest, limits.fastest)
-        under_way = FOLLOWING_LAG_S * np.minimum(np.abs(desired[VELOCITY]), limits.fastest)
+        under_way = (FOLLOWING_LAG_S * np.minimum(np.abs(actual[VELOCITY]), limits.fastest)
+                     + COMMAND_S * np.minimum(np.abs(desired[VELOCITY]), limits.fastest))
         ahead = np.clip(desired[POSITION] - actual[POSITION], -under_way, under_way)
         limits = limits.with_positions(actual[POSITION])
         position = np.clip(actual[POSITION] + ahead, limits.lowest, limits.highest)

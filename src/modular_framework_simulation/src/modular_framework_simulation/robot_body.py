@@ -187,9 +187,11 @@ class RobotBody:
                 leader = self.readings[self._rank[joint.mimic.leader]].position
                 target = joint.mimic.multiplier * leader + joint.mimic.offset
                 effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
-            reach = joint.velocity * step_s / _POSITION_GAIN
+            # The drive adds the velocity that corrects the position to the one fed forward; the sum stays in bounds.
+            ahead, behind = (max(0.0, speed) * step_s / _POSITION_GAIN
+                             for speed in (joint.velocity - velocity, joint.velocity + velocity))
             indices.append(self._indices[rank])
-            targets.append(max(position - reach, min(position + reach, target)))
+            targets.append(max(position - behind, min(position + ahead, target)))
             velocities.append(velocity)
             efforts.append(effort)
         self._set_motors(indices, targets, velocities, efforts)
