@@ -140,7 +140,7 @@ URDF = """<robot name="r"><link name="base"/>
 def car(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     def make(**more: Any) -> Any:
         parameters = {"type": "ackermann_steering_controller/AckermannSteeringController", **COMMON, **more}
-        loop = make_loop({"robot_description": URDF, "c": parameters},
+        loop = make_loop({"robot_description": parameters.pop("robot_description", URDF), "c": parameters},
                          Cart(["rear_wheel_joint"], ["front_steer_joint"]))
         loop.spawn("c")
         return loop
@@ -315,7 +315,9 @@ def test_a_rover_that_cannot_be_is_refused(rover: Callable[..., Any], parameters
 @pytest.mark.parametrize(("parameters", "fault"), [
     ({"front_steer": 3}, "front_steer: got 3; expected a joint's name"),
     ({"rear_wheel": "front_steer_joint"}, "is not ahead of joint"),
-    ({"rear_wheel": "none"}, "there is no joint 'none'")])
+    ({"rear_wheel": "none"}, "there is no joint 'none'"),
+    ({"robot_description": URDF.replace('<cylinder radius="0.11" length="0.1"/>', '<sphere radius="0.11"/>')},
+     "wheel link 'w' is <sphere>; expected <cylinder>, whose radius")])
 def test_a_car_that_cannot_be_is_refused(car: Callable[..., Any], parameters: dict[str, Any], fault: str) -> None:
     with pytest.raises(ControllerError, match=fault):
         car(**parameters)

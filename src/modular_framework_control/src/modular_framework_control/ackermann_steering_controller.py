@@ -23,7 +23,8 @@ class AckermannSteeringController(MobileBaseController):
 
     Parameters, besides those of every mobile base: `rear_wheel` rear_wheel_joint and `front_steer` front_steer_joint,
     the joints; `wheel_separation_h` [m], the distance of the axles, and `wheel_radius` [m]: of the robot description
-    when not set; `wheel_separation_h_multiplier`, `wheel_radius_multiplier`, `steer_pos_multiplier` 1.
+    when not set, the latter of a cylinder only; `wheel_separation_h_multiplier`, `wheel_radius_multiplier`,
+    `steer_pos_multiplier` 1.
 
     While a position is not a number the odometry stands still, and the base comes to rest.
     """
@@ -37,7 +38,7 @@ class AckermannSteeringController(MobileBaseController):
         base = (read_positive(controller_nh, "wheel_separation_h", 1.0) if controller_nh.has_param("wheel_separation_h")
                 else _wheel_base_of(WheelGeometry(root_nh, "wheel_separation_h"), wheel, steer))
         radius = (read_positive(controller_nh, "wheel_radius", 1.0) if controller_nh.has_param("wheel_radius")
-                  else WheelGeometry(root_nh, "wheel_radius").radius(wheel))
+                  else WheelGeometry(root_nh, "wheel_radius").radius(wheel, ("cylinder",)))
         self._wheel_base = base * read_positive(controller_nh, "wheel_separation_h_multiplier", 1.0)
         self._radius = radius * read_positive(controller_nh, "wheel_radius_multiplier", 1.0)
         self._steer_factor = read_positive(controller_nh, "steer_pos_multiplier", 1.0)

@@ -52,8 +52,12 @@ class WheelGeometry:
         """Distance between two joints, both unmoved [m]; raises as `between`."""
         return float(np.linalg.norm(self.between(first, second)))
 
-    def radius(self, joint: str) -> float:
-        """Radius of the wheel that a joint turns: of the cylinder or sphere of its link's collision geometry [m].
+    def radius(self, joint: str, shapes: tuple[str, ...] = ("cylinder", "sphere")) -> float:
+        """Radius of the wheel that a joint turns: that of its link's collision geometry [m].
+
+        Args:
+            joint: name of the joint.
+            shapes: geometries that are wheels.
 
         Raises:
             ParameterError: no such joint, or its link has no such collision geometry.
@@ -65,11 +69,12 @@ class WheelGeometry:
                                  f"links: {', '.join(sorted(self._links)) or 'none'}; {self._remedy}")
         geometry = link.find("collision/geometry")
         for shape in () if geometry is None else geometry:
-            if shape.tag in ("cylinder", "sphere"):
+            if shape.tag in shapes:
                 return self._radius_of(shape, name)
         found = "none" if geometry is None else ", ".join(f"<{shape.tag}>" for shape in geometry) or "empty"
         raise ParameterError(f"{self._where}: collision geometry of the wheel link '{name}' is {found}; expected "
-                             f"<cylinder> or <sphere>, whose radius is the wheel's; {self._remedy}")
+                             f"{' or '.join(f'<{tag}>' for tag in shapes)}, whose radius is the wheel's; "
+                             f"{self._remedy}")
 
     def _joint(self, name: str) -> ElementTree.Element:
         if name not in self._joints:
