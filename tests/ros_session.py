@@ -154,13 +154,27 @@ class RosSession:
         return "".join(launch.log() for launch in self._launches)
 
     def stop(self) -> None:
-        """Stops launches, then the master. May be called twice."""
+        """Stops launches, then the master, then whatever of them is left. May be called twice."""
         for launch in reversed(self._launches):
             launch.stop()
         if self._master is not None:
             self._master.stop()
+        # roslaunch starts master and nodes in sessions of their own: they outlive one that had to be killed.
+        for process in self.processes():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
         with contextlib.suppress(OSError):
             self._folder.cleanup()
+
+    def processes(self) -> list[int]:
+        """The processes that run with this session's environment, whoever started them."""
+        mark = f"ROS_HOME={self.env['ROS_HOME']}".encode()
+        found = []
+        for folder in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):  # ended meanwhile, or another user's
+                if mark in (folder / "environ").read_bytes().split(b"\0") and int(folder.name) != os.getpid():
+                    found.append(int(folder.name))
+        return found
 
     def _master_answers(self) -> bool:
         return rosgraph.is_master_online(self.env["ROS_MASTER_URI"])
