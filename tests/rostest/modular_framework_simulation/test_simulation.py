@@ -71,6 +71,7 @@ class FakePlanningScene:
         self.lock = threading.Lock()
         self.objects: dict[str, Any] = {}
         self.poses: dict[str, Any] = {}
+        self.colours: dict[str, Any] = {}
         self.refuse = False
         self.services = [rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply),
                          rospy.Service("/get_planning_scene", GetPlanningScene, self.read)]
@@ -79,6 +80,7 @@ class FakePlanningScene:
         if self.refuse:
             return ApplyPlanningSceneResponse(False)
         with self.lock:
+            self.colours |= {item.id: item.color for item in request.scene.object_colors}
             for item in request.scene.world.collision_objects:
                 if item.operation == CollisionObject.REMOVE:
                     self.objects.pop(item.id, None)
@@ -296,6 +298,8 @@ def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -
         assert block.header.frame_id == "world"
         assert list(block.primitives[0].dimensions) == pytest.approx([0.05, 0.05, 0.1])
         assert len(scene.objects["ground_plane__link"].planes) == 1
+        red = scene.colours["can__link"]  # as in the can's model.sdf
+        assert (red.r, red.g, red.b, red.a) == pytest.approx((0.75, 0.12, 0.12, 1.0))
         assert spawn("ball", 0.25, 0.65, 0.88).success
         until(lambda: "ball__link" in scene.objects, "the new ball")
         away = ModelState(model_name="ball", pose=Pose(Point(-0.2, 0.7, 0.88), Quaternion(0, 0, 0, 1)))

@@ -21,8 +21,8 @@ from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
 from modular_framework_planning.spatial import Array, Transform
 
-OBJECT_COLOR = (0.45, 0.75, 0.35, 0.8)
-ATTACHED_COLOR = (0.75, 0.3, 0.75, 0.9)
+OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz draws transparent markers in no order of depth
+ATTACHED_COLOR = (0.75, 0.3, 0.75, 1.0)
 GHOST_COLOR = (1.0, 0.6, 0.1)
 INTERMEDIATE_GHOSTS = 3
 LINE_POINTS = 60

@@ -14,8 +14,15 @@ import time
 import rosgraph
 import rospy
 from geometry_msgs.msg import Pose as PoseMsg
-from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneComponents
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    ObjectColor,
+    PlanningScene,
+    PlanningSceneComponents,
+)
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
+from std_msgs.msg import ColorRGBA
 
 from modular_framework_simulation import conversions, ros_names
 from modular_framework_simulation.errors import SimulationError
@@ -180,6 +187,8 @@ class PlanningScenePublisher:
         model, link = change.key
         identity = conversions.collision_object_id(model, link)
         attached, world = scene.robot_state.attached_collision_objects, scene.world.collision_objects
+        if isinstance(change, Put | Attach) and change.link.visuals:
+            scene.object_colors.append(ObjectColor(identity, ColorRGBA(*change.link.visuals[0].colour)))
         match change:
             case Put(link=spec, pose_in_world=pose):
                 world.append(conversions.link_to_collision_object(model, spec, ros_names.WORLD_FRAME, pose))
