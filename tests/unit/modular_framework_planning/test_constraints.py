@@ -153,6 +153,30 @@ def test_random_states_are_projected_upright_and_stay_within_bounds(model: Robot
     assert solved >= 95
 
 
+def test_a_pose_within_tolerances_of_goals_is_found_from_one_nearby(model: RobotModel) -> None:
+    """The rotation is right at the start: a step towards the position must not turn the link away for the next step."""
+    rng = np.random.default_rng(5)
+    indices = model.group("arm_and_manipulator").indices
+    solved = 0
+    for _ in range(50):
+        goal = random_state(model, rng)
+        start = goal.copy()
+        start[indices] += rng.uniform(-0.15, 0.15, len(indices))
+        start[indices] = np.clip(start[indices], model.lower[indices], model.upper[indices])
+        wanted, turned = model.link_transforms(goal)[TIP], model.link_transforms(start)[TIP].rotation
+        spot = (SphereSolid(1e-4), pin.SE3(np.eye(3), wanted.translation))
+        constraints = KinematicConstraints(
+            model, positions=[PositionConstraint(on_link(model), np.zeros(3), WORLD, (spot,))],
+            orientations=[OrientationConstraint(on_link(model), WORLD, turned, np.full(3, 1e-3))])
+        found = constraints.project(start, indices)
+        if found is not None:
+            solved += 1
+            reached = model.link_transforms(found)[TIP]
+            assert np.linalg.norm(reached.translation - wanted.translation) < 1.1e-4
+            assert np.linalg.norm(pin.log3(turned.T @ reached.rotation)) < 2e-3
+    assert solved >= 40, solved  # some of these poses are out of reach
+
+
 def test_a_state_that_satisfies_is_left_where_it_is(model: RobotModel) -> None:
     constraints = KinematicConstraints(model, orientations=[upright(model, Parameterization.ROTATION_VECTOR, WORLD)])
     indices = model.group("arm_and_manipulator").indices

@@ -6,7 +6,6 @@ several regions, the rotation of a link within a tolerance about each axis.
 """
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -20,6 +19,7 @@ from modular_framework_planning.spatial import Array, Transform
 SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
 INSIDE = 1.0e-5  # [m]; projections aim this far inside a region, not at its border
 INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight ways between two states bulge
+TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
 Row = tuple[Array, float]  # one linearised condition: (joint velocities -> change, change that is wanted)
 
 
@@ -95,9 +95,9 @@ class JointConstraint:
                 f"+{self.above:.4f}")
         return ConstraintResult("joint", self.name, kept, self.weight * abs(value), text)
 
-    def rows(self, *_: Any) -> Iterator[Row]:
-        """Yields nothing: a projection keeps joints within their tolerance by clipping."""
-        return iter(())
+    def conditions(self, *_: Any) -> tuple[bool, list[Row]]:
+        """Returns no condition: a projection keeps joints within their tolerance by clipping."""
+        return False, []
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +116,8 @@ class PositionConstraint:
     regions: tuple[tuple[Solid, Transform], ...]
     weight: float = 1.0
 
-    def _gap(self, data: Any) -> tuple[float, Array, Array, Transform]:
-        """Returns distance to the closest region, the point there, the point in the region's frame, its pose."""
+    def _gap(self, data: Any) -> tuple[float, Array, Array, Transform, Solid]:
+        """Returns distance to the closest region, the point there, the point in the region's frame, its pose, it."""
         point = self.link.pose(data).act(self.offset)
         reference = self.reference.pose(data)
         best = None
@@ -127,28 +127,31 @@ class PositionConstraint:
             nearest = solid.nearest(inside)
             distance = float(np.linalg.norm(nearest - inside))
             if best is None or distance < best[0]:
-                best = (distance, nearest, inside, region)
+                best = (distance, nearest, inside, region, solid)
         assert best is not None, "a position constraint has at least one region"
         return best
 
     def evaluate(self, data: Any, _: Array) -> ConstraintResult:
         """Returns the verdict on the state whose joint placements `data` holds."""
-        distance, _nearest, inside, _region = self._gap(data)
+        distance, _nearest, inside, _region, _solid = self._gap(data)
         text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
         return ConstraintResult("position", self.link.name, distance <= SLACK,
                                 self.weight * float(np.linalg.norm(inside)), text)
 
-    def rows(self, model: Any, data: Any) -> Iterator[Row]:
-        """Yields the condition that brings the point into the region; `data` holds the joint Jacobians."""
-        distance, nearest, inside, region = self._gap(data)
-        if distance <= SLACK:
-            return
-        depth = float(np.linalg.norm(nearest))
-        aim = nearest * (1.0 - min(INSIDE / depth, 0.5)) if depth > 0.0 else nearest
-        wanted = region.rotation @ (aim - inside)
-        point, size = region.act(inside), float(np.linalg.norm(wanted))
+    def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
+        """Returns whether the point is outside, and what brings or keeps it inside; `data` holds joint Jacobians."""
+        distance, nearest, inside, region, solid = self._gap(data)
+        violated, tight = distance > SLACK, solid.extent <= TIGHT
+        if not (violated or tight):
+            return False, []
+        point = region.act(inside)
         speed = self.link.jacobian_at(model, data, point)[:3] - self.reference.jacobian_at(model, data, point)[:3]
-        yield wanted / size @ speed, size
+        if tight:
+            return violated, list(zip(speed, (region.translation - point).tolist(), strict=True))
+        depth = float(np.linalg.norm(nearest))
+        wanted = region.rotation @ (nearest * (1.0 - min(INSIDE / depth, 0.5)) - inside if depth > 0.0 else -inside)
+        size = float(np.linalg.norm(wanted))
+        return violated, [(wanted / size @ speed, size)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,12 +190,17 @@ class OrientationConstraint:
                 f"is {np.array2string(self.tolerances, precision=4)}")
         return ConstraintResult("orientation", self.link.name, excess <= SLACK, self.weight * float(angles.sum()), text)
 
-    def rows(self, model: Any, data: Any) -> Iterator[Row]:
-        """Yields one condition per axis that is off; `data` holds the joint Jacobians."""
+    def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
+        """Returns whether the rotation is off, and a condition per axis that brings or keeps it within the tolerances;
+        `data` holds the joint Jacobians.
+        """
         angles, turned = self.deviation(data)
-        if float((np.abs(angles) - self.tolerances).max()) <= SLACK:
-            return
-        limits = INNER_SHARE * self.tolerances
+        tight = self.tolerances <= TIGHT
+        violated = float((np.abs(angles) - self.tolerances).max()) > SLACK
+        limits = np.where(tight, 0.0, INNER_SHARE * self.tolerances)
+        chosen = np.flatnonzero(tight | (violated & (np.abs(angles) > limits)))
+        if not len(chosen):
+            return violated, []
         reference = self.reference.pose(data)
         where = self.link.pose(data).translation
         spin = (self.link.jacobian_at(model, data, where) - self.reference.jacobian_at(model, data, where))[3:]
@@ -201,8 +209,8 @@ class OrientationConstraint:
             rates = self.target @ pin.Jlog3(turned) @ turned.T @ in_target
         else:
             rates = _euler_rates(angles) @ in_target
-        for number in np.flatnonzero(np.abs(angles) > limits):
-            yield rates[number], float(np.clip(angles[number], -limits[number], limits[number]) - angles[number])
+        aims = np.clip(angles, -limits, limits) - angles
+        return violated, [(rates[number], float(aims[number])) for number in chosen]
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random rotation within the tolerances, in the reference frame, shape (3, 3)."""

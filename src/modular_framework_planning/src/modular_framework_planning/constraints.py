@@ -129,9 +129,10 @@ class KinematicConstraints:
         for _ in range(steps):
             current = self.model.with_mimics(current, members)
             pin.computeJointJacobians(self.model.pin_model, self._data, current)
-            rows = [row for item in self._all for row in item.rows(self.model.pin_model, self._data)]
-            if not rows:
+            found = [item.conditions(self.model.pin_model, self._data) for item in self._all]
+            if not any(violated for violated, _ in found):
                 return current if self.satisfied(current) else None
+            rows = [row for _, conditions in found for row in conditions]
             rates = self._group_rates(np.array([row[0] for row in rows]), chosen)
             step = _bounded_step(rates, np.array([row[1] for row in rows]), current[chosen], lower, upper)
             current[chosen] = np.clip(current[chosen] + step, lower, upper)
