@@ -20,6 +20,7 @@ from modular_framework_control.controller_manager import ControllerManager
 from modular_framework_control.goal_ticket import GoalStatus
 from modular_framework_control.hardware_interface import COMMAND_INTERFACES
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
+from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.mock_robot_hw import MockRobotHW
 from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.real_time import run_in_real_time
@@ -37,6 +38,7 @@ from modular_framework_simulation.robot_description import read_robot
 
 PERIOD_S = 0.008
 READY_S = 60.0
+LONGEST_STEP_S = 0.05    # as in the node robot_hw: a loop that was held up for longer goes on later
 START = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
             "effort": "EffortJointInterface", "pos_vel": "PosVelJointInterface",
@@ -62,6 +64,7 @@ class Rig:
         running: name of the controller that runs.
         positions, velocities: measured in the last cycle, shape (joints,).
         fastest, braking: limits of the joints, shape (joints,).
+        longest_gap_s: how late the latest cycle began, because of what else the computer did [s]; 0 in simulated time.
     """
 
     def __init__(self, name: str, hw: RobotHW, parameters: dict[str, Any], lag_s: float) -> None:
@@ -80,6 +83,7 @@ class Rig:
         self.lowest = np.array([limit.min_position for limit in limits])
         self.highest = np.array([limit.max_position for limit in limits])
         self.running = "hold"
+        self.longest_gap_s = 0.0
         self._measure()
 
     def start(self) -> None:
@@ -163,9 +167,11 @@ class RealTimeRig(Rig):
     def __init__(self, arm: EmulatedArm) -> None:
         self._arm = arm
         self._due_s = time.monotonic()
+        self._loop_time = LoopTime()
+        self._loop_time.longest_step_s = LONGEST_STEP_S
         super().__init__("ur_emulator", UrArmHardware(), _parameters({"robot_ip_address": arm.address}, "position"),
                          0.06)
-        self.time_s = time.monotonic()
+        self.time_s = self._loop_time.now()
         run_in_real_time()
         deadline_s = time.monotonic() + READY_S
         while not getattr(self.hw, "ready", False):
@@ -176,7 +182,8 @@ class RealTimeRig(Rig):
     def _next_cycle(self) -> float:
         self._due_s = max(self._due_s + PERIOD_S, time.monotonic())
         time.sleep(max(0.0, self._due_s - time.monotonic()))
-        before_s, self.time_s = self.time_s, time.monotonic()
+        before_s, self.time_s = self.time_s, self._loop_time.now()
+        self.longest_gap_s = max(self.longest_gap_s, time.monotonic() - self._due_s)
         return max(0.0, self.time_s - before_s)
 
     def close(self) -> None:

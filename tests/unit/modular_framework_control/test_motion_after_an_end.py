@@ -2,7 +2,9 @@
 """However a motion ends, the joints stop within their braking distance, and the next valid goal succeeds."""
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -216,3 +218,69 @@ def test_a_joint_outside_its_range_may_come_back(make_loop: Callable[..., Any]) 
     back = send(loop, (1.0, (6.0, 0.0), (0.0, 0.0)))
     loop.run(1.1)
     assert back.status is GoalStatus.SUCCEEDED and positions(loop)[0] == pytest.approx(6.0)
+
+
+class LateRobotHW(WalledRobotHW):
+    """Fake hardware that follows commands a cycle late, and measures angles between -pi and pi."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._under_way: list[float] = []
+
+    def read(self, time_s: float, period_s: float) -> None:
+        self._sent, self._under_way = self._under_way or self._sent, self._sent
+        before = [joint.position for joint in self.joints]
+        super().read(time_s, period_s)
+        for joint, then in zip(self.joints, before, strict=True):
+            joint.state.velocity = math.remainder(joint.position - then, 2.0 * math.pi) / period_s
+            joint.state.position = math.remainder(joint.position, 2.0 * math.pi)
+
+
+@pytest.fixture
+def late_loop(make_loop: Callable[..., Any]) -> Any:
+    endless = {"has_position_limits": False, "angle_wraparound": True, "has_velocity_limits": True,
+               "max_velocity": FASTEST}
+    loop = make_loop({"hw": {"joints": list(JOINTS)}, "joint_limits": dict.fromkeys(JOINTS, endless),
+                      **{name: {"type": "position_controllers/JointTrajectoryController", "joints": list(JOINTS),
+                                "stop_trajectory_duration": stop_s} for name, stop_s in (("c", 0.1), ("hold", 0.0))}},
+                     LateRobotHW())
+    loop.manager.load_controller("hold")
+    loop.spawn("c")
+    return loop
+
+
+def test_on_a_ramp_a_joint_that_follows_late_never_turns_back(late_loop: Any) -> None:
+    ticket = send(late_loop, (4.0, (0.8, 0.0), (0.0, 0.0)))
+    late_loop.run(2.0)
+    late_loop.controllers["c"].cancel(ticket)
+    seen = []
+    for _ in range(40):
+        late_loop.step()
+        seen.append(positions(late_loop)[0])
+    assert all(after >= before - 1e-9 for before, after in pairwise(seen))
+    assert seen[-1] == seen[-10]
+
+
+def test_a_ramp_at_a_wall_begins_with_no_more_than_the_last_command(late_loop: Any) -> None:
+    late_loop.robot_hw.wall = 0.26
+    ticket = send(late_loop, (1.0, (0.8, 0.0), (0.0, 0.0)))
+    late_loop.run(0.5)
+    late_loop.controllers["c"].cancel(ticket)
+    late_loop.run(0.5)
+    assert 0.26 < late_loop.controllers["c"].desired_at(late_loop.time_s)[0, 0] < 0.28
+
+
+@pytest.mark.parametrize("name", ["c", "hold"])
+def test_a_joint_without_end_is_stopped_in_the_turn_in_which_it_is_commanded(late_loop: Any, name: str) -> None:
+    assert name == "c" or late_loop.switch([name], ["c"]) is None
+    late_loop.controllers["c"] = late_loop.controllers[name]
+    for target in (3.0, 4.5):
+        ticket = send(late_loop, (2.0, (target, 0.0), (0.0, 0.0)))
+        late_loop.run(2.1 if target == 3.0 else 1.0)
+    assert positions(late_loop)[0] < -2.0, "measured a turn below its command"
+    late_loop.controllers["c"].cancel(ticket)
+    before = late_loop.robot_hw.joints[0].command
+    late_loop.run(0.5)
+    assert before > 3.5 and late_loop.robot_hw.joints[0].command == pytest.approx(before, abs=0.1)
+    assert late_loop.switch([], [name]) is None
+    assert late_loop.robot_hw.joints[0].command == pytest.approx(before, abs=0.1)
