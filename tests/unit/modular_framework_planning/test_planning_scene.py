@@ -147,6 +147,8 @@ def test_a_matrix_that_is_not_square_is_refused() -> None:
     (lambda: Cylinder(0.0, 0.1), "height is 0.0"), (lambda: Plane(0, 0, 0, 1), "no normal"),
     (lambda: Mesh(np.zeros((3, 3)), np.array([[0, 1, 7]])), "names vertex 7"),
     (lambda: Mesh(np.zeros((0, 3)), np.zeros((0, 3))), "0 vertices"),
+    (lambda: Box(1.0, 1.0e30, 1.0), r"y is 1e\+30 m; .* up to 10000 m"),
+    (lambda: Mesh(np.eye(3) * 1.0e30, np.array([[0, 1, 2]])), "beyond all reach; .* 10000 m"),
     (lambda: make_transform((0, 0, 0), (0, 0, 0, 0)), "length 0"),
     (lambda: make_transform((0, float("nan"), 0), (0, 0, 0, 1)), "not finite"),
 ])

@@ -278,6 +278,8 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
         (lift_robot_urdf().replace("<mimic joint=\"slide_1\"", "<mimic joint=\"slide_2\""),
          "'slide_2': it mimics itself through slide_2 -> slide_2; a joint may mimic one of lift, slide_1"),
         (lift_robot_urdf().replace("<mimic joint=\"slide_1\"", "<mimic joint=\"knee\""), "'knee', which is no joint"),
+        ("<robot name='r'><link name='a'><collision><geometry><box size='1 1e30 1'/></geometry></collision></link>"
+         "</robot>", "link 'a', <box size=...>: got '1 1e30 1'; allowed: lengths of at most 10000 m"),
     ],
 )
 def test_a_faulty_robot_description_is_refused(urdf: str, said: str, tmp_path: Path) -> None:

@@ -153,6 +153,12 @@ def test_a_joint_without_limits_turns_without_end() -> None:
         ),
         (
             "<link name='l'><collision name='c'><geometry>"
+            "\n<box><size>1 1e30 1</size></box></geometry></collision></link>",
+            3,
+            ["<size>", "1e30", "at most 10000 m"],
+        ),
+        (
+            "<link name='l'><collision name='c'><geometry>"
             "\n<box><size>0 1 1</size></box></geometry></collision></link>",
             3,
             ["<size>", "greater than 0"],

@@ -12,14 +12,16 @@ import numpy as np
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.spatial import Array
 from modular_framework_planning.voxel_map import VoxelMap
+from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 
 MAX_TRIANGLES = 2_000_000
 
 
 def _require_positive(kind: str, **dimensions: float) -> None:
     for name, value in dimensions.items():
-        if not np.isfinite(value) or value <= 0.0:
-            raise GeometryError(f"{kind}: {name} is {value}; it must be a finite length above 0 m")
+        if not 0.0 < value <= LARGEST_LENGTH_M:
+            raise GeometryError(f"{kind}: {name} is {value} m; allowed are lengths above 0 m and up to "
+                                f"{LARGEST_LENGTH_M:g} m; use a plane for what has no end")
 
 
 class Shape:
@@ -139,8 +141,9 @@ class Mesh(Shape):
                                 "at least 3 vertices and 1 triangle are needed")
         if count > MAX_TRIANGLES:
             raise GeometryError(f"mesh: {count} triangles; allowed are {MAX_TRIANGLES}; simplify the mesh")
-        if not np.isfinite(self.vertices).all():
-            raise GeometryError("mesh: a vertex is not finite; every coordinate must be finite")
+        if not (np.abs(self.vertices) <= LARGEST_LENGTH_M).all():
+            raise GeometryError("mesh: a vertex is not finite or beyond all reach; allowed are coordinates of at most "
+                                f"{LARGEST_LENGTH_M:g} m")
         if int(np.min(self.triangles)) < 0 or int(np.max(self.triangles)) >= len(self.vertices):
             raise GeometryError(f"mesh: a triangle names vertex {int(np.max(self.triangles))}; "
                                 f"allowed are 0..{len(self.vertices) - 1}")

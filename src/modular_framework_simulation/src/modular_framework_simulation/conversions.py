@@ -17,9 +17,10 @@ from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.mesh_files import load_mesh
 from modular_framework_simulation.poses import Pose, normalised_quaternion
 from modular_framework_simulation.simulated_body import BodyState, Twist
+from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
-LARGEST_COORDINATE_M = 1e4
+LARGEST_COORDINATE_M = LARGEST_LENGTH_M
 LARGEST_VELOCITY = 1e3
 """Beyond these the physics engine loses its numbers; larger ones in requests are refused [m/s, rad/s]."""
 

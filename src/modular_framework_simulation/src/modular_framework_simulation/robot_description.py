@@ -7,6 +7,7 @@ a fraction of the time and computes contacts faster.
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from modular_framework_simulation.mesh_files import ConvexParts
 from modular_framework_simulation.sdf_resources import PackageFinder
 from modular_framework_simulation.sdf_specs import Mesh
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mimics import Mimic, resolved
 
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
@@ -179,6 +181,7 @@ def _rewrite_meshes(
         for shape in link.findall("collision") + link.findall("visual"):
             mesh = shape.find("geometry/mesh")
             if mesh is None:
+                _require_sizes(link.get("name", ""), shape)
                 continue
             path = mesh_path(link.get("name", ""), mesh.get("filename", ""), find_package)
             if shape.tag == "visual":
@@ -187,6 +190,19 @@ def _rewrite_meshes(
             x, y, z = (float(value) for value in mesh.get("scale", "1 1 1").split())
             mesh.set("filename", str(convex_parts.hull(Mesh(path, (x, y, z)))))
             mesh.attrib.pop("scale", None)
+
+
+def _require_sizes(link: str, shape: ElementTree.Element) -> None:
+    """Refuses primitives that are larger than the engine can place to the millimetre."""
+    for element in shape.findall("geometry/*"):
+        for key, text in ((key, element.get(key)) for key in ("size", "radius", "length")):
+            try:
+                largest = max((abs(float(word)) for word in (text or "").split()), default=0.0)
+            except ValueError:
+                largest = math.inf
+            if not largest <= LARGEST_LENGTH_M:
+                where = f"robot_description: <{shape.tag}> of link '{link}', <{element.tag} {key}=...>"
+                raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {LARGEST_LENGTH_M:g} m")
 
 
 def _give_frames_no_weight(root: ElementTree.Element) -> None:

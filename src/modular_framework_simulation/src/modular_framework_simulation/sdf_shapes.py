@@ -11,6 +11,7 @@ from modular_framework_simulation.poses import Pose
 from modular_framework_simulation.sdf_frames import pose_of
 from modular_framework_simulation.sdf_resources import Resources
 from modular_framework_simulation.xml_nodes import XmlNode
+from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
 
 SUPPORTED_VERSIONS = ("1.4", "1.5", "1.6", "1.7")
@@ -85,12 +86,12 @@ def _read_geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
     shape = shapes[0]
     match shape.tag:
         case "box":
-            x, y, z = _positive(shape.require("size"), 3)
+            x, y, z = _sizes(shape.require("size"), 3)
             return specs.Box((x, y, z))
         case "cylinder":
-            return specs.Cylinder(_positive(shape.require("radius"), 1)[0], _positive(shape.require("length"), 1)[0])
+            return specs.Cylinder(_sizes(shape.require("radius"), 1)[0], _sizes(shape.require("length"), 1)[0])
         case "sphere":
-            return specs.Sphere(_positive(shape.require("radius"), 1)[0])
+            return specs.Sphere(_sizes(shape.require("radius"), 1)[0])
         case "plane":
             return _read_plane(shape)
         case "mesh":
@@ -146,4 +147,11 @@ def _positive(node: XmlNode, count: int) -> tuple[float, ...]:
     values = node.numbers(count)
     if min(values) <= 0:
         raise DescriptionError(node.where, f"got '{node.text.strip()}'", "allowed: greater than 0")
+    return values
+
+
+def _sizes(node: XmlNode, count: int) -> tuple[float, ...]:
+    values = _positive(node, count)
+    if max(values) > LARGEST_LENGTH_M:
+        raise DescriptionError(node.where, f"got '{node.text.strip()}'", f"allowed: at most {LARGEST_LENGTH_M:g} m")
     return values

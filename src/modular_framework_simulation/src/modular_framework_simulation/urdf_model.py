@@ -10,6 +10,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.poses import Pose
 from modular_framework_simulation.sdf_resources import Resources
 from modular_framework_simulation.xml_nodes import XmlNode, parse_numbers, parse_xml
+from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 
 _GEOMETRIES = ("box", "cylinder", "sphere", "mesh")
 
@@ -114,6 +115,9 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
         values = parse_numbers(shape.where, shape.attributes.get(attribute, default), count)
         if min(values) <= 0:
             raise DescriptionError(shape.where, f"got {attribute}='{values}'", "allowed: greater than 0")
+        if attribute != "scale" and max(values) > LARGEST_LENGTH_M:
+            problem = f"got {attribute}='{shape.attributes.get(attribute)}'"
+            raise DescriptionError(shape.where, problem, f"allowed: at most {LARGEST_LENGTH_M:g} m")
         return values
 
     match shape.tag:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from modular_framework_urdf import collada
 from modular_framework_urdf.declared_triangles import FORMATS, declared_triangles, with_absolute_indices
+from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 
 ALLOWED = (*FORMATS, "dae")
 Scale = tuple[float, float, float]
@@ -65,6 +66,9 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
     if not np.isfinite(vertices).all():
         raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; mend the file")
     vertices, triangles = _merged(vertices * (unit * factors), triangles)
+    if np.abs(vertices).max() > LARGEST_LENGTH_M:
+        raise MeshError(path, f"a vertex is {np.abs(vertices).max():.3g} m from the origin", "allowed: at most "
+                        f"{LARGEST_LENGTH_M:g} m; mend the file, its unit or the scale")
     return TriangleMesh(vertices, triangles if np.prod(factors) > 0.0 else np.ascontiguousarray(triangles[:, ::-1]))
 
 
