@@ -9,12 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 from independent_checker import IndependentChecker, box
 
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.goals import GoalResolver
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.last_check import GRACE_S, LastCheck
+from modular_framework_planning.motion_check import MotionChecker
 from modular_framework_planning.ompl_planning import OmplPlanner
 from modular_framework_planning.path_repair import EdgeError, repaired
 from modular_framework_planning.pilz.command_planner import CommandPlanner
@@ -23,7 +26,7 @@ from modular_framework_planning.planner_interface import PlannedPath, PlanningPr
 from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningRequest
 from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
+from modular_framework_planning.shapes import Box, Mesh
 from modular_framework_planning.time_parameterization import parameterize
 from modular_framework_planning.urdf_document import package_resolver
 
@@ -169,3 +172,46 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
     assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
     with pytest.raises(EdgeError, match="edge 1 of 2"):
         Stubborn.repaired(problem, np.array([START, GOAL, START]))
+
+
+def sphere_mesh(subdivisions: int) -> Mesh:
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.1)
+    return Mesh(np.asarray(ball.vertices, dtype=float), np.asarray(ball.faces, dtype=np.int64))
+
+
+def test_the_allowed_time_covers_building_the_world_and_what_was_built_is_kept(
+        model: RobotModel, pool: KinematicsPool) -> None:
+    asked = request(model, board=False)
+    meshes = [sphere_mesh(3) for _ in range(3)]
+    scene = asked.scene
+    for number, mesh in enumerate(meshes):
+        at = pin.SE3(np.eye(3), np.array([1.5, 0.3 * number, 1.0]))
+        scene = scene.with_object(CollisionObject(f"ball{number}", at, ((mesh, pin.SE3.Identity()),)))
+    pipeline = PlanningPipeline(model, pool, PipelineSettings(seed=1))
+    with pytest.raises(PlanningError, match="collision world of 3 objects was not built") as caught:
+        pipeline.plan(replace(asked, scene=scene, allowed_time_s=1e-6))
+    assert caught.value.code == ErrorCode.TIMED_OUT
+    assert np.allclose(pipeline.plan(replace(asked, scene=scene)).trajectory.positions[-1], GOAL)
+    assert all("geometry" not in vars(mesh) for mesh in meshes), "Coal's tree is not built for what is far away"
+
+
+def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel, pool: KinematicsPool) -> None:
+    asked = request(model)
+    indices = model.group(GROUP).indices
+    checker = CollisionChecker(asked.scene, indices)
+    motion = MotionChecker(checker, indices, asked.scene.positions)
+    free, hit = request(model, START).goals, JointGoal(dict(zip(model.group(GROUP).joints, (
+        1.57, 0.6, 0.0, 0.0, 0.0, 0.0), strict=True)))
+
+    def found(*goals: object) -> np.ndarray:
+        return GoalResolver(replace(asked, goals=goals), model.group(GROUP), pool, checker, motion,
+                            np.random.default_rng(1), None, lambda: True).resolve()
+
+    assert len(found(*free, hit, hit)) == 1
+    block = CollisionObject("block", pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), (
+        (Box(3.0, 3.0, 3.0), pin.SE3.Identity()),))
+    checker = CollisionChecker(asked.scene.with_object(block), indices)
+    motion = MotionChecker(checker, indices, asked.scene.positions)
+    with pytest.raises(PlanningError, match="1 of 3 alternatives were looked at.*'block'") as caught:
+        found(hit, hit, *free)
+    assert caught.value.code == ErrorCode.TIMED_OUT

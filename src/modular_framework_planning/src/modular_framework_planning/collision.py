@@ -5,7 +5,7 @@ A state is called free only where every pair of bodies was proved apart, or wher
 """
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -73,6 +73,14 @@ class CollisionChecker:
     @cached_property
     def _compiled(self) -> CompiledWorld:
         return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
+
+    def build(self, go_on: Callable[[], None]) -> None:
+        """Builds now what the first question would build: seconds for 100,000 triangles.
+
+        Args:
+            go_on: called between shapes; raises an exception to end the work. What was built is kept.
+        """
+        self._compiled = compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving], go_on)
 
     @property
     def world(self) -> World:

@@ -35,16 +35,20 @@ class PlacedGeometry:
     Attributes:
         joint_id: Pinocchio's number of the joint it hangs on, 0 for the world.
         placement: pose in that joint's frame.
-        geometry: Coal's geometry; source: the shape it was made from, which never changes.
+        source: the shape, which never changes.
         margin: distance it keeps from bodies of the world [m].
     """
 
     body: Body
     joint_id: int
     placement: Transform
-    geometry: Any
     source: Shape
     margin: float
+
+    @property
+    def geometry(self) -> Any:
+        """Coal's geometry, built when it is first asked for."""
+        return self.source.geometry
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +64,7 @@ class WatchedPair:
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     """Returns every collision geometry of a scene: links, held objects, then the world."""
     model = scene.model
-    result = [PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.geometry, item.shape,
+    result = [PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape,
                              float(margin))
               for item, margin in zip(model.link_geometries, scene.link_margins(), strict=True)]
     for held in scene.attached.values():
@@ -68,11 +72,11 @@ def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
         body = Body(held.name, ATTACHED, held.link, held.touch_links)
         for shape, pose in held.body.shapes:
             placement = frame.placement * held.body.pose * pose
-            result.append(PlacedGeometry(body, frame.parentJoint, placement, shape.geometry, shape,
+            result.append(PlacedGeometry(body, frame.parentJoint, placement, shape,
                                          scene.held_margin()))
     for thing in scene.obstacles():
         for shape, pose in thing.shapes:
-            result.append(PlacedGeometry(Body(thing.name, WORLD), 0, thing.pose * pose, shape.geometry, shape, 0.0))
+            result.append(PlacedGeometry(Body(thing.name, WORLD), 0, thing.pose * pose, shape, 0.0))
     return result
 
 

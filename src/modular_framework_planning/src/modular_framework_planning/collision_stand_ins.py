@@ -87,18 +87,19 @@ def stand_in(part: PlacedGeometry) -> StandIn:
     with _lock:
         found = _of_shapes.get(part.source)
         if found is None:
-            found = _of_shapes[part.source] = _make(part.geometry, part.source)
+            found = _of_shapes[part.source] = _make(part.source)
         return found
 
 
-def _make(geometry: Any, source: Any) -> StandIn:
+def _make(source: Shape) -> StandIn:
     if isinstance(source, Octree):
         points = np.tile(source.centers, 3)
         return StandIn(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
+    if isinstance(source, Mesh):
+        vertices, faces = np.asarray(source.vertices, dtype=float), np.asarray(source.triangles, dtype=np.int64)
+        return StandIn(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
+    geometry = source.geometry
     match geometry:
-        case coal.BVHModelBase() if isinstance(source, Mesh):
-            triangles = np.asarray(source.vertices, dtype=float)[np.asarray(source.triangles)].reshape(-1, 9)
-            return StandIn(lambda: triangles, is_closed=_is_closed(triangles))
         case coal.Box():
             x, y, z = (float(value) for value in geometry.halfSide)
             return StandIn(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
@@ -142,10 +143,14 @@ def _surface(triangles: Array) -> Surfaces:
     return Surfaces(spheres, boxes, links, triangles)
 
 
-def _is_closed(triangles: Array) -> bool:
+def _is_closed(vertices: Array, faces: Any) -> bool:
     """Whether every edge is passed as often in one direction as in the other: then the surface has an inside."""
-    _, corners = np.unique(np.round(triangles.reshape(-1, 3), 7), axis=0, return_inverse=True)
-    faces = corners.reshape(-1, 3).astype(np.int64)
+    order = np.lexsort(np.round(vertices, 7).T)
+    ranked = np.round(vertices[order], 7)
+    ranks = np.concatenate([[0], np.cumsum((np.diff(ranked, axis=0) != 0.0).any(axis=1))])
+    corners = np.empty(len(vertices), dtype=np.int64)
+    corners[order] = ranks
+    faces = corners[faces]
     starts, ends = faces.ravel(), faces[:, [1, 2, 0]].ravel()
     size = int(faces.max()) + 1
     return bool(np.array_equal(np.sort(starts * size + ends), np.sort(ends * size + starts)))

@@ -2,7 +2,7 @@
 """Puts the bodies of a scene and the pairs to watch into the arrays that compiled collision checks work on."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
@@ -18,7 +18,7 @@ from modular_framework_planning.compiled_distance import SURFACE
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.spatial import Array
 
-KEPT_MODELS, KEPT_GROUPINGS = 4, 16
+KEPT_MODELS, KEPT_GROUPINGS, KEPT_SCENES = 4, 16, 2
 Grouping = tuple[tuple[int, ...], ...]
 
 
@@ -55,7 +55,7 @@ def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
     """Stand-ins of all link geometries; surfaces without a closed form are moved into their joints' frames."""
     result = []
     for item in model.link_geometries:
-        part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.geometry, item.shape, 0.0)
+        part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.shape, 0.0)
         shape = stand_in(part)
         if shape.kind == SURFACE and shape.corners is not None:
             shape = StandIn(partial(moved, shape.corners(), item.placement * shape.offset), is_closed=shape.is_closed)
@@ -110,18 +110,24 @@ def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[
     return tuple(tuple(group) for group in groups.values())
 
 
-def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> CompiledWorld:
-    """Builds the arrays.
+def _go_on() -> None:
+    """Lets a world be built however long that takes."""
+
+
+def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
+                  go_on: Callable[[], None] = _go_on) -> CompiledWorld:
+    """Builds the arrays. What was built for a shape is kept as long as the shape.
 
     Args:
         model: the robot.
         parts: geometries of the scene, the model's links first.
         pairs: the pairs to watch; those that no joint moves should not be among them.
+        go_on: called between shapes; raises an exception to end the work.
     """
     groups = _groups(model, parts, pairs)
     robot, roots = _link_surfaces(model, groups)
     members, place = _link_members(model, parts, groups, robot, roots)
-    scene = _add_others(model, parts, pairs, members, place)
+    scene = _add_others(model, parts, pairs, members, place, go_on)
     found: dict[tuple[int, int, float], list[int]] = {}
     uncompiled = []
     orders: dict[tuple[int, int], tuple[int, int] | None] = {}
@@ -158,15 +164,22 @@ def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Gr
 
 
 def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
-                members: list[_Member], place: dict[int, int]) -> Surfaces:
+                members: list[_Member], place: dict[int, int], go_on: Callable[[], None]) -> Surfaces:
     """Appends links in closed form, held objects and the world; returns the surfaces they need."""
     links = _link_stand_ins(model)
     watched = {number for pair in pairs for number in (pair.first, pair.second)}
     others = [number for number in sorted(watched) if number not in place]
-    shapes = [links[number] if number < len(links) else stand_in(parts[number]) for number in others]
+    shapes = []
+    for number in others:
+        shapes.append(links[number] if number < len(links) else stand_in(parts[number]))
+        go_on()
     wanted = _with_surface(dict(zip(others, shapes, strict=True)), parts, pairs)
-    surfaces, roots = stacked([shape.surface for number, shape in zip(others, shapes, strict=True)
-                               if number in wanted and shape.surface is not None])
+    found = []
+    for number, shape in zip(others, shapes, strict=True):
+        if number in wanted and shape.surface is not None:
+            found.append(shape)
+            go_on()
+    surfaces, roots = _scene_surfaces(tuple(found))
     remaining = iter(roots)
     for number, shape in zip(others, shapes, strict=True):
         root = next(remaining) if number in wanted and shape.corners is not None else -1
@@ -176,6 +189,13 @@ def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seque
         place[number] = len(members)
         members.append(_Member(shape, parts[number].joint_id - 1, pose, root, True, sphere))
     return surfaces
+
+
+@lru_cache(maxsize=KEPT_SCENES)
+def _scene_surfaces(shapes: tuple[StandIn, ...]) -> tuple[Surfaces, tuple[int, ...]]:
+    """Surfaces of a scene in one set of arrays; the next plan mostly has the same ones."""
+    together, roots = stacked([shape.surface for shape in shapes if shape.surface is not None])
+    return together, tuple(roots)
 
 
 def _with_surface(shapes: Mapping[int, StandIn], parts: Sequence[PlacedGeometry],

@@ -14,6 +14,7 @@ from modular_framework_planning.collision_bodies import ATTACHED, LINK, Body, Pl
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.spatial import Array, Transform
 
+ROUNDING = 1.0e-9  # [m]
 MOST_CONTACTS = 20  # of a pair, among which the deepest is told
 
 
@@ -49,12 +50,14 @@ class ExactCollision:
         self._model, self._parts, self._pairs = model, parts, pairs
         self._data = model.pin_model.createData()
         self._poses: dict[int, Any] = {}
+        self._balls: dict[int, tuple[Array, float]] = {}
         self._at: Array | None = None
 
     def _place(self, positions: Array) -> None:
         if self._at is None or not np.array_equal(positions, self._at):
             pin.forwardKinematics(self._model.pin_model, self._data, positions)
             self._poses.clear()
+            self._balls.clear()
             self._at = np.array(positions)
 
     def _pose(self, number: int) -> Any:
@@ -62,6 +65,19 @@ class ExactCollision:
             part = self._parts[number]
             self._poses[number] = _coal_transform(self._data.oMi[part.joint_id] * part.placement)
         return self._poses[number]
+
+    def _is_far(self, number: int) -> bool:
+        """Whether balls around both bodies are apart: then Coal need not build or ask anything."""
+        pair = self._pairs[number]
+        (one, radius), (other, reach) = (self._ball(which) for which in (pair.first, pair.second))
+        return float(np.linalg.norm(one - other)) > radius + reach + pair.margin + ROUNDING
+
+    def _ball(self, which: int) -> tuple[Array, float]:
+        if which not in self._balls:
+            part = self._parts[which]
+            centre, radius = part.source.bounding_sphere
+            self._balls[which] = (self._data.oMi[part.joint_id] * part.placement).act(centre), radius
+        return self._balls[which]
 
     def _collide(self, number: int, request: Any) -> Any:
         pair = self._pairs[number]
@@ -74,13 +90,16 @@ class ExactCollision:
     def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
         """Whether any of the pairs touches at these positions (of the whole robot)."""
         self._place(positions)
-        return any(self._collide(number, coal.CollisionRequest()).isCollision() for number in numbers)
+        return any(not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
+                   for number in numbers)
 
     def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
         """Returns those of the pairs that touch, each with its deepest contact."""
         self._place(positions)
         found = []
         for number in numbers:
+            if self._is_far(number):
+                continue
             if self._collide(number, coal.CollisionRequest()).isCollision():  # without contacts: much faster
                 result = self._collide(number, coal.CollisionRequest(coal.CONTACT, MOST_CONTACTS))
                 found.append((number, self._contact(number, result)))

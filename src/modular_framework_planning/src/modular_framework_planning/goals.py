@@ -6,6 +6,7 @@ How long it looks is bounded by numbers of samples, never by the clock, so that 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -31,8 +32,11 @@ class GoalResolver:
 
     def __init__(self, request: PlanningRequest, group: JointGroup, kinematics: KinematicsPool,
                  checker: CollisionChecker, motion: MotionChecker, rng: np.random.Generator,
-                 path_constraints: KinematicConstraints | None = None) -> None:
-        """Args: the request; its group; solvers; collision checks; random numbers; what goal states must satisfy."""
+                 path_constraints: KinematicConstraints | None = None,
+                 interrupted: Callable[[], bool] = lambda: False) -> None:
+        """Args: the request; its group; solvers; collision checks; random numbers; what goal states must satisfy; when
+        to stop looking at further goals."""
+        self._interrupted = interrupted
         self._request, self._group, self._kinematics = request, group, kinematics
         self._checker, self._motion, self._rng = checker, motion, rng
         self._path_constraints = path_constraints
@@ -50,7 +54,13 @@ class GoalResolver:
                                 "or a position and an orientation constraint")
         vectors: list[Array] = []
         failures: list[PlanningError] = []
-        for goal in self._request.goals:
+        for number, goal in enumerate(self._request.goals):
+            if number and self._interrupted():
+                if vectors:
+                    break
+                raise PlanningError(ErrorCode.TIMED_OUT, f"goal_constraints: {number} of {len(self._request.goals)} "
+                                    f"alternatives were looked at in the allowed {self._request.allowed_time_s:.2f} s, "
+                                    f"none can be reached ({failures[0].reason}); allow more time or give fewer goals")
             try:
                 vectors += self._vectors(goal)
             except PlanningError as error:

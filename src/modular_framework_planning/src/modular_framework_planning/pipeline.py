@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -164,18 +165,21 @@ class PlanningPipeline:
                                   path.planner_id or problem.planner_id, path.found_s - begun,
                                   time.monotonic() - begun)
 
-    def checker(self, scene: PlanningScene, group: JointGroup, start: Array) -> CollisionChecker:
+    def checker(self, scene: PlanningScene, group: JointGroup, start: Array,
+                go_on: Callable[[], None] = lambda: None) -> CollisionChecker:
         """Returns the collision world of a motion, with shallow contacts of held bodies tolerated.
 
         Args:
             scene: the world.
             group: the joints that will move.
             start: positions of the whole robot the motion begins at.
+            go_on: called now and then while the world is built; raises an exception to end that.
 
         Raises:
             PlanningError: bodies touch that the group cannot separate.
         """
         checker = self._checkers(scene, group.indices)
+        checker.build(go_on)
         fixed = checker.fixed_contacts(start)
         if fixed:
             raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
@@ -201,7 +205,7 @@ class PlanningPipeline:
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "start state: a joint position is not finite")
         velocity, acceleration = self._scaled_limits(request, group)
         seed = self.settings.seed if request.seed is None else request.seed
-        checker = self.checker(request.scene, group, start)
+        checker = self.checker(request.scene, group, start, partial(_require_time, request, begun))
         return PlanningProblem(
             request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
             self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
@@ -267,6 +271,18 @@ class _Search:
             vertices = _shortened(problem, vertices)
         self._found = replace(path, vertices=vertices)
         return self._found
+
+
+def _require_time(request: PlanningRequest, begun_s: float) -> None:
+    """Raises PlanningError when a request is over before its search began."""
+    spent = time.monotonic() - begun_s
+    if request.cancelled():
+        raise PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s, while the collision "
+                            "world was built")
+    if spent > request.allowed_time_s:
+        raise PlanningError(ErrorCode.TIMED_OUT, f"the collision world of {len(request.scene.objects)} objects was "
+                            f"not built in {spent:.2f} s (allowed {request.allowed_time_s:.2f} s); allow more time, "
+                            "simplify meshes, or ask again: what was built is kept")
 
 
 def _reserved(allowed_time_s: float) -> float:

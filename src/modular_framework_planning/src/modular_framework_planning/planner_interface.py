@@ -91,8 +91,17 @@ class PlanningProblem:
         """
         if not self._goals:
             self._goals.append(GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
-                                            self.rng, self.constraints).resolve())
+                                            self.rng, self.constraints, self._goals_must_end).resolve())
         return self._goals[0]
+
+    def _goals_must_end(self) -> bool:
+        """Whether no further goal may be looked at: half the time is for the search.
+
+        Where the plan must be repeatable, all goals are looked at, or none is used.
+        """
+        if self.repeatable and not self.interrupted():
+            return False
+        return self.cancelled() or time.monotonic() > 0.5 * (self.begun_s + self.deadline_s)
 
     def state_is_valid(self, values: Array) -> bool:
         """Whether a joint vector is free of collisions and satisfies the path constraints."""

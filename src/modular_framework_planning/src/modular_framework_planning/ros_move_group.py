@@ -113,7 +113,9 @@ def main() -> int:
         rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
     compile_all()
     scene = context.monitor.snapshot()
-    CollisionChecker(scene).is_free(scene.positions)  # reads the links' meshes
+    checker = CollisionChecker(scene)
+    checker.is_free(scene.positions)  # builds what both checks need of the links
+    checker.distance(scene.positions)
     advertise(context)
     rospy.loginfo("move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
                   context.model.name, ", ".join(context.model.groups), ", ".join(context.pipelines),

@@ -35,6 +35,12 @@ class Shape:
     def _build(self) -> Any:
         raise TypeError(f"{type(self).__name__} is not a shape that can be built")
 
+    @cached_property
+    def bounding_sphere(self) -> tuple[Array, float]:
+        """Centre and radius [m] of a ball in the shape's frame that holds it."""
+        self.geometry.computeLocalAABB()
+        return np.array(self.geometry.aabb_center), float(self.geometry.aabb_radius)
+
 
 @dataclass(frozen=True, eq=False)
 class Box(Shape):
@@ -126,6 +132,11 @@ class Plane(Shape):
         length = float(np.linalg.norm(normal))
         return coal.Plane(normal / length, -self.d / length)
 
+    @cached_property
+    def bounding_sphere(self) -> tuple[Array, float]:
+        """None holds a plane."""
+        return np.zeros(3), np.inf
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Shape):
@@ -156,6 +167,13 @@ class Mesh(Shape):
         model.endModel()
         model.computeLocalAABB()
         return model
+
+    @cached_property
+    def bounding_sphere(self) -> tuple[Array, float]:
+        """Known without Coal's tree over the triangles, which takes a second for 100,000 of them."""
+        points = np.asarray(self.vertices, dtype=float)
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        return centre, float(np.linalg.norm(points - centre, axis=1).max())
 
 
 @dataclass(frozen=True, eq=False)
