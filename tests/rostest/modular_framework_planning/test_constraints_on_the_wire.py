@@ -157,8 +157,8 @@ OLD_KIND = in_box(0.2, 0.5, 1.1, (0.1, 0.1, 0.1), constraint_region=BoundingVolu
      "'nobody' does not exist"),
     (Constraints(position_constraints=[in_box(0, 0, 1, (0.1, 0.1, 0.1), weight=NAN)]), CODES.INVALID_GOAL_CONSTRAINTS,
      "weight"),
-    (Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, orientation=Quaternion())]),
-     CODES.INVALID_GOAL_CONSTRAINTS, "length 0"),
+    (Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, orientation=Quaternion(0, 0, 0, 0.5))]),
+     CODES.INVALID_GOAL_CONSTRAINTS, "length 0.5"),
     (Constraints(orientation_constraints=[turned(NAN, 0.1, 0.1)]), CODES.INVALID_GOAL_CONSTRAINTS, "absolute_x_axis"),
     (Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, parameterization=7)]), CODES.INVALID_GOAL_CONSTRAINTS,
      "1 ROTATION_VECTOR"),
@@ -246,6 +246,26 @@ def test_validity_answers_every_constraint_and_every_contact() -> None:
     answer, report = report_of(lambda: call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
                                             constraints))
     assert not answer.valid and "visibility" in report["reason"]
+
+
+def test_validity_says_which_constraint_is_refused_and_answers_the_others() -> None:
+    constraints = Constraints(
+        joint_constraints=[JointConstraint(ARM[0], START[0], 0.1, 0.1, 1.0), JointConstraint("knee", 0.0, 0.1, 0.1, 1)],
+        orientation_constraints=[turned(9.0, 9.0, 9.0)], visibility_constraints=[VisibilityConstraint()])
+    answer, report = report_of(lambda: call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
+                                            constraints))
+    assert not answer.valid and [item.result for item in answer.constraint_result] == [True, False, True, False]
+    assert [np.isinf(item.distance) for item in answer.constraint_result] == [False, True, False, True]
+    assert "constraints.joint_constraints[1]: joint 'knee'" in report["reason"]
+    assert "constraints.visibility_constraints[0]" in report["reason"]
+
+
+def test_an_orientation_that_was_not_filled_in_is_the_identity() -> None:
+    given, empty = turned(9.0, 9.0, 9.0), turned(9.0, 9.0, 9.0)
+    given.orientation, empty.orientation = Quaternion(0, 0, 0, 1), Quaternion()
+    results = [call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
+                    Constraints(orientation_constraints=[item])).constraint_result[0] for item in (given, empty)]
+    assert results[0] == results[1]
 
 
 def test_fk_answers_many_links_in_any_frame() -> None:

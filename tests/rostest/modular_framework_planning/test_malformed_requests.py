@@ -201,7 +201,7 @@ def test_counts_without_end_can_be_cancelled(clients: dict[str, Any]) -> None:
                                          allowed_planning_time=1e-3))
     goal.planning_options.plan_only = goal.planning_options.replan = True
     goal.planning_options.replan_attempts = 2**31 - 1
-    goal.request.planner_id = "nobody"
+    goal.request.pipeline_id = "nobody"
     clients["move_group"].send_goal(goal)
     time.sleep(0.3)
     clients["move_group"].cancel_goal()

@@ -307,7 +307,6 @@ NAN = float("nan")
     (pick_goal(grasp(quality=NAN)), {CODES.INVALID_GOAL_CONSTRAINTS}, "grasp_quality"),
     (pick_goal(grasp(grasp_pose=PoseStamped(Header(frame_id="world"), Pose()))), {CODES.FAILURE}, "quaternion"),
     (pick_goal(allowed_planning_time=NAN), {CODES.TIMED_OUT}, "allowed_planning_time"),
-    (pick_goal(planner_id="nobody"), {CODES.PLANNING_FAILED}, "nobody"),
 ])
 def test_malformed_picks_get_a_code_and_a_reason(pickup: Any, goal: PickupGoal, codes: set[int], word: str) -> None:
     result, report = ask(pickup, goal)

@@ -63,12 +63,17 @@ def test_the_planner_of_the_guide_plans(session: Any) -> None:
 @pytest.mark.parametrize(("changes", "parts"), [
     ({"pipeline_id": "nobody"}, ("'nobody' is not loaded", "ompl", "mine")),
     ({"pipeline_id": "chomp"}, ("chomp_interface/CHOMPPlanner", "available: ", "mine")),
-    ({"pipeline_id": "wrong"}, ("Nonsense", "default_planner_request_adapters/FixStartStateBounds")),
-    ({"planner_id": "BiTRRT"}, ("BiTRRT", "available: RRTConnect"))])
+    ({"pipeline_id": "wrong"}, ("Nonsense", "default_planner_request_adapters/FixStartStateBounds"))])
 def test_a_name_that_is_not_there_is_refused_with_the_list(session: Any, changes: Any, parts: Any) -> None:
     answer, report = report_of(lambda: plan(request(GOAL, **changes)))
     assert answer.error_code.val == MoveItErrorCodes.PLANNING_FAILED
     assert all(part in report["reason"] for part in parts), report["reason"]
+
+
+def test_a_planner_that_is_not_there_is_replaced_by_the_default_one_with_a_warning(session: Any) -> None:
+    answer, report = report_of(lambda: plan(request(GOAL, planner_id="BiTRRT")))
+    assert answer.error_code.val == OK and report["planner_id"] == "RRTConnect"
+    assert "planner_id 'BiTRRT': pipeline 'ompl' has no such planner, available: RRTConnect" in session.log()
 
 
 def test_pipelines_and_planners_are_listed_also_by_group(session: Any) -> None:
@@ -92,6 +97,8 @@ def test_settings_of_planners_are_read_and_changed_for_one_group_or_all(session:
     assert settings(GROUP) == before | {"goal_bias": "0.2"} and settings() == before
     call("set_planner_params", SetPlannerParams, "ompl", "RRT", "", kind, True)
     assert settings() == {"type": "geometric::RRT"}
+    for name, group in (("nobody", ""), ("", ""), ("nobody", "no_group")):
+        assert call("get_planner_params", GetPlannerParams, "ompl", name, group).params.keys == []
 
 
 def test_a_seed_repeats_the_motion_also_while_others_plan(session: Any) -> None:

@@ -370,8 +370,10 @@ def test_a_plan_is_a_tuple_of_four_and_can_be_executed(arm: MoveGroupCommander) 
     slow = arm.retime_trajectory(arm.get_current_state(), trajectory, 0.5, 0.5)
     ends = [item.joint_trajectory.points[-1].time_from_start.to_sec() for item in (trajectory, slow)]
     assert ends[1] > ends[0] and slow.joint_trajectory.points[-1].positions == pytest.approx(NEAR, abs=1e-3)
-    with pytest.raises(MoveItCommanderException, match="unknown time parameterization"):
-        arm.retime_trajectory(arm.get_current_state(), trajectory, algorithm="magic")
+    for name in ("magic", ""):
+        assert not arm.retime_trajectory(arm.get_current_state(), trajectory, algorithm=name).joint_trajectory.points
+    full, beyond = (arm.retime_trajectory(arm.get_current_state(), trajectory, factor, factor) for factor in (1.0, 7.0))
+    assert beyond == full, "a factor that is none is 1"
     assert arm.execute(trajectory) is True
     assert is_at(arm, NEAR)
     with pytest.raises(MoveItCommanderException, match="second item"):

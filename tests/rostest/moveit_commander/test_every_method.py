@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import genpy
 import moveit_commander
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ from moveit_msgs.msg import (
     OrientationConstraint,
     PlanningScene,
     PlanningSceneComponents,
+    RobotState,
     TrajectoryConstraints,
 )
 from moveit_msgs.srv import GetPlannerParams, SetPlannerParams
@@ -165,6 +167,10 @@ def test_what_a_group_knows(arm: MoveGroupCommander) -> None:
     assert arm.get_current_rpy()[0] == pytest.approx(math.pi, abs=1e-2) or arm.get_current_rpy()[0] < -3.1
     assert arm.get_current_state_bounded().joint_state.name == arm.get_current_state().joint_state.name
     assert arm.enforce_bounds(arm.get_current_state()).joint_state.name
+    with pytest.raises(genpy.DeserializationError, match="names no joint"):
+        arm.enforce_bounds(RobotState())
+    state = arm.get_current_state()
+    assert state.joint_state.header.stamp == state.multi_dof_joint_state.header.stamp == rospy.Time(0)
     assert len(arm.get_random_joint_values()) == 7 and arm.get_random_pose().header.frame_id == "panda_link0"
     assert np.array(arm.get_jacobian_matrix(READY)).shape == (6, 7)
     assert arm.get_known_constraints() == []

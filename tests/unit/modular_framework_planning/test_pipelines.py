@@ -103,10 +103,20 @@ def test_planners_that_improve_their_path_stop_with_the_time_and_return_what_the
     assert time.monotonic() - begun > 5.5, "the time allowed is used"
 
 
-def test_a_planner_that_is_not_there_is_refused_with_the_list(model: RobotModel, pipeline: PlanningPipeline) -> None:
-    error = failure(pipeline, wall_request(model, planner_id="BiTRRT"))
-    assert error.code == ErrorCode.PLANNING_FAILED
-    assert all(name in error.reason for name in ("BiTRRT", *PLANNERS))
+def test_a_planner_that_is_not_there_is_replaced_by_the_default_one(
+        model: RobotModel, pipeline: PlanningPipeline, caplog: pytest.LogCaptureFixture) -> None:
+    default = pipeline.plan(wall_request(model)).planner_id
+    answer = pipeline.plan(wall_request(model, planner_id="BiTRRT"))
+    assert arrives(answer) and answer.planner_id == default
+    assert all(name in caplog.text for name in ("planner_id 'BiTRRT'", f"default planner '{default}'", *PLANNERS))
+
+
+def test_a_default_planner_that_is_not_there_is_refused_with_the_list(model: RobotModel, pool: KinematicsPool) -> None:
+    settings = PipelineSettings(groups={GROUP: {"default_planner_config": "BiTRRT"}})
+    for name in ("", "nobody"):
+        error = failure(PlanningPipeline(model, pool, settings), wall_request(model, planner_id=name))
+        assert error.code == ErrorCode.PLANNING_FAILED
+        assert all(word in error.reason for word in ("BiTRRT", *PLANNERS))
 
 
 def test_projections_and_segment_lengths_of_the_group_are_honoured(model: RobotModel, pool: KinematicsPool) -> None:
@@ -277,7 +287,6 @@ def test_a_seed_repeats_a_plan_bit_for_bit_in_two_runs_and_at_the_same_time(
 def test_seeded_plans_fail_with_a_reason_and_can_be_cancelled(
         model: RobotModel, pipeline: PlanningPipeline, seeded: list[SeededPlanning]) -> None:
     cases = [(wall_request(model, planner_id="PRM"), 1, ErrorCode.PLANNING_FAILED, "threads"),
-             (wall_request(model, planner_id="nobody"), 1, ErrorCode.PLANNING_FAILED, "available"),
              (wall_request(model, cancelled=lambda: True), 1, ErrorCode.PREEMPTED, "cancelled"),
              (wall_request(model), -1, ErrorCode.FAILURE, "0 or more")]
     for request, seed, code, text in cases:

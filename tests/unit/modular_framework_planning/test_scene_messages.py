@@ -186,6 +186,16 @@ def test_a_matrix_that_was_read_and_sent_back_means_the_same(scene: Scene) -> No
     assert all(again.allows(x, y) == matrix.allows(x, y) for x in bodies for y in bodies)
 
 
+def test_an_orientation_that_was_not_filled_in_is_the_identity(scene: Scene, caplog: pytest.LogCaptureFixture) -> None:
+    given, empty = body("b"), body("b")
+    for item in (empty, empty.primitive_poses[1]):
+        (item.pose if item is empty else item).orientation = Quaternion()
+    placed = [apply_collision_object(scene, item).objects["b"] for item in (given, empty)]
+    for one, other in zip(*([item.pose, *(pose for _, pose in item.shapes)] for item in placed), strict=True):
+        assert one.isApprox(other)
+    assert "collision object 'b': quaternion xyzw 0 0 0 0 has no length; the identity 0 0 0 1 is used" in caplog.text
+
+
 def test_a_message_with_nothing_but_defaults_keeps_the_entries(scene: Scene) -> None:
     message = PlanningScene(is_diff=True)
     message.allowed_collision_matrix.default_entry_names = [WRIST, "<octomap>"]

@@ -69,8 +69,16 @@ def test_scaling_factors_scale_the_limits_and_0_means_the_default(model: RobotMo
         assert max(shares[0].max() / expected[0], shares[1].max() / expected[1]) > 0.98, "as fast as allowed"
 
 
-@pytest.mark.parametrize("factor", [-0.1, 1.01, np.nan, np.inf])
-def test_scaling_factors_out_of_range_are_refused(model: RobotModel, factor: float) -> None:
+@pytest.mark.parametrize("factor", [-0.1, 1.01])
+def test_scaling_factors_out_of_range_are_1(model: RobotModel, factor: float, caplog: pytest.LogCaptureFixture) -> None:
+    full, other = (planned(model, [AddTimeOptimalParameterization()], velocity_scaling=value, acceleration_scaling=value
+                           ).trajectory for value in (1.0, factor))
+    assert other.times.tolist() == full.times.tolist()
+    assert f"max_velocity_scaling_factor is {factor:g}; allowed is 0 < factor <= 1" in caplog.text
+
+
+@pytest.mark.parametrize("factor", [np.nan, np.inf])
+def test_scaling_factors_that_are_no_numbers_are_refused(model: RobotModel, factor: float) -> None:
     for name in ("velocity_scaling", "acceleration_scaling"):
         with pytest.raises(PlanningError, match="allowed is 0 < factor <= 1"):
             planned(model, [AddTimeOptimalParameterization()], **{name: factor})

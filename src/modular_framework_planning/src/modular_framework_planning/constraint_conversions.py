@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from moveit_msgs.msg import ConstraintEvalResult
+from moveit_msgs.msg import ConstraintEvalResult, Constraints
 from shape_msgs.msg import SolidPrimitive
 
 from modular_framework_planning.constraint_kinds import (
@@ -22,7 +22,7 @@ from modular_framework_planning.errors import ErrorCode, GeometryError, Planning
 from modular_framework_planning.joint_limits import BEYOND_BOUND
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.regions import BoxSolid, ConeSolid, CylinderSolid, HullSolid, Solid, SphereSolid
-from modular_framework_planning.spatial import Transform, make_transform
+from modular_framework_planning.spatial import Transform, make_transform, turned
 
 PRIMITIVES: dict[int, tuple[Callable[..., Solid], int]] = {
     SolidPrimitive.BOX: (BoxSolid, 3), SolidPrimitive.SPHERE: (SphereSolid, 1),
@@ -55,6 +55,28 @@ def constraints_from_message(scene: PlanningScene, message: Any, where: str,
          for n, item in enumerate(message.position_constraints)],
         [reader.orientation(item, f"{where}.orientation_constraints[{n}]")
          for n, item in enumerate(message.orientation_constraints)], message.name)
+
+
+def evaluated_one_by_one(scene: PlanningScene, message: Any, where: str,
+                         tip: str) -> tuple[list[ConstraintResult], list[str]]:
+    """Returns what each constraint says of the scene's state, and why some are refused.
+
+    A refused one, of any kind, is not satisfied and infinitely far off; the results are in the order of
+    `KinematicConstraints.evaluate`, visibility constraints last.
+    """
+    results, faults = [], []
+    for kind in ("joint", "position", "orientation", "visibility"):
+        for number, item in enumerate(getattr(message, f"{kind}_constraints")):
+            place = f"{where}.{kind}_constraints[{number}]"
+            try:
+                alone = constraints_from_message(scene, Constraints(**{f"{kind}_constraints": [item]}), where, tip=tip)
+                results += alone.evaluate(scene.positions)
+            except PlanningError as error:
+                reason = error.reason.replace(f"{where}.{kind}_constraints[0]", place)
+                faults.append(reason if place in reason else f"{place}: {reason}")
+                name = getattr(item, f"{'joint' if kind == 'joint' else 'link'}_name", "")
+                results.append(ConstraintResult(kind, name, False, np.inf, faults[-1]))
+    return results, faults
 
 
 def result_messages(results: Sequence[ConstraintResult]) -> list[ConstraintEvalResult]:
@@ -187,7 +209,8 @@ class _Reader:
         """Reads an OrientationConstraint."""
         q = message.orientation
         try:
-            target = make_transform((0.0, 0.0, 0.0), (q.x, q.y, q.z, q.w), f"{where}: orientation").rotation
+            quaternion = turned((q.x, q.y, q.z, q.w), f"{where}: orientation")
+            target = make_transform((0.0, 0.0, 0.0), quaternion, f"{where}: orientation").rotation
         except GeometryError as error:
             raise PlanningError(self._code, error.reason) from error
         known = {item.value: item for item in Parameterization}

@@ -2,6 +2,7 @@
 """One planning pipeline: a planner, the request adapters around it, and the check every motion has to pass."""
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -37,6 +38,7 @@ BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 CheckerSource = Callable[..., CollisionChecker]
+LOGGER = logging.getLogger("rosout.planning_pipeline")
 
 
 class PlanningPipeline:
@@ -74,6 +76,11 @@ class PlanningPipeline:
     def description(self) -> str:
         """What the planner calls itself."""
         return str(getattr(self._planner, "description", type(self._planner).__name__))
+
+    @property
+    def _replaces_bad_values(self) -> bool:
+        """Whether an unknown planner_id and scaling out of range are replaced by defaults, with a warning."""
+        return bool(getattr(self._planner, "replaces_bad_values", True))
 
     @property
     def auxiliary_constraints(self) -> tuple[str, ...]:
@@ -214,11 +221,13 @@ class PlanningPipeline:
 
     def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner's name and settings; raises PlanningError with the names there are."""
-        name = asked or self.settings.default_planner(group)
-        if name.endswith("]") and "[" in name:
-            name = name.split("[")[-1].rstrip("]")
-        kind, parameters = self._kind(name, group)
-        known = self.planner_ids
+        default, known = self.settings.default_planner(group), self.planner_ids
+        kind, parameters = self._kind(_bare(asked or default), group)
+        if asked and known and kind not in known and self._replaces_bad_values:
+            kind, parameters = self._kind(_bare(default), group)
+            LOGGER.warning("planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
+                           "for by the default planner '%s'", asked, self.name, ", ".join(known), group,
+                           kind or known[0])
         kind = kind or (known[0] if known else "")
         if known and kind not in known:
             raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{asked}': pipeline '{self.name}' has no "
@@ -239,6 +248,10 @@ class PlanningPipeline:
                  self.settings.default_velocity_scaling_factor),
                 ("max_acceleration_scaling_factor", request.acceleration_scaling,
                  self.settings.default_acceleration_scaling_factor)):
+            if np.isfinite(value) and not 0.0 <= value <= 1.0 and self._replaces_bad_values:
+                LOGGER.warning("%s is %g; allowed is 0 < factor <= 1, or 0 for the default %g; 1 is used", name, value,
+                               default)
+                value = 1.0
             if not np.isfinite(value) or value < 0.0 or value > 1.0:
                 raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{name} is {value}; allowed is 0 < factor <= 1, "
                                     f"or 0 for the default {default}")
@@ -307,6 +320,11 @@ def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
                              f"{spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s): allow more time")
     return PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion found in {spent:.2f} s fails the last check: "
                          f"{fault}; move the goal or the start away from contact")
+
+
+def _bare(planner_id: str) -> str:
+    """Takes the group off a name such as arm[RRTConnect]."""
+    return planner_id.split("[")[-1].rstrip("]") if planner_id.endswith("]") and "[" in planner_id else planner_id
 
 
 def _require_start(problem: PlanningProblem) -> None:

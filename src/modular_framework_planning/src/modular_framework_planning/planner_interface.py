@@ -167,6 +167,8 @@ class Planner(Protocol):
 
     A class may also have, each optional:
         planner_ids: names it takes as planner_id; any name when it is absent or empty.
+        replaces_bad_values: whether an unknown planner_id and scaling out of range give a warning and defaults, as in
+            OMPL's planning contexts, or are refused; true when it is absent.
         configure(model, settings): class method that makes it; without one it is made without arguments.
         auxiliary_constraints: names of path constraints that are input of the planner (such as the interim point of
             a circle), which then need not be kept by the motion.

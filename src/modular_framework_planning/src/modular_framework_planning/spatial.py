@@ -2,6 +2,7 @@
 """Turns positions and xyzw quaternions into rigid transforms, and refuses numbers that are not a pose."""
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +16,8 @@ Array = NDArray[np.float64]
 Transform = Any  # pinocchio.SE3: Pinocchio ships no type information
 
 QUATERNION_NORM_TOLERANCE = 0.1
+IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
+LOGGER = logging.getLogger("rosout.poses")
 
 
 def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], where: str = "pose") -> Transform:
@@ -39,6 +42,14 @@ def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], 
                             f"within {QUATERNION_NORM_TOLERANCE}; the identity is 0 0 0 1")
     x, y, z, w = quaternion / norm
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), translation)
+
+
+def turned(quaternion_xyzw: Sequence[float], where: str) -> Sequence[float]:
+    """Returns the quaternion; for one of no length, as a message not filled in has it, the identity and a warning."""
+    if any(quaternion_xyzw):
+        return quaternion_xyzw
+    LOGGER.warning("%s: quaternion xyzw 0 0 0 0 has no length; the identity 0 0 0 1 is used", where)
+    return IDENTITY_XYZW
 
 
 def pose_of(transform: Transform) -> tuple[Array, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import genpy
 import rospy
 from geometry_msgs.msg import PoseStamped
 from moveit_msgs.msg import (
@@ -120,7 +121,14 @@ class GroupConnection:
         return self.enforce_bounds(self.get_current_state())
 
     def enforce_bounds(self, robot_state_msg: RobotState) -> RobotState:
-        """Answers a state with each joint wrapped or cut off to its bounds; the given one stays as it is."""
+        """Answers a state with each joint wrapped or cut off to its bounds; the given one stays as it is.
+
+        Raises:
+            genpy.DeserializationError: the state names no joint; as in MoveIt, whose message is then empty.
+        """
+        if not robot_state_msg.joint_state.name and not robot_state_msg.is_diff:
+            raise genpy.DeserializationError("enforce_bounds: the state names no joint; give joint_state.name and "
+                                             "position, as get_current_state() does")
         state = RobotState()
         state.deserialize(conversions.msg_to_string(robot_state_msg))
         joints = self._model.joints

@@ -69,10 +69,12 @@ class GroupObjects(GroupMotion):
         return self._publish(messages)
 
     def pick(self, object_name: str, grasp: Grasp | Sequence[Grasp] = (), plan_only: bool = False) -> int:
-        """Picks an object by one of the grasps; none: those of the service plan_grasps. Answers the error code.
+        """Picks an object by one of the grasps. Answers the error code.
+
+        None given: those of the service plan_grasps; where nobody plans any, move_group answers for a pick without.
 
         Raises:
-            ServerError: move_group does not offer the action pickup, or nobody plans grasps.
+            ServerError: move_group does not offer the action pickup.
         """
         grasps = [grasp] if isinstance(grasp, Grasp) else list(grasp)
         caller = self._servers.action("pickup", PickupAction)
@@ -125,10 +127,15 @@ class GroupObjects(GroupMotion):
     def _planned_grasps(self, object_name: str) -> list[Grasp]:
         request = GraspPlanningRequest(group_name=self._group.name, support_surfaces=[self._support_surface])
         request.target.id = object_name
-        answer = self._servers.call("plan_grasps", GraspPlanning, request)
+        try:
+            answer = self._servers.call("plan_grasps", GraspPlanning, request)
+        except ServerError as error:
+            rospy.logwarn("pick of '%s': no grasp is given and nobody plans one (%s); give grasps to pick()",
+                          object_name, error)
+            return []
         if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.grasps:
-            raise ServerError(f"service plan_grasps: no grasp of '{object_name}' (code {answer.error_code.val}); give "
-                              "grasps to pick()")
+            rospy.logwarn("pick of '%s': no grasp is given, and service plan_grasps has %d (code %d); give grasps to "
+                          "pick()", object_name, len(answer.grasps), answer.error_code.val)
         return list(answer.grasps)
 
     def _publish(self, messages: Sequence[AttachedCollisionObject]) -> bool:

@@ -63,17 +63,18 @@ class MoveGroupCommander(GroupObjects):
             traj_in: the trajectory; points equal to the one before are left out.
             velocity_scaling_factor: share of the top velocities, in (0, 1].
             acceleration_scaling_factor: share of the top accelerations, in (0, 1].
-            algorithm: one of MoveIt's names; all are one time-optimal algorithm here.
+            algorithm: one of MoveIt's names; all are one time-optimal algorithm here. Another one is an error on the
+                log, and the answer is empty, as in MoveIt.
         """
         if algorithm not in ALGORITHMS:
-            raise MoveItCommanderException(f"retime_trajectory: unknown time parameterization algorithm '{algorithm}'; "
-                                           f"allowed: {', '.join(ALGORITHMS)}")
+            rospy.logerr("retime_trajectory: unknown time parameterization algorithm '%s'; allowed: %s; the answer is "
+                         "an empty trajectory", algorithm, ", ".join(ALGORITHMS))
+            return RobotTrajectory()
         names = traj_in.joint_trajectory.joint_names
         unknown = [name for name in names if name not in self._model.joints]
-        if unknown or not (0.0 < velocity_scaling_factor <= 1.0 and 0.0 < acceleration_scaling_factor <= 1.0):
-            raise MoveItCommanderException(f"retime_trajectory: unknown joints {unknown}, scaling factors "
-                                           f"{velocity_scaling_factor}, {acceleration_scaling_factor}; only joints of "
-                                           "the robot and factors in (0, 1] are allowed")
+        if unknown:
+            raise MoveItCommanderException(f"retime_trajectory: unknown joints {unknown}; only joints of the robot are "
+                                           f"allowed: {', '.join(self._model.joints)}")
         joints = [self._model.joints[name] for name in names]
         points = [point.positions for point in traj_in.joint_trajectory.points]
         timed = RobotTrajectory(multi_dof_joint_trajectory=traj_in.multi_dof_joint_trajectory)
@@ -84,11 +85,19 @@ class MoveGroupCommander(GroupObjects):
                                              for point in kept]
             return timed
         times, velocities, accelerations = retime(
-            kept, velocity_scaling_factor * np.array([joint.velocity for joint in joints]),
-            acceleration_scaling_factor * np.array([joint.acceleration for joint in joints]))
+            kept, _factor("velocity", velocity_scaling_factor) * np.array([joint.velocity for joint in joints]),
+            _factor("acceleration", acceleration_scaling_factor) * np.array([joint.acceleration for joint in joints]))
         timed.joint_trajectory.points = [_point(*row) for row in zip(kept, times, velocities, accelerations,
                                                                      strict=True)]
         return timed
+
+
+def _factor(kind: str, value: float) -> float:
+    """The scaling factor; as in MoveIt, one that is not in (0, 1] is 1, with a warning."""
+    if 0.0 < value <= 1.0:
+        return value
+    rospy.logwarn("retime_trajectory: %s_scaling_factor is %s; allowed is 0 < factor <= 1; 1 is used", kind, value)
+    return 1.0
 
 
 def _point(positions: Sequence[float], time_s: float, velocities: Sequence[float],

@@ -66,7 +66,6 @@ class CurrentState:
         self._topic = topic
         self._positions: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}
-        self._stamp = rospy.Time()
         self._changed = threading.Condition()
         self._subscriber = rospy.Subscriber(topic, JointState, self._hear, queue_size=10, tcp_nodelay=True)
         on_shutdown(_forget_all)
@@ -101,10 +100,9 @@ class CurrentState:
         return self.message_of(self.positions(needed))
 
     def message_of(self, positions: Mapping[str, float]) -> RobotState:
-        """A message of given positions."""
+        """A message of given positions; as in MoveIt, it has no time stamp."""
         state = RobotState()
         state.joint_state.header.frame_id = self.model.planning_frame
-        state.joint_state.header.stamp = self._stamp
         state.joint_state.name = list(positions)
         state.joint_state.position = list(positions.values())
         state.multi_dof_joint_state.header = state.joint_state.header
@@ -118,5 +116,4 @@ class CurrentState:
         with self._changed:
             for name, position in zip(message.name, message.position, strict=False):
                 self._positions[name], self._arrivals[name] = position, now
-            self._stamp = max(self._stamp, message.header.stamp)
             self._changed.notify_all()

@@ -44,8 +44,9 @@ class QueryPlannersService:
                                          for name in pipeline.group_planners(group))]
 
     def _get(self, request: Any) -> GetPlannerParamsResponse | None:
+        """Returns the settings; none where no planner or group of that name has any, as in MoveIt."""
         try:
-            pipeline = self._pipeline("get_planner_params", request)
+            pipeline = self._context.pipeline(request.pipeline_id)
         except PlanningError as error:
             rospy.logerr("%s", error.reason)
             return None
@@ -55,7 +56,7 @@ class QueryPlannersService:
 
     def _set(self, request: Any) -> SetPlannerParamsResponse | None:
         try:
-            pipeline = self._pipeline("set_planner_params", request)
+            pipeline = self._named(request)
             if len(request.params.keys) != len(request.params.values):
                 raise PlanningError(ErrorCode.FAILURE, f"set_planner_params: {len(request.params.keys)} keys and "
                                     f"{len(request.params.values)} values; one value a key is needed")
@@ -68,12 +69,12 @@ class QueryPlannersService:
             rospy.logwarn("set_planner_params, %s: %s", request.planner_config, fault)
         return SetPlannerParamsResponse()
 
-    def _pipeline(self, where: str, request: Any) -> PlanningPipeline:
+    def _named(self, request: Any) -> PlanningPipeline:
         """Returns the pipeline; raises PlanningError for a pipeline or group that does not exist."""
         if request.group:
             self._context.model.group(request.group)
         if not request.planner_config:
-            raise PlanningError(ErrorCode.FAILURE, f"{where}: planner_config is empty; name a planner")
+            raise PlanningError(ErrorCode.FAILURE, "set_planner_params: planner_config is empty; name a planner")
         return self._context.pipeline(request.pipeline_id)
 
 

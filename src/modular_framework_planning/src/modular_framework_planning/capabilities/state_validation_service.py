@@ -11,7 +11,7 @@ from moveit_msgs.srv import GetStateValidity, GetStateValidityResponse
 
 from modular_framework_planning import capability_names as names
 from modular_framework_planning.collision import CollisionChecker, Contact
-from modular_framework_planning.constraint_conversions import constraints_from_message, result_messages
+from modular_framework_planning.constraint_conversions import evaluated_one_by_one, result_messages
 from modular_framework_planning.conversions import BODY_TYPES, scene_with_state
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.ros_context import MoveGroupContext
@@ -37,7 +37,8 @@ class StateValidationService:
     def _answer(self, request: Any) -> GetStateValidityResponse:
         """Looks at the state; raises PlanningError for a request without meaning.
 
-        The response lists every contact and one result a constraint (joints, then positions, then orientations). Cost
+        The response lists every contact and one result a constraint (joints, then positions, then orientations, then
+        visibility); one that is refused is not satisfied, its distance is infinite, the log has the reason. Cost
         sources stay empty: the scene has no costs, a place is either free or not.
         """
         if not request.robot_state.joint_state.name or request.robot_state.is_diff:
@@ -48,11 +49,13 @@ class StateValidationService:
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
         group = model.group(request.group_name) if request.group_name else None
         moving = [int(number) for number in (group.indices if group else range(len(model.joint_names)))]
-        constraints = constraints_from_message(scene, request.constraints, "constraints",
-                                               tip=group.tip_link if group else "")
         contacts = CollisionChecker(scene, moving).contacts(scene.positions, include_fixed=group is None)
         problems = model.bound_violations(scene.positions, moving, 1e-6)
-        results = constraints.evaluate(scene.positions)
+        results, refused = evaluated_one_by_one(scene, request.constraints, "constraints",
+                                                group.tip_link if group else "")
+        if refused:
+            self._context.reporter.report("validity", ErrorCode.INVALID_GOAL_CONSTRAINTS, "; ".join(refused),
+                                          group=request.group_name)
         problems += [item.text for item in results if not item.satisfied]
         if problems:
             rospy.logdebug("state not valid: %s", "; ".join(problems))

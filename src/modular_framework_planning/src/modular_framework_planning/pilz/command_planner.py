@@ -42,6 +42,7 @@ class CommandPlanner:
     """Plans PTP, LIN and CIRC."""
 
     planner_ids = ("PTP", "LIN", "CIRC")
+    replaces_bad_values = False
     auxiliary_constraints = (CENTRE, INTERIM)
     collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators look at no collisions themselves
 
