@@ -335,6 +335,7 @@ def test_a_pipe_is_refused_at_once_and_positions_that_are_not_finite_are_not_tak
     for service in ("load_plans", "save_plans", "reload_joint_states"):
         answer = call(service, srv.MessageFile, "pipe.yaml")
         assert not answer.success and "no regular file" in answer.message
+    assert lists("joint_states") == (["down", "up"], 0)
     nowhere = JointState(name=["a"], position=[math.nan])
     assert not call("add_joint_state", srv.AddJointState, nowhere, "nowhere").success
     assert "nowhere" not in lists("joint_states")[0]

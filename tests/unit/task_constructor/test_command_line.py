@@ -113,6 +113,21 @@ def test_names_that_are_nowhere_and_keys_that_are_not_declared_are_found_without
     assert reason in message and message.startswith("1 fault in the task:\n"), message
 
 
+def test_a_plan_that_another_state_makes_under_another_name_is_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script = tmp_path / "t.yaml"
+    plans = ("source: plan, target_state_type: joint_state, target_state_name: stability_pose, "
+             "plan_name: to_stability, transitions: {success: B, fail: gave_up}")
+    moves = "  - B: {source: move, plan_name: %s, transitions: {success: done, fail: gave_up}}\n"
+    text = (ONE_STATE % plans).replace(", transitions: {success: done, fail: gave_up}}", "}")
+    script.write_text(text + moves % "to_stability")
+    assert main(["--check", str(script)]) == 0, capsys.readouterr().err
+    script.write_text(text + moves % "to_stabilty")
+    assert main(["--check", str(script)]) == 1
+    assert "'to_stabilty' is unknown; allowed: to_stability; let a state make it" in capsys.readouterr().err
+
+
 def test_names_that_another_node_adds_are_named_in_the_task_and_other_configurations_are_chosen(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

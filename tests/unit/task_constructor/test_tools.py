@@ -60,6 +60,33 @@ def test_arrows_are_the_transitions_of_the_task(world: World) -> None:
     }
 
 
+def test_the_drawing_begins_with_the_initial_state_and_the_schema_takes_all_keys(
+        world: World, validator: jsonschema.Draft7Validator) -> None:
+    text = GOOD_TASK.replace("states:", "initial_state: B\nstates:").replace("success: done", "success: A").replace(
+        "success: B", "success: done")
+    assert ("tiny|start", "", "tiny/B") in arrows(graph_of(world.build(text)))
+    task = """name: t
+source: framework_state_machine
+outcomes: [done, gave_up]
+initial_state: B
+anchors: {slow: &slow {planning_time: 1.0}}
+external_names: {plan: [homing]}
+states:
+  - A: {source: move, plan_name: homing, remapping: {arm_commander: arm}, transitions: {success: done, fail: gave_up}}
+  - B: {source: set_planner, <<: *slow, group: hand, transitions: {success: A, fail: gave_up}}
+  - C:
+      source: call_service
+      service_name: s
+      request: {a: userdata.b}
+      outcome_field: code
+      outcome_values: {found: 0, fail: [1, 2]}
+      keep: {c: d.e}
+      outcomes: [found, fail]
+"""
+    assert list(validator.iter_errors(yaml.safe_load(task))) == []
+    assert not validator.is_valid(yaml.safe_load(task.replace("remapping", "remaping")))
+
+
 def test_arrows_of_a_nested_concurrent_machine_leave_from_its_outcomes() -> None:
     found = arrows(graph_of(build(MOCK_TRAJECTORY)))
     inner = "mock_trajectory/ConcurrentPlan"

@@ -228,8 +228,10 @@ class MessageServices:
         return srv.ReinitManagerResponse(success=answer.success)
 
     def _read(self, file: NamedFile) -> tuple[int, list[EntryError]]:
-        """Replaces what is stored by what is usable of a file."""
+        """Replaces what is stored by what is usable of a file; keeps it when nothing of the file is."""
         named, faults = file.read(file.path)
+        if faults and not named:
+            return 0, faults
         self.store.load(named, clear=True)
         rospy.loginfo("Loaded the %s of %s: %s.", self.kind.plural.replace("_", " "), file.path,
                       ", ".join(named) or "none")

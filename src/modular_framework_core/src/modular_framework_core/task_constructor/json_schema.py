@@ -48,7 +48,8 @@ def _readable(states: StateCatalogue, name: str) -> StateSource | None:
 
 def _state(source: StateSource) -> dict[str, Any]:
     properties: dict[str, Any] = {"source": {"enum": [source.name, f"state_{source.name}"]},
-                                  "transitions": or_reference(NAME_MAP), "params": {"type": "object"}}
+                                  "transitions": or_reference(NAME_MAP), "remapping": or_reference(NAME_MAP),
+                                  "params": {"type": "object"}}
     meanings = option_meanings(source.doc)
     for option in source.options.values():
         kind = OUTCOMES if option.name == "outcomes" else NAMES if option.name in STATE_KEYS else option.type.schema()

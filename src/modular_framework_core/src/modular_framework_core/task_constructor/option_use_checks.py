@@ -175,11 +175,14 @@ def _may_make(state: StateSpec, kind: str) -> bool:
     """Return whether a state may store messages of a kind under names that cannot be told from the task.
 
     So does what loads files of messages, what calls a service of the kind's manager by its name, and a state whose own
-    source speaks of such a service.
+    source speaks of such a service and has no option for the name.
     """
     plural = _PLURALS.get(kind, f"{kind}s")
     if state.source.name == "load" and state.options.get("kind") == kind:
         return True
     services = (f"add_{kind}", f"load_{plural}", f"reload_{plural}", f"store_{kind}(")
     words = [str(value) for value in state.options.values() if isinstance(value, str)]
-    return any(service in text for service in services for text in [*words, state.source.text])
+    says_itself = any(isinstance(use, Named) and use.made and use.kind == kind
+                      for option in state.source.options.values() for use in option.uses)
+    texts = words if says_itself else [*words, state.source.text]
+    return any(service in text for service in services for text in texts)

@@ -80,7 +80,7 @@ def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: s
                 frame.node(inner, _text(child.label), shape="box", style="rounded,filled", fillcolor="#eceff1",
                            tooltip=f"{child.source.name}, {child.place}")
         if parent is None:
-            for child in machine.states[:None if machine.template.concurrent else 1]:
+            for child in machine.first_states():
                 _edge(frame, f"{path}|start", "", child, f"{path}/{child.label}")
         if machine.template.concurrent:
             _concurrent_edges(frame, machine, path)
@@ -120,7 +120,7 @@ def _edge(graph: graphviz.Digraph, start: str, label: str, target: ChildSpec, pa
     """Draw an arrow to a child; to a machine it ends at the frame."""
     first, frame = path, {"lhead": f"cluster_{path}"} if isinstance(target, MachineSpec) else {}
     while isinstance(target, MachineSpec):
-        target = target.states[0]
+        target = target.first_states()[0]
         first = f"{first}/{target.label}"
     graph.edge(start, first, label=_text(label), **frame)
 

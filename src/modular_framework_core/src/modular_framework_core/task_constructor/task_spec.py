@@ -78,6 +78,12 @@ class MachineSpec:
     place: Place
     is_machine: bool = field(default=True, init=False)
 
+    def first_states(self) -> tuple[ChildSpec, ...]:
+        """Return the children it begins with: one, or all of a concurrent machine."""
+        if self.template.concurrent:
+            return self.states
+        return tuple(child for child in self.states if child.label == self.initial_state) or self.states[:1]
+
     def machines(self) -> Iterator[MachineSpec]:
         """Yield the machines nested in this one, innermost first, and this one last."""
         for child in self.states:
