@@ -138,7 +138,7 @@ def test_a_refused_change_is_an_error(scene: PlanningSceneInterface, tmp_path: P
         scene.add_box("block", at(0.0, 0.0, 1.0, "nowhere"), (1, 1, 1))
     with pytest.raises(MoveItCommanderException, match="every size must be above 0"):
         scene.add_box("block", at(0.0, 0.0, 1.0), (1, 0, 1))
-    with pytest.raises(MoveItCommanderException, match="does not exist"):
+    with pytest.raises(MoveItCommanderException, match="cannot be read"):
         scene.add_mesh("mesh", at(0.0, 0.0, 1.0), str(tmp_path / "absent.stl"))
     (tmp_path / "broken.stl").write_text("no mesh")
     with pytest.raises(MoveItCommanderException, match="broken.stl"):
@@ -164,7 +164,7 @@ def test_scenes_are_read_and_applied_whole(scene: PlanningSceneInterface) -> Non
 
 def test_an_asynchronous_scene_publishes(scene: PlanningSceneInterface) -> None:
     quick = PlanningSceneInterface(synchronous=False)
-    until(lambda: quick._objects.get_num_connections() > 0 and quick._attachments.get_num_connections() > 0,
+    until(lambda: quick._pub_co.get_num_connections() > 0 and quick._pub_aco.get_num_connections() > 0,
           "listeners to what it publishes")
     quick.add_box("block", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
     until(lambda: scene.get_known_object_names() == ["block"], "the block in the scene")
