@@ -235,6 +235,24 @@ def test_a_faulty_script_exits_with_2_and_lists_every_fault(run) -> None:
     assert "Traceback" not in output
 
 
+def test_names_are_checked_against_the_files_and_the_robot_of_the_launch(run, tmp_path: Path) -> None:
+    (tmp_path / "named_poses.yaml").write_text("above: {reference_frame: world, position: {}, orientation: {}}\n")
+    (tmp_path / "manipulator_controller_parameters.yaml").write_text("manipulator_group_name: hand\n")
+    rospy.set_param("/robot_description_semantic", """<robot name="r"><group name="hand"><joint name="f"/></group>
+<group_state name="wide" group="hand"><joint name="f" value="0"/></group_state></robot>""")
+    line = "      source: {}\n      transitions: {{success: done, fail: gave_up}}\n"
+    text = task("  - A:\n" + line.format("cartesian_move\n      pose_name: abvoe").replace("done", "B")
+                + "  - B:\n" + line.format("gripper\n      posture: open"))
+    text = text.replace("source: state_machine", "source: framework_state_machine")
+    try:
+        code, output = run(text, f"_config_directory:={tmp_path}").end()
+    finally:
+        rospy.delete_param("/robot_description_semantic")
+    assert code == 2, output
+    assert f"the pose 'abvoe' is unknown; allowed: above; add it to {tmp_path}/named_poses.yaml" in output
+    assert "the posture 'open' is unknown; allowed: wide" in output
+
+
 def test_nothing_to_run_exits_with_2(run) -> None:
     code, output = run(None).end()
     assert code == 2, output
