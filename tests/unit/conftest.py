@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties are tried on the same examples in every run, so that a verdict depends on the code alone.
+"""Properties are tried on the same examples in every run and without a deadline: a verdict depends on the code alone.
 
 Other examples: `HYPOTHESIS_PROFILE=default tests/run unit -m hypothesis --hypothesis-seed=NUMBER`.
 """
@@ -9,5 +9,5 @@ import os
 
 from hypothesis import settings
 
-settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))

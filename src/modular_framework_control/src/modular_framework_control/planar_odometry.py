@@ -24,7 +24,7 @@ def arc(forward: float, sideways: float, turn: float) -> tuple[float, float]:
     if abs(turn) < SMALL_ANGLE:
         sine, versine = 1.0 - turn * turn / 6.0, turn / 2.0
     else:
-        sine, versine = math.sin(turn) / turn, (1.0 - math.cos(turn)) / turn
+        sine, versine = math.sin(turn) / turn, 2.0 * math.sin(0.5 * turn) ** 2 / turn
     return sine * forward - versine * sideways, versine * forward + sine * sideways
 
 
