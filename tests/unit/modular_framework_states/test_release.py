@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Letting go counts once the fingers are open and nothing is attached to them."""
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from modular_framework_states.grasp_goals import GraspGoalError
+from modular_framework_states.states import release
+from modular_framework_states.states.release import Release
+
+
+@pytest.fixture
+def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A hand that holds a can, in a scene that lets it go when told, or by itself after some reads."""
+    state = SimpleNamespace(simulation=False, sent=[], held={"can__link": "palm"}, reads_left=0, problem="")
+
+    def send(client: Any, stage: str, grasp: Any, *_: Any) -> None:
+        state.sent.append((stage, list(grasp.pregrasp.posture.position)))
+        if state.problem:
+            raise GraspGoalError(state.problem)
+
+    def held_objects() -> dict[str, str]:
+        if state.simulation and state.reads_left == 0:
+            state.held = {}
+        state.reads_left -= 1
+        return dict(state.held)
+
+    monkeypatch.setattr(release, "rospy", SimpleNamespace(get_param=lambda *_: state.simulation))
+    monkeypatch.setattr(release, "posture_positions", lambda posture: {"f": 0.0})
+    monkeypatch.setattr(release, "send", send)
+    monkeypatch.setattr(release, "held_objects", held_objects)
+    monkeypatch.setattr(release, "detach", lambda objects: [state.held.pop(name) for name in objects])
+    return state
+
+
+def run(timeout: float = 5.0) -> tuple[str, str]:
+    state = Release(timeout=timeout)
+    outcome = state.execute(SimpleNamespace(manipulator_controller_client=None, max_torque=1.0))
+    return outcome, state.reason
+
+
+def test_without_a_simulation_the_object_is_detached_here(hand: Any) -> None:
+    assert run() == ("success", "")
+    assert hand.sent == [("pregrasp", [0.0])] and not hand.held
+
+
+def test_in_simulation_the_object_is_waited_for_until_the_fingers_have_left_it(hand: Any) -> None:
+    hand.simulation, hand.reads_left = True, 3
+    assert run() == ("success", "")
+
+
+def test_what_stays_between_the_fingers_and_fingers_that_do_not_open_are_failures_with_the_reason(hand: Any) -> None:
+    hand.simulation, hand.reads_left = True, 10**6
+    outcome, reason = run(timeout=0.3)
+    assert outcome == "fail" and "still has can__link attached to palm" in reason
+    hand.problem = "joint 'f' is 0.4 away from its target"
+    outcome, reason = run()
+    assert outcome == "fail" and "joint 'f' is 0.4 away" in reason
