@@ -18,7 +18,7 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
     state = SimpleNamespace(simulation=False, sent=[], held={"can__link": "palm"}, reads_left=0, problem="")
 
     def send(client: Any, stage: str, grasp: Any, *_: Any) -> None:
-        state.sent.append((stage, list(grasp.pregrasp.posture.position)))
+        state.sent.append((stage, grasp))
         if state.problem:
             raise GraspGoalError(state.problem)
 
@@ -30,6 +30,7 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(release, "rospy", SimpleNamespace(get_param=lambda *_: state.simulation))
     monkeypatch.setattr(release, "posture_positions", lambda posture: {"f": 0.0})
+    monkeypatch.setattr(release, "posture_grasp", lambda positions, torque: dict(positions))
     monkeypatch.setattr(release, "send", send)
     monkeypatch.setattr(release, "held_objects", held_objects)
     monkeypatch.setattr(release, "detach", lambda objects: [state.held.pop(name) for name in objects])
@@ -44,7 +45,7 @@ def run(timeout: float = 5.0) -> tuple[str, str]:
 
 def test_without_a_simulation_the_object_is_detached_here(hand: Any) -> None:
     assert run() == ("success", "")
-    assert hand.sent == [("pregrasp", [0.0])] and not hand.held
+    assert hand.sent == [("pregrasp", {"f": 0.0})] and not hand.held
 
 
 def test_in_simulation_the_object_is_waited_for_until_the_fingers_have_left_it(hand: Any) -> None:
