@@ -475,6 +475,12 @@ def test_a_file_in_the_folder_cmd_is_a_command(session: Any, tmp_path: Path, mon
     assert interpreter.execute("prepare") == (MoveGroupInfoLevel.DEBUG, "OK")
     assert interpreter.execute("closed") == (MoveGroupInfoLevel.INFO, "[0.0]")
     assert interpreter.execute("load prepare") == (MoveGroupInfoLevel.DEBUG, "OK")
+    (tmp_path / "prepare").write_text("use panda_arm\n")
+    assert interpreter.execute("prepare") == (MoveGroupInfoLevel.DEBUG, "OK")
+    assert interpreter.execute("id") == (MoveGroupInfoLevel.INFO, "hand"), "the file in cmd, not the one beside it"
+    for line in (f"{tmp_path / 'prepare'}", f"many = {[0.12345] * 60}", f"load {'x' * 300}", "load a\0b", "save a\0b"):
+        assert interpreter.execute(line)[0] == MoveGroupInfoLevel.WARN, line
+    assert interpreter.execute("id") == (MoveGroupInfoLevel.INFO, "hand")
 
 
 def test_the_terminal_executes_what_it_reads(session: Any) -> None:

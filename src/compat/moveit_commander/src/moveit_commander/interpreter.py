@@ -2,6 +2,7 @@
 """Commands as text, for people at a terminal and files of commands: MoveGroupCommandInterpreter."""
 from __future__ import annotations
 
+import os.path
 from collections.abc import Callable
 from pathlib import Path
 
@@ -86,8 +87,8 @@ class MoveGroupCommandInterpreter:
             return MoveGroupInfoLevel.WARN, str(error)
 
     def _execute_generic(self, line: str) -> Answer | None:
-        if (FOLDER / line).is_file():
-            return self._load([line])
+        if os.path.isfile(f"{FOLDER}/{line}"):  # a line may be longer than a file name can be, and begin with a slash
+            return self._load([f"{FOLDER}/{line}"])
         words = line.split()
         first = words[0].lower()
         general: dict[str, Callable[[Words], Answer]] = {
@@ -126,11 +127,12 @@ class MoveGroupCommandInterpreter:
     def _load(self, words: Words) -> Answer:
         """Executes a file; it ends at the first line that is not understood or not done."""
         path = Path(words[0] if words else self.DEFAULT_FILENAME)
-        if not path.is_file() and (FOLDER / path).is_file():
-            path = FOLDER / path
+        in_folder = f"{FOLDER}/{path}"
+        if not os.path.isfile(path) and os.path.isfile(in_folder):
+            path = Path(in_folder)
         try:
             lines = path.read_text().splitlines()
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, ValueError) as error:  # no text, or no name of a file
             raise MoveItCommanderException(f"Unable to load {path}: {error}") from error
         for number, line in enumerate(lines, 1):
             command = line.partition("#")[0].strip()
@@ -152,7 +154,7 @@ class MoveGroupCommandInterpreter:
                 lines.append(f"database {database}")
         try:
             path.write_text("".join(f"{line}\n" for line in lines))
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise MoveItCommanderException(f"Unable to save {path}: {error}") from error
         return OK
 
