@@ -41,6 +41,7 @@ class OmplPlanner:
     """
 
     planner_ids = tuple(PLANNERS)
+    improving_ids = ANYTIME
     description = "OMPL"
 
     @staticmethod

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,7 +20,7 @@ from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.last_check import LastCheck
 from modular_framework_planning.motion_check import MotionChecker
 from modular_framework_planning.path_repair import EdgeError
-from modular_framework_planning.path_shortening import shorten
+from modular_framework_planning.path_search import PathSearch
 from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, make_adapters, make_planner
 from modular_framework_planning.planner_configurations import PlannerConfigurations
 from modular_framework_planning.planner_interface import PlannedPath, Planner, PlanningProblem
@@ -29,12 +28,9 @@ from modular_framework_planning.planning_request import PipelineSettings, Planni
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.robot_model import JointGroup, RobotModel
 from modular_framework_planning.spatial import Array
-from modular_framework_planning.trajectory import Trajectory
 
-MAX_SHORTENING_S = 1.0
-SHORTENING_SHARE = 0.3  # of the time left where a planner used all of its own
 RESERVED_S, RESERVED_SHARE = 0.25, 0.2  # of the allowed time, for what follows the search
-BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
+RESERVED_AFTER_IMPROVING_S = 1.0  # where the planner always uses all of its time, so that the rest is all there is
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 CheckerSource = Callable[..., CollisionChecker]
@@ -122,14 +118,14 @@ class PlanningPipeline:
         begun = time.monotonic()
         problem = replace(self._problem(request, begun), repeatable=repeatable)
         adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
-        search = _Search(self._planner)
+        search = PathSearch(self._planner)
         while steps:
             problem = replace(problem, step=steps.pop(0), _goals=[])
             try:
                 path = chain(adapters, search)(problem)
                 fault, answer = self._checked(problem, path, begun)
             except EdgeError as error:
-                fault, search = error.reason, _Search(self._planner)  # the next search looks at its edges more finely
+                fault, search = error.reason, PathSearch(self._planner)  # the next one looks at edges more finely
                 if problem.interrupted():
                     break
             except PlanningError as error:
@@ -143,7 +139,7 @@ class PlanningPipeline:
                     problem = replace(problem, settings=replace(problem.settings,
                                                                 motion_step=problem.settings.motion_step / 4.0))
                 else:
-                    search = _Search(self._planner)
+                    search = PathSearch(self._planner)
         raise _failed(problem, fault)
 
     def _adapters_for(self, request: PlanningRequest) -> tuple[RequestAdapter, ...]:
@@ -216,8 +212,13 @@ class PlanningPipeline:
         return PlanningProblem(
             request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
             self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
-            begun, begun + request.allowed_time_s - _reserved(request.allowed_time_s), begun + request.allowed_time_s,
-            LastCheck(), planner_id, parameters, request.path_constraints)
+            begun, begun + request.allowed_time_s - self._reserved(request.allowed_time_s, planner_id),
+            begun + request.allowed_time_s, LastCheck(), planner_id, parameters, request.path_constraints)
+
+    def _reserved(self, allowed_time_s: float, planner_id: str) -> float:
+        """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""
+        improves = planner_id in getattr(self._planner, "improving_ids", ())
+        return min(RESERVED_AFTER_IMPROVING_S if improves else RESERVED_S, RESERVED_SHARE * allowed_time_s)
 
     def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner's name and settings; raises PlanningError with the names there are."""
@@ -260,32 +261,6 @@ class PlanningPipeline:
                 self._model.max_acceleration[group.indices] * factors[1])
 
 
-class _Search:
-    """The innermost step: checks the start, runs the planner once, lets it repair its path, shortens that."""
-
-    def __init__(self, planner: Planner) -> None:
-        self._planner = planner
-        self._found: PlannedPath | None = None
-        self.repairs = hasattr(planner, "repaired")
-
-    def __call__(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the path; that of the first call, repaired once more, where it is called again."""
-        _require_start(problem)
-        if self._found is None:
-            found = self._planner.plan(problem)
-            now = time.monotonic()
-            self._found = (PlannedPath(found.positions, found, found_s=now, is_short=True)
-                           if isinstance(found, Trajectory) else replace(found, found_s=now))
-        path = self._found
-        if path.is_short or path.trajectory is not None:
-            return path
-        vertices = self._planner.repaired(problem, path.vertices) if self.repairs else path.vertices  # type: ignore
-        if problem.settings.sampling.simplify_solutions:
-            vertices = _shortened(problem, vertices)
-        self._found = replace(path, vertices=vertices)
-        return self._found
-
-
 def _require_time(request: PlanningRequest, begun_s: float) -> None:
     """Raises PlanningError when a request is over before its search began."""
     spent = time.monotonic() - begun_s
@@ -296,11 +271,6 @@ def _require_time(request: PlanningRequest, begun_s: float) -> None:
         raise PlanningError(ErrorCode.TIMED_OUT, f"the collision world of {len(request.scene.objects)} objects was "
                             f"not built in {spent:.2f} s (allowed {request.allowed_time_s:.2f} s); allow more time, "
                             "simplify meshes, or ask again: what was built is kept")
-
-
-def _reserved(allowed_time_s: float) -> float:
-    """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""
-    return min(RESERVED_S, RESERVED_SHARE * allowed_time_s)
 
 
 def _with_fault(error: PlanningError, fault: str) -> PlanningError:
@@ -325,34 +295,3 @@ def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
 def _bare(planner_id: str) -> str:
     """Takes the group off a name such as arm[RRTConnect]."""
     return planner_id.split("[")[-1].rstrip("]") if planner_id.endswith("]") and "[" in planner_id else planner_id
-
-
-def _require_start(problem: PlanningProblem) -> None:
-    """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
-    faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
-    if faults:
-        raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {'; '.join(faults)}; move the robot within "
-                            "its bounds or use the adapter FixStartStateBounds")
-    if not problem.motion.state_is_free(problem.start_values):
-        contacts = problem.checker.contacts(problem.start, include_fixed=False)
-        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state in collision: "
-                            f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
-                            "FixStartStateCollision", contacts)
-    if problem.constraints is not None and not problem.constraints.satisfied(problem.start):
-        raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
-                            f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "
-                            "path constraints or use the adapter FixStartStatePathConstraints")
-
-
-def _shortened(problem: PlanningProblem, path: Array) -> Array:
-    """Shortens a path; what it accepts was looked at as finely as the last check looks."""
-    now = time.monotonic()
-    limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
-    if problem.repeatable:
-        limit = math.inf
-    fine = problem.settings.finest_step
-
-    def edge(first: Array, second: Array) -> bool:
-        return problem.edge_is_valid(first, second, fine)
-
-    return shorten(path, edge, limit, problem.rng)

@@ -167,6 +167,7 @@ class Planner(Protocol):
 
     A class may also have, each optional:
         planner_ids: names it takes as planner_id; any name when it is absent or empty.
+        improving_ids: those of them that improve their path until their time is over.
         replaces_bad_values: whether an unknown planner_id and scaling out of range give a warning and defaults, as in
             OMPL's planning contexts, or are refused; true when it is absent.
         configure(model, settings): class method that makes it; without one it is made without arguments.
