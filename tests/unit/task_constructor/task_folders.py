@@ -2,6 +2,7 @@
 """A small world for tests of the task constructor: a folder of states, the shipped templates, and one valid task."""
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from modular_framework_core.task_constructor import generator, located_yaml
@@ -147,11 +148,11 @@ states:
 """
 
 
-def write_states(folder: Path) -> Path:
-    """Write the state files and return their folder."""
+def write_states(folder: Path, more: Mapping[str, str] | None = None) -> Path:
+    """Write the state files, and more by name, and return their folder."""
     states = folder / "own_states"
     states.mkdir(exist_ok=True)
-    for name, text in STATE_FILES.items():
+    for name, text in {**STATE_FILES, **(more or {})}.items():
         (states / f"{name}.py").write_text(text)
     return states
 
@@ -159,9 +160,9 @@ def write_states(folder: Path) -> Path:
 class World:
     """Builds and generates tasks from text."""
 
-    def __init__(self, folder: Path, *templates: Path) -> None:
+    def __init__(self, folder: Path, *templates: Path, states: Mapping[str, str] | None = None) -> None:
         self.folder = folder
-        self.states = StateCatalogue([write_states(folder)])
+        self.states = StateCatalogue([write_states(folder, states)])
         self.known = KNOWN
         self.template_folders = [*templates, TEMPLATES]
         self.templates = TemplateCatalogue(self.template_folders)

@@ -105,6 +105,40 @@ class {{ state_machine.type }}(smach.StateMachine):
         assert said in faults[0]
 
 
+SMACH_STATE = """\
+import smach
+
+
+class Unlock(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=["opened", "stuck"], input_keys=["door"], output_keys=["angle"])
+
+    def execute(self, userdata):
+        door = userdata.door
+        userdata.angle = 1.0 if door else 0.0
+        return "opened"
+"""
+
+
+def test_a_state_that_declares_its_keys_itself_is_taken_at_its_word(tmp_path: Path) -> None:
+    text = """\
+name: tiny
+source: framework_state_machine
+outcomes: [done, gave_up]
+states:
+  - A:
+      source: unlock
+      remapping: {door: selected_pose, angle: selected_plan}
+      transitions: {opened: done, stuck: gave_up}
+"""
+    world = World(tmp_path, states={"unlock": SMACH_STATE})
+    assert world.faults(text) == []
+    misspelt = world.faults(text.replace("opened:", "success:"))
+    assert "outcome 'success' is unknown; allowed: opened, stuck" in misspelt[1]
+    other = World(tmp_path, states={"unlock": SMACH_STATE.replace("door = userdata.door", "door = userdata.gate")})
+    assert other.faults(text)[0].endswith("but its input keys are: door; add it to input_keys in unlock.py")
+
+
 def test_the_good_tasks_have_no_fault(world: World) -> None:
     shared = NESTED.replace("outcomes: [done, gave_up]\n      states", "outcomes: [done, gave_up]\n      userdata: "
                             "self.userdata\n      states")

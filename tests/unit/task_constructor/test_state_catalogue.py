@@ -43,6 +43,25 @@ def test_a_state_without_constructor_has_that_of_its_base(tmp_path: Path) -> Non
     assert list(catalogue(tmp_path, plan=text).get("plan").options) == ["a"]
 
 
+CALLS = {
+    "smach.State.__init__(self, outcomes=['a', 'b'], input_keys=['x'], output_keys=('y',))":
+        (("a", "b"), ("x",), ("y",)),
+    "smach.State.__init__(self, ['a', 'b'], ['x'])": (("a", "b"), ("x",), ()),
+    "super().__init__(outcomes, input_keys=NAMES)": (("success", "fail"), ("named",), ()),
+    "super().__init__(list(outcomes), input_keys + ['more'])": (("success", "fail"), None, ()),
+    "super().__init__(*arguments)": (None, None, None),
+    "super().__init__(outcomes); self.register_input_keys(['z'])": (("success", "fail"), None, ()),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_what_a_constructor_declares_itself_is_known(tmp_path: Path, call: str) -> None:
+    text = (f"NAMES = ['named']\nclass Plan(smach.State):\n    def __init__(self, outcomes=('success', 'fail')):\n"
+            f"        {call}\n")
+    source = catalogue(tmp_path, plan=text).get("plan")
+    assert tuple(source.default_names(key) for key in ("outcomes", "input_keys", "output_keys")) == CALLS[call]
+
+
 def test_a_base_from_elsewhere_leaves_the_options_open(tmp_path: Path) -> None:
     source = catalogue(tmp_path, plan="import x\nclass Plan(x.Y):\n    pass\n").get("plan")
     assert source.takes_any_option

@@ -26,8 +26,8 @@ from typing import Any
 
 import smach
 from modular_framework_core.stop_requests import stoppable
+from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
 from modular_framework_core.task_constructor.option_checks import checks_options
-from modular_framework_core.task_constructor.state_catalogue import STATE_KEYS
 
 DEFAULT_OUTCOMES = ("success", "fail")
 
@@ -162,8 +162,8 @@ class FrameworkState(smach.State):
 
 def _stoppable(execute: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
     @functools.wraps(execute)
-    def heeding(state: FrameworkState, userdata: Any) -> str:
+    def execute_stoppable(state: FrameworkState, userdata: Any) -> str:
         with stoppable(state.stop_requested):
             return execute(state, userdata)
 
-    return heeding
+    return execute_stoppable

@@ -6,9 +6,10 @@ import inspect
 import re
 import textwrap
 
+from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
 from modular_framework_core.task_constructor.generator import GenerationError, literal
 from modular_framework_core.task_constructor.machine_keys import MachineKey, machine_keys
-from modular_framework_core.task_constructor.state_catalogue import STATE_KEYS, StateOption, StateSource
+from modular_framework_core.task_constructor.state_catalogue import StateOption, StateSource
 from modular_framework_core.task_constructor.template_catalogue import TemplateSource
 
 _WIDTH = 110
@@ -88,4 +89,6 @@ def _names(source: StateSource, key: str) -> str:
     names = source.default_names(key)
     if names is None:
         return "not known from the source"
-    return f"{', '.join(names) or 'none'} (by default)" if key in source.options else "none, and cannot be set"
+    if key in source.options and key not in source.own_keys:
+        return f"{', '.join(names) or 'none'} (by default)"
+    return f"{', '.join(names) or 'none'}, and cannot be set"

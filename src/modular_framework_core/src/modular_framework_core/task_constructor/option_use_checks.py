@@ -121,10 +121,12 @@ class _Checker:
         declared = self._inputs if direction == "input" else self._outputs
         if declared is None or key in declared:
             return
-        does = "takes" if direction == "input" else "writes"
-        self._faults.add(place, f"state '{self._state.label}' ({self._state.source.name}): {what} {does} the userdata "
-                                f"key '{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
-                                f"add it to {listed or f'{direction}_keys'}")
+        does, listed = "takes" if direction == "input" else "writes", listed or f"{direction}_keys"
+        source = self._state.source
+        where = f"{listed} in {source.file.name}" if listed in source.own_keys else listed
+        self._faults.add(place, f"state '{self._state.label}' ({source.name}): {what} {does} the userdata key '{key}', "
+                                f"but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; add it to "
+                                f"{where}")
 
     def _check_reads(self) -> None:
         """Note keys that the source reads and the task's own lists of keys leave out."""

@@ -5,17 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from modular_framework_core.task_constructor import header_fields
+from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
 from modular_framework_core.task_constructor.faults import FaultList, Place
 from modular_framework_core.task_constructor.key_spelling import meant_key, spelt_as_meant, value_of
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.task_constructor.option_types import complaint
 from modular_framework_core.task_constructor.params_scope import ParamsScope
-from modular_framework_core.task_constructor.state_catalogue import (
-    STATE_KEYS,
-    StateCatalogue,
-    StateSource,
-    StateSourceError,
-)
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSource, StateSourceError
 from modular_framework_core.task_constructor.task_spec import StateSpec
 
 _RESERVED = ("source", "transitions", "remapping", "params")
@@ -82,7 +78,7 @@ class StateBuilder:
             elif option.name in options and option.name not in STATE_KEYS:
                 wrong = complaint(option.type, options[option.name])
                 if wrong is not None:
-                    self._faults.add(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
+                    self._faults.add_cause(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
         self._faults.harmless += len(self._faults) - before
         for key in STATE_KEYS:
             if key in options:
@@ -138,7 +134,7 @@ class StateBuilder:
         return options
 
     def _state_outcomes(self, options: dict[str, Node], source: StateSource) -> tuple[str, ...] | None:
-        if "outcomes" in options:
+        if "outcomes" in options and "outcomes" not in source.own_keys:
             return header_fields.names(options["outcomes"], "outcomes", FaultList())
         return source.default_names("outcomes") or None
 

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_core.option_uses import Use
+from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS, own_keys
 from modular_framework_core.task_constructor.option_annotations import from_annotation, uses_in
 from modular_framework_core.task_constructor.option_types import Anything, OptionType
 from modular_framework_core.task_constructor.state_imports import missing_imports
 from modular_framework_core.task_constructor.userdata_reads import UserdataReads, reads_of
 
 _FRAMEWORK = Path(__file__).resolve().parents[2]
-
-STATE_KEYS = ("outcomes", "input_keys", "output_keys", "io_keys")
-"""Options every state has."""
 
 BASE_DEFAULTS: dict[str, tuple[str, ...]] = {
     "FrameworkState": ("success", "fail"),
@@ -67,6 +65,7 @@ class StateSource:
         missing_imports: what the file imports that Python does not find, a message each.
         userdata: what the class reads of userdata.
         text: the source, for what can be told only by a word in it.
+        own_keys: outcomes and userdata keys that the constructor declares itself; None where they cannot be known.
     """
 
     name: str
@@ -79,9 +78,12 @@ class StateSource:
     missing_imports: tuple[str, ...] = ()
     userdata: UserdataReads = UserdataReads()
     text: str = field(default="", repr=False)
+    own_keys: dict[str, tuple[str, ...] | None] = field(default_factory=dict)
 
     def default_names(self, key: str) -> tuple[str, ...] | None:
         """Return the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
+        if key in self.own_keys:
+            return self.own_keys[key]
         option = self.options.get(key)
         if option is None:
             return None if self.takes_any_option else ()
@@ -162,11 +164,13 @@ def _read_state(name: str, file: Path) -> StateSource:
             f"{file} must define the class {wanted} (the file name in camel case); it defines: "
             f"{', '.join(classes) or 'no class'}"
         )
-    options, takes_any = _constructor_options(classes[wanted], classes, {**_imported(tree, file), **_aliases(tree)})
+    aliases = {**_imported(tree, file), **_aliases(tree)}
+    options, takes_any = _constructor_options(classes[wanted], classes, aliases)
     is_ours = _is_framework_state(classes[wanted], classes)
     doc = ast.get_docstring(classes[wanted]) or ""
     return StateSource(name, file, wanted, options, takes_any, is_ours, doc, missing_imports(tree, file),
-                       reads_of(classes[wanted]), file.read_text(encoding="utf-8"))
+                       reads_of(classes[wanted]), file.read_text(encoding="utf-8"),
+                       _own_keys(classes[wanted], classes, aliases))
 
 
 def _parsed(file: Path) -> ast.Module:
@@ -227,6 +231,18 @@ def _constructor_options(
             defaults: dict[str, tuple[str, ...]] = {"outcomes": BASE_DEFAULTS[base_name]}
             return {key: StateOption(key, False, defaults.get(key, ()), True) for key in STATE_KEYS}, False
     return {}, True
+
+
+def _own_keys(
+    node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
+) -> dict[str, tuple[str, ...] | None]:
+    """Return what the constructor of a class, or that of its base, declares by itself."""
+    bases = [_base_name(base) for base in node.bases]
+    for item in node.body:
+        if isinstance(item, ast.FunctionDef) and item.name == "__init__":
+            return own_keys(item, bool(bases) and bases[0] in BASE_DEFAULTS, aliases)
+    inner = next((name for name in bases if name in classes and name != node.name), None)
+    return {} if inner is None else _own_keys(classes[inner], classes, aliases)
 
 
 def _arguments(

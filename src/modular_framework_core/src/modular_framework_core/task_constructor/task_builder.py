@@ -7,7 +7,7 @@ from pathlib import Path
 
 from modular_framework_core.task_constructor import header_fields, located_yaml, machine_checks, userdata_checks
 from modular_framework_core.task_constructor.faults import FaultList, Place
-from modular_framework_core.task_constructor.key_spelling import value_of
+from modular_framework_core.task_constructor.key_spelling import meant_key, value_of
 from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
@@ -62,11 +62,11 @@ class TaskBuilder:
             self._faults.raise_if_any()
         assert isinstance(document, Mapping)
         self._faults.harmless = len(self._faults)
-        scope = ParamsScope().inner(params_of(document.entries.get("params"), self._faults), self._faults)
+        scope = ParamsScope().inner(params_of(value_of(document, "params"), self._faults), self._faults)
         name = "task"
         given = value_of(document, "name")
         label = str(given.value) if isinstance(given, Scalar) else name
-        header = self._headers.spelt(self._resolved_header(document, scope), label, is_root=True)
+        header = self._headers.spelt(self._resolved(document, scope, is_machine=True), label, is_root=True)
         if "name" in header.entries:
             name = header_fields.identifier(header.entries["name"], "name", self._faults) or name
         node = name
@@ -130,12 +130,11 @@ class TaskBuilder:
             place=header.place,
         )
 
-    def _resolved_header(self, node: Mapping, scope: ParamsScope) -> Mapping:
-        """Resolve the references of a header, leaving what is read later, or not at all."""
-        entries = {
-            key: value if key in UNREAD else scope.resolve(value, self._faults)
-            for key, value in node.entries.items()
-        }
+    def _resolved(self, node: Mapping, scope: ParamsScope, *, is_machine: bool) -> Mapping:
+        """Resolve the references of a header or state, leaving what is read later, or not at all."""
+        unread = {key for key in node.entries if key in UNREAD or (is_machine and meant_key(key, UNREAD))}
+        entries = {key: value if key in unread else scope.resolve(value, self._faults)
+                   for key, value in node.entries.items()}
         return Mapping(entries, node.keys, node.place)
 
     def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
@@ -208,11 +207,13 @@ class TaskBuilder:
     def _child(
         self, label: str, place: Place, body: Mapping, outer: ParamsScope, parent_type: str
     ) -> tuple[ChildSpec | None, ChildLinks]:
-        scope = outer.inner(params_of(body.entries.get("params"), self._faults), self._faults)
-        body = self._resolved_header(body, scope)
+        is_machine = "states" in body.entries or bool(self._headers.template_named(value_of(body, "source")))
+        params = value_of(body, "params") if is_machine else body.entries.get("params")
+        scope = outer.inner(params_of(params, self._faults), self._faults)
+        body = self._resolved(body, scope, is_machine=is_machine)
         spec: ChildSpec | None
         outcomes: tuple[str, ...] | None
-        if "states" in body.entries or self._headers.template_named(value_of(body, "source")):
+        if is_machine or self._headers.template_named(value_of(body, "source")):
             body = self._headers.spelt(body, label, is_root=False)
             spec = self._machine(label, body, scope, parent_type)
             outcomes = None if spec is None else spec.outcomes

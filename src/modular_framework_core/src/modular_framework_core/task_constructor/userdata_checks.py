@@ -124,5 +124,5 @@ def declared_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
         state: the state.
         key: input_keys, output_keys or io_keys.
     """
-    given = state.options.get(key)
+    given = None if key in state.source.own_keys else state.options.get(key)
     return tuple(given) if isinstance(given, (list, tuple)) else state.source.default_names(key)
