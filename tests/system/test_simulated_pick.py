@@ -58,7 +58,7 @@ def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None
 
 @pytest.mark.parametrize(("name", "value", "code", "cause"), [
     ("simulation", "flase", 2, "argument 'simulation' is 'flase', allowed are true and false"),
-    ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: the file cannot be read"),
+    ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: there is no such file"),
     ("world_file", "no.world", 3, "node 'gazebo' died .*no.world: cannot be read")])
 def test_the_last_lines_say_what_is_wrong_and_no_interrupted_node_prints_a_traceback(
         session: RosSession, name: str, value: str, code: int, cause: str) -> None:

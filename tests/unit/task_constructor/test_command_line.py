@@ -147,6 +147,37 @@ def test_names_that_another_node_adds_are_named_in_the_task_and_other_configurat
     assert main(["--check", str(script)]) == 0, capsys.readouterr().err
 
 
+def test_a_name_that_a_state_of_ones_own_or_a_service_is_called_with_may_be_made_by_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script = tmp_path / "t.yaml"
+    makes = ("  - B: {source: call_service, service_name: my_planner, request: {name: %s}, "
+             "transitions: {success: A, fail: gave_up}}\n")
+    moves = "initial_state: B\n" + ONE_STATE % "source: move, plan_name: homing"
+    script.write_text(moves + makes % "homing")
+    assert main(["--check", str(script)]) == 0, capsys.readouterr().err
+    script.write_text(moves + makes % "homming")
+    assert main(["--check", str(script)]) == 1
+    assert "the plan 'homing' is unknown" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("option", "reason"), [
+    (["--config", "/nowhere"], "configuration folder /nowhere is not a directory"),
+    (["--moveit-config", "no_such_config"], "package 'no_such_config' is not found"),
+])
+def test_a_configuration_that_is_not_there_is_refused_and_not_left_unchecked(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], option: list[str], reason: str
+) -> None:
+    assert main(["--check", *arguments[:3], *option]) == 1
+    assert reason in capsys.readouterr().err
+
+
+def test_a_task_that_is_not_there_is_named_with_those_that_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--check", "simulation_pik.yaml"]) == 1
+    message = capsys.readouterr().err
+    assert "there is no such file; allowed: pick_and_hold.yaml, simulation_pick.yaml; did you mean" in message
+
+
 def test_several_directories_are_separated_by_colons() -> None:
     assert directories_from("/a:/b:") == [Path("/a"), Path("/b")]
     assert directories_from("") == []

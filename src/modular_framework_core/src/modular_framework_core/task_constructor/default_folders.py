@@ -54,7 +54,7 @@ def templates_folders(own: Sequence[Path]) -> list[Path]:
 def config_folder() -> Path | None:
     """Return the configuration folder of the API package; None when that package is not there."""
     folder = _package(API_PACKAGE)
-    return None if folder is None else folder / "config"
+    return None if folder is None or not (folder / "config").is_dir() else folder / "config"
 
 
 def task_script(name: Path) -> Path:

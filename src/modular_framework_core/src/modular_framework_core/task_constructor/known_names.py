@@ -63,8 +63,10 @@ def names_of_config(folder: Path) -> KnownNames:
     """Return the names in the YAML files of a configuration folder; a file that is not there leaves its kind unknown.
 
     Raises:
-        ValueError: a file cannot be read; names it.
+        ValueError: the folder is not there, or a file cannot be read; names it.
     """
+    if not folder.is_dir():
+        raise ValueError(f"configuration folder {folder} is not a directory; name the one with named_joint_states.yaml")
     names: dict[str, frozenset[str]] = {}
     origins: dict[str, str] = {}
     for kind, file in _FILES.items():
@@ -88,11 +90,14 @@ def names_of_installation(config: Path | None, moveit_package: str = "") -> Know
         moveit_package: name of the package; "" for that of the API package's launch file.
 
     Raises:
-        ValueError: a file cannot be read.
+        ValueError: a file cannot be read, or what was named is not there.
     """
     folder = config or default_folders.config_folder()
     names = KnownNames() if folder is None else names_of_config(folder)
     srdf = default_folders.srdf_file(moveit_package)
+    if srdf is None and moveit_package:
+        raise ValueError(f"package '{moveit_package}' is not found, or has not exactly one SRDF in config/; name the "
+                         "robot's MoveIt configuration package, one that is on ROS_PACKAGE_PATH")
     return names if srdf is None else names.with_robot(srdf.read_text(encoding="utf-8"), str(srdf))
 
 

@@ -10,7 +10,7 @@ from typing import Any, Union
 
 import yaml
 
-from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault
+from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault, listing, nearest
 from modular_framework_core.whole_files import read_whole
 
 MAX_NODES = 500_000
@@ -105,6 +105,10 @@ def load(path: Path, faults: FaultList) -> Node:
     start = Place(str(path), 1, 1)
     try:
         text = read_whole(path)
+    except FileNotFoundError as error:
+        there = sorted(file.name for file in path.parent.glob("*.yaml"))
+        raise TaskFault([Fault(start, f"there is no such file; {listing(there, 'no other .yaml is in its folder')}"
+                                      f"{nearest(path.name, there)}")]) from error
     except (OSError, UnicodeDecodeError) as error:
         raise TaskFault([Fault(start, f"the file cannot be read: {error}")]) from error
     return loads(text, str(path), faults)

@@ -19,7 +19,7 @@ class HeaderReader:
     """Reads headers of the machines of one task."""
 
     def __init__(self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList) -> None:
-        """Use these templates; the states serve to tell a state from a misspelt template."""
+        """Use these templates; the states serve to distinguish a state from a misspelt template."""
         self._states = states
         self._templates = templates
         self._faults = faults

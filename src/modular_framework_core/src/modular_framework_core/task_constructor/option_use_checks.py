@@ -35,20 +35,24 @@ def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, compl
         complete: whether all states of the task could be read, so that no other makes a plan.
     """
     states = list(root.leaf_states())
+    maybe_made = frozenset(_unexplained(states))
     names = known.with_names(_made(states))
     open_kinds = {kind for kind in names.names if any(_may_make(state, kind) for state in states)}
     open_kinds |= set() if complete else {"plan"}
     for state in states:
-        _Checker(state, names, open_kinds, faults).check()
+        _Checker(state, names, open_kinds, maybe_made, faults).check()
 
 
 class _Checker:
     """Checks the options of one state."""
 
-    def __init__(self, state: StateSpec, known: KnownNames, open_kinds: set[str], faults: FaultList) -> None:
+    def __init__(
+        self, state: StateSpec, known: KnownNames, open_kinds: set[str], maybe_made: frozenset[str], faults: FaultList
+    ) -> None:
         self._state = state
         self._known = known
         self._open = open_kinds
+        self._maybe_made = maybe_made
         self._faults = faults
         self._inputs = _declared(state, ("input_keys", "io_keys"))
         self._outputs = _declared(state, ("output_keys", "io_keys"))
@@ -98,7 +102,8 @@ class _Checker:
                     self._need("input", keys[-1], f"option '{option}' 'userdata'", item.place)
                 continue
             names = self._known.names.get(kind)
-            if names is not None and kind not in self._open and name not in names:
+            made = name in self._maybe_made and kind not in _WORDS
+            if names is not None and kind not in self._open and name not in names and not made:
                 self._faults.add(item.place, self._unknown(option, kind, name, names))
 
     def _unknown(self, option: str, kind: str, name: str, names: frozenset[str]) -> str:
@@ -151,15 +156,7 @@ def _declared(state: StateSpec, lists: tuple[str, ...]) -> frozenset[str] | None
 
 def _references(node: Node) -> Iterator[tuple[Place, str]]:
     """Yield the references to userdata in the fields of a message, with their places."""
-    match node:
-        case Scalar(value=str(text)) if text.startswith(USERDATA_PREFIX):
-            yield node.place, text
-        case Sequence(items=items):
-            for item in items:
-                yield from _references(item)
-        case Mapping(entries=entries):
-            for item in entries.values():
-                yield from _references(item)
+    return ((place, text) for place, text in _texts(node) if text.startswith(USERDATA_PREFIX))
 
 
 def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
@@ -171,6 +168,31 @@ def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
                 if isinstance(use, Named) and use.made:
                     found.setdefault(use.kind, set()).add(str(state.options.get(option.name, option.default)))
     return {kind: frozenset(names - {""}) for kind, names in found.items()}
+
+
+def _unexplained(states: list[StateSpec]) -> Iterator[str]:
+    """Yield the texts in options of which no annotation says that they name a message to be read.
+
+    Such a state may store a message under that name: one of the user's own, or a service that is called with it.
+    """
+    for state in states:
+        for name, node in state.nodes.items():
+            option = state.source.options.get(name)
+            if option is None or not any(isinstance(use, Named) for use in option.uses):
+                yield from (text for _, text in _texts(node))
+
+
+def _texts(node: Node) -> Iterator[tuple[Place, str]]:
+    """Yield all texts in a value, with their places."""
+    match node:
+        case Scalar(value=str(text)):
+            yield node.place, text
+        case Sequence(items=items):
+            for item in items:
+                yield from _texts(item)
+        case Mapping(entries=entries):
+            for item in entries.values():
+                yield from _texts(item)
 
 
 def _may_make(state: StateSpec, kind: str) -> bool:

@@ -136,7 +136,8 @@ def _checked(given: argparse.Namespace, task: TaskSpec) -> str:
     if given.graph:
         task_graph.write(task, given.graph)
         return str(given.graph)
-    return f"{given.script}: task '{task.name}' is in order, {len(list(task.root.leaf_states()))} states"
+    count = len(list(task.root.leaf_states()))
+    return f"{given.script}: task '{task.name}' is in order, {count} state{'' if count == 1 else 's'}"
 
 
 def _about_language(given: argparse.Namespace, states: StateCatalogue, templates: TemplateCatalogue) -> str:

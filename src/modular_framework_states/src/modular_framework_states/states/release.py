@@ -48,7 +48,7 @@ class Release(FrameworkState):
             grasp = posture_grasp(posture_positions(self._posture), 1.0)
             send(userdata.manipulator_controller_client, "pregrasp", grasp, userdata.max_torque, self._timeout_s,
                  self.preempt_requested)
-            if rospy.get_param(SIMULATION_PARAMETER, False) is True:
+            if rospy.get_param(SIMULATION_PARAMETER, False):  # roslaunch makes a number of simulation:=1
                 wait_until(lambda: self.preempt_requested() or not held_objects(), self._timeout_s, SCENE_PERIOD_S)
             elif held := held_objects():
                 detach(held)
@@ -60,5 +60,5 @@ class Release(FrameworkState):
         if left:
             return self.fail(f"the fingers are open ('{self._posture}'), but the planning scene still has "
                              f"{', '.join(left)} attached to {', '.join(sorted(set(left.values())))} after "
-                             f"{self._timeout_s:g} s; look what keeps it between the fingers")
+                             f"{self._timeout_s:g} s; check what keeps it between the fingers")
         return self.succeed()
