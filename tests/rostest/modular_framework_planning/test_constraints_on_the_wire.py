@@ -266,6 +266,11 @@ def test_an_orientation_that_was_not_filled_in_is_the_identity() -> None:
     results = [call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
                     Constraints(orientation_constraints=[item])).constraint_result[0] for item in (given, empty)]
     assert results[0] == results[1]
+    regions = [in_box(0.2, 0.5, 1.1, (0.1, 0.2, 0.3)) for _ in range(2)]
+    regions[1].constraint_region.primitive_poses[0].orientation = Quaternion()
+    results = [call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
+                    Constraints(position_constraints=[item])).constraint_result[0] for item in regions]
+    assert results[0] == results[1] and np.isfinite(results[0].distance)
 
 
 def test_fk_answers_many_links_in_any_frame() -> None:

@@ -22,7 +22,7 @@ from modular_framework_planning.errors import ErrorCode, GeometryError, Planning
 from modular_framework_planning.joint_limits import BEYOND_BOUND
 from modular_framework_planning.planning_scene import PlanningScene
 from modular_framework_planning.regions import BoxSolid, ConeSolid, CylinderSolid, HullSolid, Solid, SphereSolid
-from modular_framework_planning.spatial import Transform, make_transform, turned
+from modular_framework_planning.spatial import IDENTITY_XYZW, Transform, make_transform, quaternion_or_identity
 
 PRIMITIVES: dict[int, tuple[Callable[..., Solid], int]] = {
     SolidPrimitive.BOX: (BoxSolid, 3), SolidPrimitive.SPHERE: (SphereSolid, 1),
@@ -153,13 +153,6 @@ class _Reader:
                                    [*scene.model.frame_ids, *scene.attached])
         return frame_on_robot(scene, name)
 
-    def _pose(self, message: Any, where: str) -> Transform:
-        p, q = message.position, message.orientation
-        try:
-            return make_transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), where)
-        except GeometryError as error:
-            raise PlanningError(self._code, error.reason) from error
-
     def position(self, message: Any, where: str) -> PositionConstraint:
         """Reads a PositionConstraint."""
         offset = message.target_point_offset
@@ -184,13 +177,15 @@ class _Reader:
         return tuple(regions)
 
     def _region_pose(self, shape: Any, pose: Any, where: str) -> Transform:
-        """Reads where a region is; a ball looks the same however it is turned, so its rotation may be left out."""
-        q = pose.orientation
-        if getattr(shape, "type", 0) == SolidPrimitive.SPHERE and (q.x, q.y, q.z, q.w) == (0.0, 0.0, 0.0, 0.0):
-            p = pose.position
-            self._finite(where, x=p.x, y=p.y, z=p.z)
-            return make_transform((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0), where)
-        return self._pose(pose, where)
+        """Reads where a region is; a rotation left out is none, as in MoveIt, and for a ball nothing to warn of."""
+        p, q = pose.position, pose.orientation
+        rotation = (q.x, q.y, q.z, q.w)
+        is_ball = getattr(shape, "type", 0) == SolidPrimitive.SPHERE
+        try:
+            return make_transform((p.x, p.y, p.z), IDENTITY_XYZW if is_ball and not any(rotation) else
+                                  quaternion_or_identity(rotation, where), where)
+        except GeometryError as error:
+            raise PlanningError(self._code, error.reason) from error
 
     def _solid(self, shape: Any, where: str) -> Solid:
         try:
@@ -209,7 +204,7 @@ class _Reader:
         """Reads an OrientationConstraint."""
         q = message.orientation
         try:
-            quaternion = turned((q.x, q.y, q.z, q.w), f"{where}: orientation")
+            quaternion = quaternion_or_identity((q.x, q.y, q.z, q.w), f"{where}: orientation")
             target = make_transform((0.0, 0.0, 0.0), quaternion, f"{where}: orientation").rotation
         except GeometryError as error:
             raise PlanningError(self._code, error.reason) from error

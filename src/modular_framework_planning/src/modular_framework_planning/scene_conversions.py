@@ -18,12 +18,12 @@ from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix
 from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
 from modular_framework_planning.planning_scene import OCTOMAP_ID, PlanningScene
 from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
-from modular_framework_planning.spatial import Transform, make_transform, turned
+from modular_framework_planning.spatial import Transform, make_transform, quaternion_or_identity
 
 
 def _transform(pose: Any, where: str) -> Transform:
     p, q = pose.position, pose.orientation
-    return make_transform((p.x, p.y, p.z), turned((q.x, q.y, q.z, q.w), where), where)
+    return make_transform((p.x, p.y, p.z), quaternion_or_identity((q.x, q.y, q.z, q.w), where), where)
 
 
 def _is_unset(pose: Any) -> bool:

@@ -44,7 +44,7 @@ def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], 
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), translation)
 
 
-def turned(quaternion_xyzw: Sequence[float], where: str) -> Sequence[float]:
+def quaternion_or_identity(quaternion_xyzw: Sequence[float], where: str) -> Sequence[float]:
     """Returns the quaternion; for one of no length, as a message not filled in has it, the identity and a warning."""
     if any(quaternion_xyzw):
         return quaternion_xyzw

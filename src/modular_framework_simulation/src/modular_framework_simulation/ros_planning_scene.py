@@ -42,8 +42,9 @@ _PRESENCE_PERIOD_S = 0.5
 _RETRY_PERIOD_S = 0.5
 _COMPARE_PERIOD_S = 2.0
 """At most so long the scene differs from the world unnoticed where no change of the scene is heard of."""
-_COMPARE_PAUSE_S = 0.3
-"""After a comparison, while the scene changes all the time, as it does while the robot moves."""
+_COMPARE_PAUSE_S, _COMPARE_SHARE = 0.3, 0.1
+"""After a comparison, while the scene changes all the time, as it does while the robot moves: so long at least, and so
+long that comparisons take no more than this share of the time (a held mesh comes with all its triangles)."""
 _OBJECTS = PlanningSceneComponents(
     PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
 )
@@ -71,6 +72,7 @@ class PlanningScenePublisher:
         self._next_lookup_s = 0.0
         self._scene_changed = threading.Event()
         self._compared_s = 0.0
+        self._compare_pause_s = _COMPARE_PAUSE_S
         self._last_problem = ""
 
     def connect(self) -> None:
@@ -131,12 +133,14 @@ class PlanningScenePublisher:
 
     def _compare(self) -> None:
         """Reads which objects the scene has, where it changed or was not read for a while."""
-        since_s = time.monotonic() - self._compared_s
-        if since_s < (_COMPARE_PAUSE_S if self._scene_changed.is_set() else _COMPARE_PERIOD_S):
+        begun = time.monotonic()
+        if begun - self._compared_s < (self._compare_pause_s if self._scene_changed.is_set() else _COMPARE_PERIOD_S):
             return
         self._scene_changed.clear()
         scene = rospy.ServiceProxy(ros_names.GET_PLANNING_SCENE, GetPlanningScene)(_OBJECTS).scene
         self._compared_s = time.monotonic()
+        cost_s = self._compared_s - begun
+        self._compare_pause_s = min(max(_COMPARE_PAUSE_S, cost_s / _COMPARE_SHARE), _COMPARE_PERIOD_S)
         ids = {conversions.collision_object_id(*key): key for key in self._changes.keys}
         in_world = {ids[item.id] for item in scene.world.collision_objects if item.id in ids}
         held = scene.robot_state.attached_collision_objects
