@@ -2,6 +2,8 @@
 """The scene: snapshots never change, attaching and detaching keep the place, bad geometry is refused."""
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
 from modular_framework_planning.collision import CollisionChecker
 from modular_framework_planning.errors import GeometryError, PlanningError, UnknownNameError
+from modular_framework_planning.motion_problems import read_scene
 from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model import RobotModel
 from modular_framework_planning.shapes import Box, Cylinder, Mesh, Plane, Sphere
@@ -166,3 +169,18 @@ def test_objects_without_shape_or_name_or_with_a_links_name_are_refused(model: R
         scene.with_attached(AttachedObject(box("x", at(0, 0, 0)), "nowhere", frozenset()))
     with pytest.raises(UnknownNameError, match="frame 'nowhere'"):
         scene.frame_transform("nowhere")
+
+
+def test_objects_of_a_problem_file_are_in_the_frame_it_names(model: RobotModel, tmp_path: Path) -> None:
+    file = tmp_path / "scene0001.yaml"
+    text = ("world: {collision_objects: [{id: crate, header: {frame_id: FRAME}, primitives: [{type: box, dimensions: "
+            "[0.1, 0.1, 0.1]}], pose: {position: [0.1, 0.2, 0.3], orientation: [0, 0, 0, 1]}}]}\n")
+    for frame in ("", "tool0"):
+        file.write_text(text.replace("FRAME", f"'{frame}'"))
+        scene = read_scene(model, file)
+        expected = scene.frame_transform(frame).act(np.array([0.1, 0.2, 0.3]))
+        assert scene.objects["crate"].pose.translation == pytest.approx(expected)
+    assert scene.frame_transform("tool0").translation != pytest.approx([0.0, 0.0, 0.0])
+    file.write_text(text.replace("FRAME", "nowhere"))
+    with pytest.raises(PlanningError, match="'nowhere'"):
+        read_scene(model, file)

@@ -196,6 +196,15 @@ def test_an_orientation_that_was_not_filled_in_is_the_identity(scene: Scene, cap
     assert "collision object 'b': quaternion xyzw 0 0 0 0 has no length; the identity 0 0 0 1 is used" in caplog.text
 
 
+def test_objects_of_a_whole_scene_may_be_given_in_frames_of_tf(scene: Scene) -> None:
+    seen = scene.with_fixed_frames({"camera": pin.SE3(np.eye(3), np.array([0.3, 0.2, 1.5]))})
+    message = PlanningScene(is_diff=False)
+    message.world.collision_objects = [body("crate", frame="camera", at=pose(0.1))]
+    after = apply_scene(seen, message)
+    assert list(after.objects) == ["crate"]
+    assert after.objects["crate"].pose.translation == pytest.approx([0.4, 0.2, 1.5])
+
+
 def test_a_message_with_nothing_but_defaults_keeps_the_entries(scene: Scene) -> None:
     message = PlanningScene(is_diff=True)
     message.allowed_collision_matrix.default_entry_names = [WRIST, "<octomap>"]

@@ -57,7 +57,8 @@ def read_scene(model: RobotModel, path: Path) -> PlanningScene:
         poses = entry.get("primitive_poses") or [None] * len(entry["primitives"])
         shapes = tuple((_shape(item, where), _pose(pose, where))
                        for item, pose in zip(entry["primitives"], poses, strict=True))
-        scene = scene.with_object(CollisionObject(entry["id"], _pose(entry.get("pose"), where), shapes))
+        frame = scene.frame_transform(str((entry.get("header") or {}).get("frame_id", "")))
+        scene = scene.with_object(CollisionObject(entry["id"], frame * _pose(entry.get("pose"), where), shapes))
     return scene
 
 

@@ -34,14 +34,16 @@ def apply_world(scene: PlanningScene, world: Any) -> PlanningScene:
 def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
     """Returns the scene after a diff, or the scene a full message describes.
 
-    A full message replaces objects, attached objects, octomap, colours and fixed frames; joints it does not name, link
-    paddings it does not name, and the allowed collisions if it has none, are those the robot began with.
+    A full message replaces objects, attached objects, octomap and colours; the allowed collisions, if it has none, are
+    those the robot began with. Joints and paddings it does not name, and known frames (those of tf among them, in which
+    its objects may be given) stay, as in MoveIt.
 
     Raises:
         PlanningError: something in the message is not usable; the given scene is unchanged, as always.
     """
     if not message.is_diff:
-        scene = empty_scene(scene.model, scene.positions).with_padding(scene.padding)
+        scene = empty_scene(scene.model, scene.positions).with_padding(scene.padding).with_fixed_frames(
+            scene.fixed_frames)
     if message.name:
         scene = scene.with_name(message.name)
     if message.fixed_frame_transforms:

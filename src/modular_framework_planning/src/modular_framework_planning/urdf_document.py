@@ -60,7 +60,7 @@ def package_resolver(uri: str) -> str:
 
         package, _, inner = uri[len("package://"):].partition("/")
         try:
-            path = Path(rospkg.RosPack().get_path(package)) / inner
+            path = Path(rospkg.RosPack.get_instance().get_path(package)) / inner  # which has searched once
         except rospkg.ResourceNotFound as error:
             raise ModelError(f"mesh '{uri}': ROS package '{package}' is not on ROS_PACKAGE_PATH; "
                              "install it or source the workspace") from error
