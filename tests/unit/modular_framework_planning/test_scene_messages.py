@@ -205,6 +205,20 @@ def test_objects_of_a_whole_scene_may_be_given_in_frames_of_tf(scene: Scene) -> 
     assert after.objects["crate"].pose.translation == pytest.approx([0.4, 0.2, 1.5])
 
 
+def test_an_object_takes_its_colour_with_it(scene: Scene) -> None:
+    scene = apply_collision_object(scene, body("b")).with_colors({"b": (1.0, 0.0, 0.0, 1.0), "c": (0.0, 1.0, 0.0, 1.0)})
+    for name in ("b", ""):
+        remove = CollisionObject(id=name, operation=CollisionObject.REMOVE)
+        gone = apply_collision_object(scene, remove)
+        assert gone.colors == {"c": (0.0, 1.0, 0.0, 1.0)}
+        message = difference_message(scene, gone)
+        assert message is not None and message.is_diff, "the removal says it, not a whole new scene"
+        assert apply_scene(scene, message).colors == gone.colors
+    attach = AttachedCollisionObject(link_name=PALM)
+    attach.object.id = "b"
+    assert apply_attached_object(scene, attach).colors == scene.colors
+
+
 def test_a_message_with_nothing_but_defaults_keeps_the_entries(scene: Scene) -> None:
     message = PlanningScene(is_diff=True)
     message.allowed_collision_matrix.default_entry_names = [WRIST, "<octomap>"]

@@ -2,7 +2,7 @@
 """Holds what the robot may bump into as immutable snapshots, so that plans under way never see a half-made change."""
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -174,13 +174,22 @@ class PlanningScene:
         return self._changed(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
 
     def without_object(self, name: str) -> PlanningScene:
-        """Removes an object from the world; raises UnknownNameError."""
+        """Removes an object and its colour from the world; raises UnknownNameError."""
         self.find_object(name)
-        return self._changed(objects={key: value for key, value in self.objects.items() if key != name})
+        return self._without(objects={name})
 
     def without_objects(self) -> PlanningScene:
-        """Removes every object from the world; attached ones stay."""
-        return self._changed(objects={})
+        """Removes every object and its colour from the world; attached ones stay."""
+        return self._without(objects=self.objects.keys())
+
+    def _without(self, **names: Set[str]) -> PlanningScene:
+        """Returns the scene without some of its `objects` or `attached`, and without their colours."""
+        changes: dict[str, object] = {}
+        for kind, drop in names.items():
+            changes[kind] = {key: value for key, value in getattr(self, kind).items() if key not in drop}
+            if self.colors.keys() & drop:
+                changes["colors"] = {key: value for key, value in self.colors.items() if key not in drop}
+        return self._changed(**changes)
 
     def find_object(self, name: str) -> CollisionObject:
         """Returns an object of the world; raises UnknownNameError with the known ones."""
@@ -213,9 +222,8 @@ class PlanningScene:
         return self._changed(attached=rest, objects={**self.objects, name: body})
 
     def without_attached(self, names: Iterable[str]) -> PlanningScene:
-        """Drops attached bodies without putting them into the world."""
-        drop = set(names)
-        return self._changed(attached={key: value for key, value in self.attached.items() if key not in drop})
+        """Drops attached bodies and their colours without putting them into the world."""
+        return self._without(attached=set(names))
 
     def attached_pose(self, name: str) -> Transform:
         """Returns the pose of an attached body in the planning frame at the scene's positions."""

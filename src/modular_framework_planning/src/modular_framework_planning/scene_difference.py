@@ -29,11 +29,12 @@ def joints_moved(before: PlanningScene, after: PlanningScene) -> bool:
 def difference_message(before: PlanningScene, after: PlanningScene) -> SceneMessage | None:
     """Returns the diff that turns one scene into the other, or None when they are the same.
 
-    A diff can add colours and fixed frames to a scene but not take them away: where one is gone, the answer is the
-    whole scene.
+    A diff can add colours and fixed frames to a scene but not take them away, except for the colour of an object that
+    it removes: where one is gone, the answer is the whole scene.
     """
-    gone = before.colors.keys() - after.colors.keys() | before.fixed_frames.keys() - after.fixed_frames.keys()
-    if gone:
+    there = after.objects.keys() | after.attached.keys()
+    removed = (before.objects.keys() | before.attached.keys()) - there  # with their colours
+    if before.colors.keys() - after.colors.keys() - removed or before.fixed_frames.keys() - after.fixed_frames.keys():
         return scene_message(after, 0)
     message = SceneMessage(is_diff=True, name=after.name, robot_model_name=after.model.name)
     empty = SceneMessage(is_diff=True, name=before.name, robot_model_name=after.model.name)
