@@ -126,6 +126,34 @@ def test_cancel_stops_where_the_joint_is(loop: Any) -> None:
     assert handle(loop).position == pytest.approx(here, abs=0.011)
 
 
+def test_a_finger_that_is_measured_at_no_position_stays_where_it_was_and_nothing_starts(loop: Any) -> None:
+    ticket = send(loop, 0.4)
+    loop.run(0.2)
+    finger = handle(loop)
+    there, finger.state.position = finger.position, math.nan
+    loop.manager.update(loop.time_s, 0.01)
+    assert ticket.status is GoalStatus.ABORTED
+    assert "joint 'finger' is measured at nan; expected a position" in ticket.text
+    assert finger.command == pytest.approx(there) and 0.1 < there < 0.3
+    again = send(loop, 0.4)
+    loop.manager.update(loop.time_s, 0.01)
+    assert again.status is GoalStatus.ABORTED and finger.command == pytest.approx(there)
+    loop.step()
+    ticket = send(loop, 0.4)
+    loop.run(0.5)
+    assert ticket.status is GoalStatus.SUCCEEDED
+
+
+def test_a_gripper_does_not_start_on_a_finger_that_is_measured_at_no_position(
+        loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert loop.switch([], ["gripper"]) is None
+    state = handle(loop).state
+    with monkeypatch.context() as patched:
+        patched.setattr(loop.robot_hw, "read", lambda time_s, period_s: setattr(state, "position", math.nan))
+        assert "joint 'finger' is measured at nan" in str(loop.switch(["gripper"], []))
+    assert math.isfinite(handle(loop).command)
+
+
 @pytest.mark.parametrize(("position", "effort"), [(math.nan, 0.0), (math.inf, 0.0), (0.1, math.nan)])
 def test_a_goal_that_makes_no_sense_is_refused(loop: Any, position: float, effort: float) -> None:
     with pytest.raises(GripperGoalError, match="expected finite numbers"):

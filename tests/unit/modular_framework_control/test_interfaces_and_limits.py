@@ -83,13 +83,15 @@ URDF = """<robot name="r">
 def test_limits_come_from_the_urdf() -> None:
     limits = limits_from_urdf(URDF)
     assert limits["bend"] == JointLimits(-1.0, 2.0, 0.5, 7.0)
+    assert limits_from_urdf(URDF.replace('velocity="0.5" effort="7"', 'velocity="-0.5" effort="-7"')) == limits
     assert limits["turn"] == JointLimits(max_velocity=3.0, max_effort=4.0, continuous=True)
     assert limits["bare"] == JointLimits()
     assert "stiff" not in limits
 
 
-@pytest.mark.parametrize(("text", "words"), [("<robot", "not well-formed"),
-                                             (URDF.replace('"0.5"', '"fast"'), "'bend'")])
+@pytest.mark.parametrize(("text", "words"), [
+    ("<robot", "not well-formed"), (URDF.replace('"0.5"', '"fast"'), ":3: <limit> of joint 'bend': velocity is 'fast'"),
+    (URDF.replace('"-1"', '"nan"'), "'bend': lower is 'nan'; expected a number")])
 def test_a_faulty_urdf_is_explained(text: str, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         limits_from_urdf(text)

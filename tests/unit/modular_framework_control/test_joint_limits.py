@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -57,6 +58,40 @@ def test_positions_near_a_soft_end_slow_down_and_never_pass_it(wanted: list[floa
         left = SOFT.max_position - last if way > 0.0 else last - SOFT.min_position
         assert abs(way) <= min(LIMITS.max_velocity, SOFT.k_position * left) * 0.01 + 1e-12
         last = joint.command
+
+
+@pytest.mark.parametrize(("limiter_class", "allowed"), [(VelocityJointSaturation, 0.0), (EffortJointSaturation, -2.0)])
+@pytest.mark.parametrize("wanted", [9.0, 0.0, -9.0])
+def test_a_joint_whose_position_is_not_a_number_is_braked_within_soft_limits(limiter_class: type[Any], allowed: float,
+                                                                           wanted: float) -> None:
+    joint = handle(math.nan, 0.5, wanted)
+    limiter_class(joint, LIMITS, SOFT).enforce_limits(0.01)
+    assert joint.command == pytest.approx(allowed)
+
+
+@pytest.mark.parametrize("soft", [None, SOFT])
+def test_holding_a_position_that_is_not_a_number_keeps_the_last_command(soft: SoftJointLimits | None) -> None:
+    joint = handle(0.3, command=0.3)
+    limiter = PositionJointSaturation(joint, LIMITS, soft)
+    limiter.enforce_limits(0.01)
+    joint.state.position = math.nan
+    joint.hold(math.nan)
+    limiter.enforce_limits(0.01)
+    assert joint.command == pytest.approx(0.3)
+    joint.command, joint.held = math.nan, True
+    limiter.enforce_limits(0.01)
+    assert joint.command == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_joint_outside_its_range_comes_back_no_faster_than_its_velocity_limit(side: float) -> None:
+    joint = handle(side * 1.5, command=side * 1.5)
+    limiter, seen = PositionJointSaturation(joint, LIMITS), [side * 1.5]
+    for joint.command in [side * 1.5] * 30:
+        limiter.enforce_limits(0.01)
+        seen.append(joint.command)
+    assert max(abs(after - before) for before, after in pairwise(seen)) <= LIMITS.max_velocity * 0.01 + 1e-12
+    assert seen[-1] == pytest.approx(side)
 
 
 def test_a_joint_beyond_its_soft_end_is_led_back_at_once() -> None:

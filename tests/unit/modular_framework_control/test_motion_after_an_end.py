@@ -57,14 +57,15 @@ class WalledRobotHW(MockRobotHW):
 @pytest.fixture
 def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     def starter(family: str = "position", limits: dict[str, Any] | None = LIMITS, stop_s: float = 0.0,
-                tolerance: dict[str, float] | None = None) -> Any:
+                tolerance: dict[str, float] | None = None, hw: Any = None) -> Any:
         controller = {"type": f"{family}_controllers/JointTrajectoryController", "joints": list(JOINTS),
                       "gains": dict.fromkeys(JOINTS, GAINS.get(family)), "stop_trajectory_duration": stop_s,
                       "velocity_ff": dict.fromkeys(JOINTS, 1.0 if family == "velocity" else 0.0),
                       "constraints": {"goal_time": 0.6, "stopped_velocity_tolerance": 0.05,
                                       **dict.fromkeys(JOINTS, GOAL if tolerance is None else tolerance)}}
         loop = make_loop({"hw": {"joints": list(JOINTS), "command_interface": FAMILIES[family]}, "c": controller,
-                          "joint_limits": dict.fromkeys(JOINTS, limits) if limits else {}}, WalledRobotHW())
+                          "joint_limits": dict.fromkeys(JOINTS, limits) if limits else {}},
+                         WalledRobotHW() if hw is None else hw)
         loop.spawn("c")
         return loop
 
@@ -214,10 +215,71 @@ def test_a_joint_outside_its_range_may_come_back(make_loop: Callable[..., Any]) 
     loop.spawn("c")
     loop.robot_hw.joints[0].state.position = 6.4
     further = send(loop, (1.0, (6.5, 0.0), (0.0, 0.0)))
-    assert "point 0: position of joint 'pan' is 6.5; its limits are" in further.text
+    assert "joint 'pan' is 6.5; its limits are -6.28 to 6.28 (it stands outside, at 6.4)" in further.text
     back = send(loop, (1.0, (6.0, 0.0), (0.0, 0.0)))
     loop.run(1.1)
     assert back.status is GoalStatus.SUCCEEDED and positions(loop)[0] == pytest.approx(6.0)
+
+
+class BlindRobotHW(WalledRobotHW):
+    """Fake hardware that can lose the measured position of its first joint.
+
+    Attributes:
+        blind: whether that is not a number.
+        position: where the joint is [rad].
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.blind = False
+        self.position = 0.0
+
+    def read(self, time_s: float, period_s: float) -> None:
+        state = self.joints[0].state
+        state.position = self.position
+        super().read(time_s, period_s)
+        self.position = state.position
+        if self.blind:
+            state.position = math.nan
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+@pytest.mark.parametrize("stop_s", [0.0, 0.3])
+def test_a_joint_that_is_measured_at_no_position_stops_and_takes_no_goals_until_it_is_measured_again(
+        start: Callable[..., Any], family: str, stop_s: float) -> None:
+    hw = BlindRobotHW()
+    loop = start(family, stop_s=stop_s, tolerance={"goal": 0.02}, hw=hw)
+    ticket = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
+    loop.run(0.5)
+    before, speed, hw.blind = hw.position, hw.joints[0].velocity, True
+    refused = send(loop, (5.0, (0.1, 0.1), (0.0, 0.0)))
+    for lost in (ticket, refused):
+        assert "joint 'pan' is measured at nan; expected a position" in lost.text
+    assert (ticket.status, refused.status) == (GoalStatus.ABORTED, GoalStatus.REJECTED)
+    for _ in range(50):
+        loop.step()
+        assert all(math.isfinite(joint.command) for joint in hw.joints)
+    if family != "effort":      # a body without friction rolls on when nothing brakes it
+        assert abs(hw.position - before) <= speed * (0.5 * stop_s + 0.03) + 1e-3
+    hw.blind = False
+    loop.run(1.0)
+    assert way_after(loop, 1.0) < 1e-3
+    assert_next_goal_succeeds(loop)
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_a_controller_does_not_start_on_a_joint_that_is_measured_at_no_position(start: Callable[..., Any],
+                                                                                family: str) -> None:
+    hw = BlindRobotHW()
+    loop = start(family, hw=hw)
+    assert loop.switch([], ["c"]) is None
+    hw.blind = True
+    for _ in range(2):
+        assert "joint 'pan' is measured at nan" in str(loop.switch(["c"], []))
+        assert all(math.isfinite(joint.command) for joint in hw.joints)
+    hw.blind = False
+    assert loop.switch(["c"], []) is None
+    assert_next_goal_succeeds(loop)
 
 
 class LateRobotHW(WalledRobotHW):

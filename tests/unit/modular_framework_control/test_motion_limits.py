@@ -26,8 +26,9 @@ def point(time_s: float, position: float, velocity: float | None = None,
                            () if acceleration is None else (acceleration,))
 
 
-def told(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0) -> str:
-    return excesses_of(Spline(JointTrajectory(("a",), points)), ("a",), limits).text(first, first + 1)
+def told(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0, here: float = 0.0) -> str:
+    spline = Spline(JointTrajectory(("a",), points))
+    return excesses_of(spline, ("a",), limits, np.array([here])).text(first, first + 1)
 
 
 @pytest.mark.parametrize(("points", "words"), [
@@ -65,12 +66,18 @@ def test_of_very_many_faults_only_a_few_are_told_and_the_rest_counted() -> None:
     text = told(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)))
     assert "point 7: position" in text and "point 8: position" not in text
     assert text.endswith("and 9991 more")     # 5000 positions, and the velocities of 4999 ways
+    text = told(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)), first=4997)
+    assert text.count("position of joint") == 3 and text.count("on the way") == 2 and "more" not in text
 
 
 def test_a_joint_that_stands_outside_its_range_may_come_back_but_not_go_further() -> None:
-    widened = BOUND.with_positions(np.array([2.4]))
-    assert told(point(0.0, 2.4), point(1.0, 1.0), limits=widened) == ""
-    assert "point 1: position of joint 'a' is 2.5" in told(point(0.0, 2.4), point(1.0, 2.5), limits=widened)
+    assert told(point(0.0, 2.4), point(1.0, 1.0), here=2.4) == ""
+    assert ("point 1: position of joint 'a' is 2.5; its limits are -2 to 2 (it stands outside, at 2.4)"
+            in told(point(0.0, 2.4), point(1.0, 2.5), here=2.4))
+
+
+def test_limits_hold_for_a_joint_whose_position_is_not_a_number() -> None:
+    assert "position of joint 'a' is 2.5; its limits are -2 to 2" in told(point(1.0, 2.5), here=math.nan)
 
 
 @settings(max_examples=60, deadline=None)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from modular_framework_control.joint_limits import JointLimits, SoftJointLimits
 from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
+from modular_framework_control.trajectory_limits import POINT_MARGIN
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints
 from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 
@@ -164,6 +165,28 @@ def test_outside_the_soft_range_only_the_way_back_is_open_and_nothing_moves_by_i
     for _ in range(200):
         check.admit([1.2, 0.0], DT_S)
     assert check.sent[0] == pytest.approx(1.2, abs=40.0 * DT_S * DT_S)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_joint_outside_its_range_stays_there_until_it_is_sent_back_and_never_goes_further(side: float) -> None:
+    check = checked()
+    check.reset([side * 2.4, 0.0])
+    for _ in range(50):
+        assert check.admit([side * 2.4003, 0.0], DT_S) == "", "a position that was measured a little later"
+    assert check.sent[0] == side * 2.4
+    assert "outside its range" in check.admit([side * 2.5, 0.0], DT_S) and check.sent[0] == side * 2.4
+    for _ in range(200):
+        check.admit([side * 1.95, 0.0], DT_S)
+    assert check.sent[0] == pytest.approx(side * 1.95, abs=1e-6)
+    assert "outside its range" in check.admit([side * 2.4, 0.0], DT_S)
+
+
+def test_as_little_beyond_the_range_as_trajectory_controllers_allow_is_followed_up_to_its_end() -> None:
+    check = checked(max_jump=4.0)
+    check.reset([1.99, 0.0])
+    for _ in range(100):
+        assert check.admit([2.0 + POINT_MARGIN, 0.0], DT_S) == ""
+    assert check.sent[0] == pytest.approx(2.0, abs=1e-6)
 
 
 def test_the_limits_are_those_of_the_description_and_of_joint_limits_but_never_more_than_the_arm_can() -> None:

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from modular_framework_control.controller import Controller
+from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
+from modular_framework_control.handles import unmeasured
 from modular_framework_control.hardware_interface import HardwareInterface, JointHandle, PositionJointInterface
 from modular_framework_control.mailbox import Mailbox
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
@@ -57,7 +58,8 @@ class GripperActionController(Controller):
     for `stall_timeout`: the mean velocity over that time, rather than the velocity of one cycle, so that the trembling
     of a contact does not hide a stall. The time counts from the beginning of the goal at the earliest.
 
-    While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason.
+    While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason. When
+    the measured position is not a number the goal is aborted, and the joint is held where it was measured last.
 
     Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, used for
     goals that give none, 0 = the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
@@ -76,6 +78,7 @@ class GripperActionController(Controller):
         self._running = False
         self._command = 0.0
         self._max_effort = 0.0
+        self._measured = 0.0
         self._fault = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -124,6 +127,9 @@ class GripperActionController(Controller):
     def starting(self, time_s: float) -> None:
         self._reject_waiting("the goal was sent while the controller was being stopped")
         self._active, self._fault = None, ""
+        missing = unmeasured([self._handle])
+        if missing:
+            raise ControllerError(missing)
         self._max_effort = self._default_max_effort
         self._hold()
         self._apply(0.0)
@@ -158,6 +164,12 @@ class GripperActionController(Controller):
 
     def update(self, time_s: float, period_s: float) -> None:
         self._mailbox.work_off(lambda order: self._carry_out(order, time_s))
+        missing = unmeasured([self._handle])
+        if missing and self._active is not None:
+            self._finish(GoalStatus.ABORTED, self._state(False, False), missing)
+            self._hold()
+        elif not missing:
+            self._measured = self._handle.position
         if self._fault:
             self._hold()
         self._apply(period_s)
@@ -203,7 +215,9 @@ class GripperActionController(Controller):
 
     def _hold(self) -> None:
         """Stay, with no more effort than before: there may be something between the fingers."""
-        self._command = self._handle.position
+        if math.isfinite(self._handle.position):
+            self._measured = self._handle.position
+        self._command = self._measured
         self._handle.held = True
 
     def _apply(self, period_s: float) -> None:

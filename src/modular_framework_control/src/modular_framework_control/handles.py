@@ -6,7 +6,7 @@ The `RobotHW` makes one handle per thing and keeps it; reading and writing it is
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from modular_framework_control.joint_limit_parameters import JointLimits
 
@@ -44,9 +44,8 @@ class JointHandle:
         max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
             Only hardware that says so (`supports_max_effort`) heeds it.
         supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
-        limits: what the hardware keeps the joint within; whoever enforces limits sets it. None: the hardware enforces
-            none.
-        held: set by `hold`; who enforces limits goes on from that command, and clears it.
+        limits: what the hardware keeps the joint within, set by what enforces limits. None: the hardware enforces none.
+        held: set by `hold`; what enforces limits goes on from that command, and clears it.
     """
 
     __slots__ = ("state", "command", "max_effort", "supports_max_effort", "limits", "held")
@@ -76,17 +75,26 @@ class JointHandle:
         return self.state.effort
 
     def hold(self, position: float) -> None:
-        """Command a joint that takes positions to stay where it stands, whatever it was commanded before.
+        """Command a joint that takes positions to stay where it stands, whatever it was commanded before; where that is
+        not a number the last command stays.
 
         Args:
             position: where that is [rad|m]: as measured; for a joint that turns without end, in the turn in which it is
                 commanded.
         """
-        self.command = position
-        self.held = True
+        if math.isfinite(position):
+            self.command = position
+            self.held = True
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, command={self.command:.6g})"
+
+
+def unmeasured(handles: Iterable[JointHandle]) -> str:
+    """Which joints have a measured position that is not a finite number; "" when none has."""
+    faults = [f"joint '{handle.name}' is measured at {handle.position}" for handle in handles
+              if not math.isfinite(handle.position)]
+    return f"{', '.join(faults)}; expected a position: see why the hardware reads none" if faults else ""
 
 
 class PosVelJointHandle(JointHandle):

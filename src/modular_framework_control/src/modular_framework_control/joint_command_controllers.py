@@ -148,7 +148,7 @@ class PositionJointPositionController(JointCommandController):
             handle.hold(handle.position)
 
     def _resting(self) -> tuple[float, ...]:
-        return tuple(handle.position for handle in self._handles)
+        return tuple(handle.position if math.isfinite(handle.position) else handle.command for handle in self._handles)
 
 
 class PositionJointGroupPositionController(PositionJointPositionController):

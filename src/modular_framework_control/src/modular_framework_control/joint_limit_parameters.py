@@ -15,7 +15,7 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
 from modular_framework_control.node_handle import NodeHandle, ParameterError, read_bool, read_number
-from modular_framework_control.urdf_xml import parse_description
+from modular_framework_control.urdf_xml import line_of, parse_description
 
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
@@ -100,17 +100,22 @@ def _limits_of(name: str, joint: ElementTree.Element) -> JointLimits:
     return JointLimits(
         min_position=-INFINITY if continuous else _number(name, limit, "lower", "0"),
         max_position=INFINITY if continuous else _number(name, limit, "upper", "0"),
-        max_velocity=_number(name, limit, "velocity", "inf"),
-        max_effort=_number(name, limit, "effort", "inf"),
+        max_velocity=abs(_number(name, limit, "velocity", "inf")),
+        max_effort=abs(_number(name, limit, "effort", "inf")),
         continuous=continuous,
     )
 
 
 def _number(joint: str, element: ElementTree.Element, key: str, default: str) -> float:
+    text = element.get(key, default)
     try:
-        return float(element.get(key, default))
-    except ValueError as error:
-        raise ParameterError(f"robot_description: <{element.tag}> of joint '{joint}': {key}: {error}") from error
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if math.isnan(value):
+        raise ParameterError(f"robot_description:{line_of(element)}: <{element.tag}> of joint '{joint}': {key} is "
+                             f"'{text}'; expected a number; mend the description")
+    return value
 
 
 def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) -> JointLimits:

@@ -48,7 +48,8 @@ class PositionJointSaturation:
 
     With soft limits the speed towards an end of the soft range is besides at most `k_position` times the way left.
     It looks at commands, not at measured positions, which lag behind them; only a joint that is held
-    (`JointHandle.hold`) gets that command at once, as it is where the joint stands.
+    (`JointHandle.hold`) gets that command at once, as it is where the joint stands. One that stands outside its range
+    comes back no faster than the velocity limit.
 
     Args:
         handle: the joint.
@@ -77,7 +78,9 @@ class PositionJointSaturation:
         limits, handle, last = self.limits, self.handle, self._last_command
         command = handle.command
         if handle.held:
-            handle.held, last = False, command
+            handle.held = False
+            if command == command:
+                last = command
         if last != last:
             last = handle.position
         if command != command:
@@ -90,14 +93,14 @@ class PositionJointSaturation:
         else:
             slowest, fastest = soft_velocities(last, limits, self.soft)
             lowest, highest = last + slowest * period_s, last + fastest * period_s
-        if command > highest:
-            command = highest
-        elif command < lowest:
-            command = lowest
         if command > limits.max_position:
             command = limits.max_position
         elif command < limits.min_position:
             command = limits.min_position
+        if command > highest:
+            command = highest
+        elif command < lowest:
+            command = lowest
         self._last_command = command
         handle.command = command
 
@@ -118,8 +121,9 @@ class PosVelJointSaturation(PositionJointSaturation):
 class _Saturation:
     """What bounds the velocities or efforts of one joint, and remembers what it was asked for and what it gave.
 
-    A controller that stops commands 0 once. So what was given in its place is no wish of anybody: the wish stays in
-    force until somebody commands anew. A position that was given is different: it is where the joint is to stay.
+    A controller that stops commands 0 once. What was given in its place was not asked for by any controller, so the 0
+    stays in force until a controller commands something else. A position that was given is different: it is where the
+    joint is to stay.
     """
 
     __slots__ = ("handle", "limits", "soft", "_wanted", "_given")
@@ -218,7 +222,9 @@ def _clamped(value: float, bound: float) -> float:
 
 
 def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
-    """Smallest and largest velocity allowed at `position`."""
+    """Smallest and largest velocity allowed at `position`: none while that is not a number."""
+    if position != position:
+        return 0.0, 0.0
     largest = limits.max_velocity
     lowest = -largest if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
     highest = largest if soft.max_position == math.inf else soft.k_position * (soft.max_position - position)

@@ -17,6 +17,7 @@ import numpy as np
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_switch import LOGGER
 from modular_framework_control.goal_ticket import GoalStatus
+from modular_framework_control.handles import unmeasured
 from modular_framework_control.hardware_interface import HardwareInterface, PositionJointInterface
 from modular_framework_control.joint_limits import limits_of
 from modular_framework_control.mailbox import Mailbox
@@ -58,6 +59,7 @@ class JointTrajectoryController(Controller):
     with `stop_trajectory_duration` 0 they are held there.
 
     While the hardware has a fault the joints are held where they are measured, and goals are refused with its reason.
+    When a measured position is not a number the goal is aborted, the joints stop, and goals are refused until it is.
 
     Attributes:
         joint_names: the joints, in the order of all arrays.
@@ -76,6 +78,7 @@ class JointTrajectoryController(Controller):
         self._running = False
         self._active: TrajectoryOrder | None = None
         self._fault = ""
+        self._unmeasured = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         self._namespace = controller_nh.namespace
@@ -114,7 +117,7 @@ class JointTrajectoryController(Controller):
         for warning in filter(None, warnings):
             LOGGER.warning("%s: %s", self._namespace, warning)
         here = np.array([handle.position for handle in self._handles])
-        self._mailbox.put(order_of(goal, ticket, replace(self._rules, limits=self._limits.with_positions(here))))
+        self._mailbox.put(order_of(goal, ticket, self._rules, here))
         if not self._running:
             self._reject_waiting("the controller was stopped")
 
@@ -145,6 +148,9 @@ class JointTrajectoryController(Controller):
         self._clock.start(time_s)
         self._next_state_s = self._next_feedback_s = time_s
         self._read_actual()
+        self._unmeasured = unmeasured(self._handles)
+        if self._unmeasured:
+            raise ControllerError(self._unmeasured)
         self._plan.hold(self._actual[POSITION], time_s)
         self._rest()
         self._running = True
@@ -172,7 +178,8 @@ class JointTrajectoryController(Controller):
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
         self._reject_waiting(text)
         self._read_actual()
-        self._command_rest()
+        if self._plan.known_from_s is not None:
+            self._command_rest()
 
     def _reject_waiting(self, text: str) -> None:
         for order in self._mailbox.taken():
@@ -182,6 +189,7 @@ class JointTrajectoryController(Controller):
     def update(self, time_s: float, period_s: float) -> None:
         self._clock.advance(time_s)
         self._read_actual()
+        self._watch_positions()
         self._mailbox.work_off(self._carry_out)
         if self._fault:
             self._rest()
@@ -194,6 +202,14 @@ class JointTrajectoryController(Controller):
             self._command(desired, error, period_s)
         self._report(time_s, desired, error)
 
+    def _watch_positions(self) -> None:
+        """Stop when a position is no longer a number, and again, from where the joints are, when all are numbers."""
+        missing = "" if np.isfinite(self._actual[POSITION]).all() else unmeasured(self._handles)
+        if bool(missing) != bool(self._unmeasured):
+            self._unmeasured = missing
+            self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL, missing)
+            self._stop()
+
     def _desired_and_error(self) -> tuple[Array, Array]:
         """Position, velocity and acceleration desired now, and how far the joints are from the first two."""
         desired = self._clock.slowed(self._plan.sample(self._clock.now_s))
@@ -203,6 +219,13 @@ class JointTrajectoryController(Controller):
             error[POSITION, self._continuous] = turned - 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
         return desired, error
 
+    def _desired_and_measured(self) -> tuple[Array, Array]:
+        """The state desired now, and positions and velocities measured, in the turn in which the joints are commanded;
+        those desired in place of what is not a number."""
+        desired, error = self._desired_and_error()
+        actual = desired[:2] - error
+        return desired, np.where(np.isfinite(actual), actual, desired[:2])
+
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
         """Command the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
         del error, period_s
@@ -210,10 +233,9 @@ class JointTrajectoryController(Controller):
             handle.command = position
 
     def _command_rest(self) -> None:
-        """Command what keeps the joints where they are measured, in the turn in which they are commanded; it also is in
-        force while the controller does not run."""
-        desired, error = self._desired_and_error()
-        for handle, position in zip(self._handles, (desired[POSITION] - error[POSITION]).tolist(), strict=True):
+        """Command what keeps the joints where they are measured; it stays in force while the controller is stopped."""
+        _, actual = self._desired_and_measured()
+        for handle, position in zip(self._handles, actual[POSITION].tolist(), strict=True):
             handle.hold(position)
 
     def _read_actual(self) -> None:
@@ -222,13 +244,13 @@ class JointTrajectoryController(Controller):
         self._actual[1] = [state.velocity for state in states]
 
     def _rest(self) -> None:
-        desired, error = self._desired_and_error()
-        self._plan.hold(desired[POSITION] - error[POSITION], self._clock.now_s)
+        _, actual = self._desired_and_measured()
+        self._plan.hold(actual[POSITION], self._clock.now_s)
         self._command_rest()
 
     def _carry_out(self, order: TrajectoryOrder | TrajectoryTicket) -> None:
         if isinstance(order, TrajectoryOrder):
-            refusal = self._fault or self._take_up(order)
+            refusal = self._fault or self._unmeasured or self._take_up(order)
             if refusal:
                 self._refuse(order, refusal)
         elif self._active is not None and self._active.ticket is order:
@@ -271,10 +293,9 @@ class JointTrajectoryController(Controller):
             return ""
         first = int(np.searchsorted(order.spline.times_s, late_s, side="right"))
         joints = list(order.joints)
-        limits = self._limits.with_positions(self._actual[POSITION]).of_joints(joints)
-        names = [self.joint_names[joint] for joint in joints]
-        return (order.excesses.text(first, first + 1)
-                or excess_of_first_way(track, names, limits, first))
+        return order.excesses.text(first, first + 1) or excess_of_first_way(
+            track, [self.joint_names[joint] for joint in joints], self._limits.of_joints(joints),
+            self._actual[POSITION, joints], first)
 
     def _warn_of_late_points(self, order: TrajectoryOrder, late_s: float) -> None:
         times_s = order.spline.times_s if order.spline is not None else np.zeros(0)
@@ -296,9 +317,8 @@ class JointTrajectoryController(Controller):
             order.ticket.activate()
 
     def _stop(self) -> None:
-        """Come to rest from where the joints are measured, in the turn in which they are commanded."""
-        desired, error = self._desired_and_error()
-        actual = desired[:2] - error
+        """Come to rest from where the joints are measured."""
+        desired, actual = self._desired_and_measured()
         self._plan.follow(self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate),
                           self._clock.now_s)
         for handle in self._handles:

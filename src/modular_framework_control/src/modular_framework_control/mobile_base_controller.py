@@ -178,6 +178,7 @@ class MobileBaseController(Controller):
         self._forget()
 
     def on_hardware_recovered(self, time_s: float) -> None:
+        self._forget()      # a command may have come just as the fault did
         self._refusal = ""
 
     def update(self, time_s: float, period_s: float) -> None:

@@ -6,10 +6,9 @@ and the joint comes a little late.
 """
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,18 +70,8 @@ class MotionLimits:
 
     def with_positions(self, positions: Array) -> MotionLimits:
         """The same, widened to where the joints are, shape (joints,): one that stands outside may come back."""
-        return MotionLimits(np.minimum(self.lowest, positions), np.maximum(self.highest, positions), self.fastest,
+        return MotionLimits(np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest,
                             self.braking)
-
-
-@dataclass(frozen=True, slots=True)
-class _Excess:
-    """One value beyond a limit; of a way, `point` is the one it leads to."""
-
-    kind: _Kind
-    point: int
-    joint: int
-    value: float
 
 
 class Excesses:
@@ -91,11 +80,13 @@ class Excesses:
     Args:
         names: the joints of the trajectory.
         limits: their limits.
+        here: where they are, shape (joints,).
     """
 
-    def __init__(self, names: Sequence[str], limits: MotionLimits) -> None:
+    def __init__(self, names: Sequence[str], limits: MotionLimits, here: Array) -> None:
         self._names = tuple(names)
         self._limits = limits
+        self._here = here
         self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []
 
     def add(self, kind: _Kind, values: Array, beyond: NDArray[np.bool_], first_point: int) -> None:
@@ -111,47 +102,50 @@ class Excesses:
             first: the first point that counts.
             first_way: the first point whose way to it counts.
         """
-        chosen = self._chosen(first, first_way)
-        described = [self._described(excess) for excess in islice(chosen, _MOST_FAULTS)]
-        more = sum(1 for _ in chosen)
+        described: list[str] = []
+        count = 0
+        for kind, indices, values in self._found:       # may be very many, and the control loop asks
+            begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_way
+            counted = np.flatnonzero(indices[:, 0] >= begin)
+            count += len(counted)
+            described += [self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
+                          for i in counted[:_MOST_FAULTS - len(described)]]
+        more = count - len(described)
         return "; ".join(described) + (f"; and {more} more" if more else "")
 
-    def _chosen(self, first: int, first_way: int) -> Iterator[_Excess]:
-        for kind, indices, values in self._found:
-            begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_way
-            for (point, joint), value in zip(indices.tolist(), values.tolist(), strict=True):
-                if point >= begin:
-                    yield _Excess(kind, point, joint, value)
-
-    def _described(self, excess: _Excess) -> str:
-        joint, limits, value = excess.joint, self._limits, excess.value
-        name = self._names[joint]
-        allowed = f"its limits are {limits.lowest[joint]:.6g} to {limits.highest[joint]:.6g}"
-        fastest = limits.fastest[joint]
-        match excess.kind:
+    def _described(self, kind: _Kind, point: int, joint: int, value: float) -> str:
+        name, allowed, fastest = self._names[joint], self._range(joint), self._limits.fastest[joint]
+        match kind:
             case _Kind.POINT_POSITION:
-                return (f"point {excess.point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position "
-                        "within them")
+                return (f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within "
+                        "them")
             case _Kind.POINT_VELOCITY:
-                return (f"point {excess.point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; "
-                        "give a lower velocity")
+                return (f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; give a "
+                        "lower velocity")
             case _Kind.WAY_POSITION:
-                return (f"on the way to point {excess.point} joint '{name}' comes to {value:.6g}; {allowed}; give the "
-                        "points other velocities, or points in between")
+                return (f"on the way to point {point} joint '{name}' comes to {value:.6g}; {allowed}; give the points "
+                        " other velocities, or points in between")
             case _Kind.WAY_VELOCITY:
-                return (f"on the way to point {excess.point} joint '{name}' reaches the velocity {value:.6g}; its "
-                        f"limit is {fastest:.6g}; give the point a later time_from_start")
+                return (f"on the way to point {point} joint '{name}' reaches the velocity {value:.6g}; its limit is "
+                        f"{fastest:.6g}; give the point a later time_from_start")
+
+    def _range(self, joint: int) -> str:
+        lowest, highest, here = self._limits.lowest[joint], self._limits.highest[joint], self._here[joint]
+        outside = f" (it stands outside, at {here:.6g})" if not lowest <= here <= highest else ""
+        return f"its limits are {lowest:.6g} to {highest:.6g}{outside}"
 
 
-def excesses_of(spline: Spline, names: Sequence[str], limits: MotionLimits) -> Excesses:
+def excesses_of(spline: Spline, names: Sequence[str], limits: MotionLimits, here: Array) -> Excesses:
     """What a trajectory asks beyond limits, at its points and between them.
 
     Args:
         spline: the trajectory.
         names: its joints.
         limits: their limits.
+        here: where they are, shape (joints,); one that stands outside its range may come back.
     """
-    found = Excesses(names, limits)
+    found = Excesses(names, limits, here)
+    limits = limits.with_positions(here)
     positions, velocities = spline.states[:, POSITION], spline.states[:, VELOCITY]
     found.add(_Kind.POINT_POSITION, positions,
               (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN), 0)
@@ -167,16 +161,18 @@ def excesses_of(spline: Spline, names: Sequence[str], limits: MotionLimits) -> E
     return found
 
 
-def excess_of_first_way(track: Track, names: Sequence[str], limits: MotionLimits, point: int) -> str:
+def excess_of_first_way(track: Track, names: Sequence[str], limits: MotionLimits, here: Array, point: int) -> str:
     """What the way from the present motion to the first point that is followed asks beyond limits; "" for nothing.
 
     Args:
         track: the motion, as it was joined to the one so far.
         names: its joints.
         limits: their limits.
+        here: where they are, shape (joints,).
         point: number of that point.
     """
-    found = Excesses(names, limits)
+    found = Excesses(names, limits, here)
+    limits = limits.with_positions(here)
     coefficients, duration_s = track.first_segment()
     ways = _Ways(coefficients[np.newaxis], np.array([duration_s]))
     speeds = np.abs(ways.velocities)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from modular_framework_control.trajectory import InvalidTrajectoryError, Spline
+from modular_framework_control.trajectory import Array, InvalidTrajectoryError, Spline
 from modular_framework_control.trajectory_check import check_points, joint_faults
 from modular_framework_control.trajectory_goal import (
     GoalRejectedError,
@@ -59,13 +59,15 @@ class GoalRules:
     allow_partial: bool
 
 
-def order_of(goal: TrajectoryGoal, ticket: TrajectoryTicket | None, rules: GoalRules) -> TrajectoryOrder:
+def order_of(goal: TrajectoryGoal, ticket: TrajectoryTicket | None, rules: GoalRules, here: Array) -> TrajectoryOrder:
     """Check a goal and compute its curve.
 
     Args:
         goal: as it was sent.
         ticket: of an action goal; None for a command, which may be empty to say "stop".
-        rules: what it is checked against; limits are noted in the order, as points that come too late do not count.
+        rules: what it is checked against; what is beyond limits is noted in the order, as points that come too late do
+            not count.
+        here: positions of the controller's joints, shape (joints,).
 
     Raises:
         GoalRejectedError: it is malformed; says what is wrong with which point and joint.
@@ -88,5 +90,5 @@ def order_of(goal: TrajectoryGoal, ticket: TrajectoryTicket | None, rules: GoalR
     if not trajectory.points:
         return TrajectoryOrder(joints, trajectory.stamp_s, None, own, ticket)
     spline = Spline(trajectory)
-    excesses = excesses_of(spline, trajectory.joint_names, rules.limits.of_joints(joints))
+    excesses = excesses_of(spline, trajectory.joint_names, rules.limits.of_joints(joints), here[list(joints)])
     return TrajectoryOrder(joints, trajectory.stamp_s, spline, own, ticket, excesses)

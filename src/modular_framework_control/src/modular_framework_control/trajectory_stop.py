@@ -67,7 +67,7 @@ class StopMotion:
         ahead = np.clip(desired[POSITION] - actual[POSITION], -under_way, under_way)
         limits = limits.with_positions(actual[POSITION])
         position = np.clip(actual[POSITION] + ahead, limits.lowest, limits.highest)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             braking_s = np.where(limits.braking > 0.0, PEAK_OF_RAMP * np.abs(velocity) / limits.braking, 0.0)
         durations_s = rate * np.maximum(self._duration_s, braking_s)
         return [_ramp(joint, (position[joint], velocity[joint] / rate), time_s, durations_s[joint],

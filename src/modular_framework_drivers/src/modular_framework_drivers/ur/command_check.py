@@ -3,7 +3,8 @@
 
 A command that is no number, lies outside a joint's range or is far from the last one is refused; the arm brakes and
 holds. One that is only faster, or accelerates more, than a joint may is followed as fast as the joint may; so is one
-beyond a soft limit, up to that limit.
+beyond a soft limit, or by as little beyond the range as trajectory controllers allow, up to that limit. A joint that
+stands outside its range may stay there and come back.
 
 The limits are those of every hardware (modular_framework_control.joint_limits), but a guard that makes any command the
 nearest allowed one does not do here: a real arm must not drive to the end of its range because a controller went
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 
 from modular_framework_control.joint_limit_parameters import JointLimits, SoftJointLimits
 from modular_framework_control.joint_limits import soft_velocities
+from modular_framework_control.trajectory_limits import WAY_MARGIN
 
 _SLACK = 1e-6     # rounding that is forgiven [rad], and as a share of a limit
 
@@ -34,6 +36,10 @@ class CheckedJoint:
     name: str
     limits: JointLimits
     soft: SoftJointLimits | None = None
+
+    def range_from(self, position: float) -> tuple[float, float]:
+        """Smallest and largest position [rad] that a joint at `position` [rad] may be sent to."""
+        return min(self.limits.min_position, position), max(self.limits.max_position, position)
 
     def velocity_range(self, position: float, period_s: float) -> tuple[float, float]:
         """Smallest and largest velocity at `position` [rad] in a cycle of `period_s` [s].
@@ -91,8 +97,8 @@ class CommandCheck:
             if reason:
                 self._brake(index, limits.max_acceleration * period_s, period_s)
             else:
-                command = min(max(commands[index], limits.min_position), limits.max_position)
-                self._approach(index, command, joint, period_s)
+                lowest, highest = joint.range_from(self.sent[index])
+                self._approach(index, min(max(commands[index], lowest), highest), joint, period_s)
         return reason
 
     def _why_not(self, commands: Sequence[float]) -> str:
@@ -100,7 +106,8 @@ class CommandCheck:
             limits = joint.limits
             if not math.isfinite(command):
                 return f"joint '{joint.name}': command {command} is no position; the arm holds"
-            if not limits.min_position - _SLACK <= command <= limits.max_position + _SLACK:
+            lowest, highest = joint.range_from(sent)
+            if not lowest - WAY_MARGIN <= command <= highest + WAY_MARGIN:
                 return (f"joint '{joint.name}': command {command:.6g} rad is outside its range "
                         f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds")
             if abs(command - sent) > self._max_jump:
