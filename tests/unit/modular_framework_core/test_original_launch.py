@@ -49,3 +49,12 @@ def test_its_states_folder_without_states_and_its_script_by_name_are_no_fault(
     assert main(["--check", *given]) == 0
     said = capsys.readouterr()
     assert "task 'simulation_pick' is in order" in said.out and "states has no state" in said.err
+
+
+@pytest.mark.parametrize(("given", "expected"), [
+    ("pick_and_hold.yaml", "{api}/task_constructor_scripts/pick_and_hold.yaml"), ("/tasks/mine.yaml", "/tasks/mine.yaml")])
+def test_a_task_is_given_by_its_name_or_by_its_path(given: str, expected: str) -> None:
+    api = rospkg.RosPack().get_path("modular_framework_api")
+    file = f"{api}/launch/start_framework.launch"
+    config = roslaunch.config.load_config_default([(file, [f"task_constructor_script:={given}"])], None, verbose=False)
+    assert config.params["/task/task_constructor_script"].value == expected.format(api=api)

@@ -139,6 +139,22 @@ states:
     assert other.faults(text)[0].endswith("but its input keys are: door; add it to input_keys in unlock.py")
 
 
+def test_a_key_that_a_state_asks_for_before_it_reads_it_may_be_left_out(tmp_path: Path) -> None:
+    state = """\
+from modular_framework_core.framework_state import FrameworkState
+
+
+class Search(FrameworkState):
+    def __init__(self, outcomes=("success", "fail"), input_keys=("hint",)):
+        super().__init__(outcomes, input_keys)
+
+    def execute(self, userdata):
+        return self.succeed() if "hint" in userdata and userdata.hint else self.fail("no hint")
+"""
+    world = World(tmp_path, states={"search": state})
+    assert world.faults(GOOD_TASK.replace("source: move", "source: search\n      input_keys: []")) == []
+
+
 def test_the_good_tasks_have_no_fault(world: World) -> None:
     shared = NESTED.replace("outcomes: [done, gave_up]\n      states", "outcomes: [done, gave_up]\n      userdata: "
                             "self.userdata\n      states")

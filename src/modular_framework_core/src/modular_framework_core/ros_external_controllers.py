@@ -22,7 +22,7 @@ from modular_framework_core.external_controllers import (
 POLL_PERIOD_S = 0.2
 STOP_TIMEOUT_S = 5.0
 END_WITH_SPAWNER = ("setpriv", "--pdeathsig", "TERM")
-"""Put before the node's command: the node is told to end when the spawner is killed, which could not stop it itself."""
+"""Put before the node's command: the node gets SIGTERM when the spawner is killed, which could not stop it itself."""
 
 
 def main() -> int:
@@ -32,7 +32,7 @@ def main() -> int:
     ``manipulator_controller_action_server_type``.
 
     Returns:
-        0 when there is nothing to run or ROS shuts down, 1 when the node died, 2 when the parameters are incomplete.
+        0 when ROS shuts down, 1 when the node died, 2 when the parameters are incomplete.
     """
     rospy.init_node("external_controllers_spawner", anonymous=True)
     try:
@@ -43,6 +43,7 @@ def main() -> int:
         return 2
     if node is None:
         rospy.loginfo("No external controller to start: '%s' is empty.", PACKAGE_KEY)
+        rospy.spin()  # a launch that requires this node goes on without one
         return 0
     return run_until_it_ends(node)
 
