@@ -52,9 +52,12 @@ def test_its_states_folder_without_states_and_its_script_by_name_are_no_fault(
 
 
 @pytest.mark.parametrize(("given", "expected"), [
-    ("pick_and_hold.yaml", "{api}/task_constructor_scripts/pick_and_hold.yaml"), ("/tasks/mine.yaml", "/tasks/mine.yaml")])
-def test_a_task_is_given_by_its_name_or_by_its_path(given: str, expected: str) -> None:
+    ("pick_and_hold.yaml", "{api}/task_constructor_scripts/pick_and_hold.yaml"),
+    ("/tasks/mine.yaml", "/tasks/mine.yaml")])
+def test_a_task_is_given_by_its_name_or_by_its_path_and_1_is_a_simulation(given: str, expected: str) -> None:
     api = rospkg.RosPack().get_path("modular_framework_api")
+    arguments = [f"task_constructor_script:={given}", "simulation:=1"]
     file = f"{api}/launch/start_framework.launch"
-    config = roslaunch.config.load_config_default([(file, [f"task_constructor_script:={given}"])], None, verbose=False)
-    assert config.params["/task/task_constructor_script"].value == expected.format(api=api)
+    params = roslaunch.config.load_config_default([(file, arguments)], None, verbose=False).params
+    assert params["/task/task_constructor_script"].value == expected.format(api=api)
+    assert params["/use_sim_time"].value is True and params["/simulation"].value is True
