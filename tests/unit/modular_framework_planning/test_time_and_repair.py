@@ -13,12 +13,15 @@ import trimesh
 from independent_checker import IndependentChecker, box
 
 from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.constrained_search import ConstrainedSearch
+from modular_framework_planning.constraint_kinds import FrameOnRobot, OrientationConstraint
+from modular_framework_planning.constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.goals import GoalResolver
 from modular_framework_planning.kinematics import KinematicsPool
 from modular_framework_planning.last_check import GRACE_S, LastCheck
 from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.ompl_planning import OmplPlanner
+from modular_framework_planning.ompl_planning import OmplPlanner, connection
 from modular_framework_planning.path_repair import EdgeError, repaired
 from modular_framework_planning.pilz.command_planner import CommandPlanner
 from modular_framework_planning.pipeline import PlanningPipeline
@@ -177,6 +180,37 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
     assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
     with pytest.raises(EdgeError, match="edge 1 of 2"):
         Stubborn.repaired(problem, np.array([START, GOAL, START]))
+
+
+def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock(
+        model: RobotModel, pool: KinematicsPool, monkeypatch: pytest.MonkeyPatch) -> None:
+    step_to = ConstrainedSearch._step_to
+    delay_s, looked = 0.0, 0
+
+    def watched(self: ConstrainedSearch, *states: np.ndarray) -> np.ndarray | None:
+        nonlocal looked
+        looked += 1
+        time.sleep(delay_s)  # as on a busy computer
+        return step_to(self, *states)
+
+    monkeypatch.setattr(ConstrainedSearch, "_step_to", watched)
+    planner = Coarse()
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(request(model, board=False))
+    problem = planner.asked[0]
+    tip = problem.group.tip_link
+    frame = model.pin_model.frames[model.frame_ids[tip]]
+    level = OrientationConstraint(FrameOnRobot(tip, int(frame.parentJoint), frame.placement.copy()),
+                                  FrameOnRobot("world", 0, pin.SE3.Identity()),
+                                  model.link_transforms(problem.start)[tip].rotation, np.array([0.02, 0.02, 0.02]))
+    tilted = np.array([*START[:4], -1.0, 0.0])  # it violates the constraint, so that no way leads there
+    steps = []
+    for slowness_s in (0.0, 0.02):
+        delay_s, looked = slowness_s, 0
+        own = replace(problem, constraints=KinematicConstraints(model, orientations=[level]), repeatable=True,
+                      rng=np.random.default_rng(3))
+        assert connection(own, np.array(START), tilted) is None
+        steps.append(looked)
+    assert steps[0] == steps[1] > 10
 
 
 def sphere_mesh(subdivisions: int) -> Mesh:

@@ -74,20 +74,27 @@ class _Tree:
 class ConstrainedSearch:
     """One search."""
 
-    def __init__(self, problem: PlanningProblem, step: float, goals: Array | None = None) -> None:
-        """Args: the problem, with constraints; the distance of collision checks along an edge [rad or m]; other goals.
+    def __init__(self, problem: PlanningProblem, step: float, goals: Array | None = None,
+                 most_states: float = np.inf) -> None:
+        """Takes what to search.
+
+        Args:
+            problem: with constraints.
+            step: distance of collision checks along an edge [rad or m].
+            goals: others than the problem's.
+            most_states: how many states to look at.
         """
-        self._problem, self._step, self._goals = problem, step, goals
+        self._problem, self._step, self._goals, self._most_states = problem, step, goals, most_states
         self._low, self._high = _search_bounds(problem)
         self._states = 0
 
     def run(self) -> PlannedPath:
-        """Returns a path whose edges satisfy the constraints; raises PlanningError when the time is over."""
+        """Returns a path whose edges satisfy the constraints; raises PlanningError when time or states are used up."""
         problem = self._problem
         grown, other = _Tree(problem.start_values[None, :]), _Tree(
             problem.goal_states() if self._goals is None else self._goals)
         forward = True
-        while not problem.interrupted():
+        while not self._ends():
             target = problem.rng.uniform(self._low, self._high)
             reached = self._grow(grown, target)
             met = self._grow(other, grown.values[reached])
@@ -99,10 +106,13 @@ class ConstrainedSearch:
             grown, other, forward = other, grown, not forward
         raise no_path(problem, NAME, self._states)
 
+    def _ends(self) -> bool:
+        return self._states >= self._most_states or self._problem.interrupted()
+
     def _grow(self, tree: _Tree, target: Array) -> int:
         """Steps from the nearest vertex to a target as far as that goes; returns the last vertex."""
         number = tree.nearest(target)
-        while not self._problem.interrupted():
+        while not self._ends():
             here = tree.values[number].copy()
             gap = target - here
             distance = float(np.linalg.norm(gap))

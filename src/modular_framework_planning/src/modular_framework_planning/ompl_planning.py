@@ -28,7 +28,7 @@ from modular_framework_planning.path_shortening import path_length
 from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.spatial import Array
 
-CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_S = 500, 0.5  # of the search for a way round one edge
+CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # of the search for a way round one edge
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
@@ -90,15 +90,14 @@ class OmplPlanner:
 def connection(problem: PlanningProblem, first: Array, second: Array) -> Array | None:
     """Returns a way between two free states, its edges looked at as finely as the last check looks; None for none.
 
-    The search ends after a number of iterations, or with the allowed time of the request.
+    The search ends after a number of iterations or states, so that a seed repeats it, or with the allowed time.
     """
     near = replace(problem.with_start(problem.motion.whole(first)), planner_id="RRTConnect", planner_parameters={},
                    deadline_s=problem.end_s)
     fine = problem.settings.finest_step
     if problem.constraints is not None and constraints_are_tight(problem):
-        near = replace(near, deadline_s=min(problem.end_s, time.monotonic() + CONSTRAINED_CONNECTION_S))
         try:
-            return ConstrainedSearch(near, fine, second[None]).run().vertices
+            return ConstrainedSearch(near, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
         except PlanningError:
             return None
     return _Search(near, second[None], fine, DEFAULT_RANGE, CONNECTION_ITERATIONS).run()
