@@ -57,6 +57,7 @@ class FakeMoveGroup:
     Attributes:
         reach: Greatest x that inverse kinematics can reach [m].
         blocked: y from which on a state is in collision with ``wall`` [m].
+        blocked_for_current_fingers: x from which on it is so while the fingers are as they are [m].
         plan_error: Error code of planning instead of a plan.
         reason: Reason reported on the planning report topic.
         execution_error: Error code of executing.
@@ -67,7 +68,7 @@ class FakeMoveGroup:
     """
 
     def __init__(self) -> None:
-        self.reach, self.blocked = 1.0, 1.0
+        self.reach, self.blocked, self.blocked_for_current_fingers = 1.0, 1.0, 1.0
         self.plan_error, self.reason = 0, ""
         self.execution_error, self.slow, self.canceled = 0, False, False
         self.moving, self.looks = threading.Event(), 0
@@ -135,6 +136,11 @@ class FakeMoveGroup:
         return response
 
     def _validity(self, request):
+        joints = request.robot_state.joint_state
+        at = dict(zip(joints.name, joints.position, strict=True))
+        fingers_collide = "f" not in at and at["jx"] > self.blocked_for_current_fingers
+        if at["jy"] <= self.blocked and not fingers_collide:
+            return GetStateValidityResponse(valid=True)
         return GetStateValidityResponse(valid=False, contacts=[
             ContactInformation(contact_body_1="palm", contact_body_2="wall")])
 

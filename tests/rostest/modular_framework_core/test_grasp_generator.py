@@ -123,6 +123,16 @@ def test_on_demand_the_reason_tells_what_is_wrong(scene) -> None:
     assert "can be grasped from above" in generate()[1]
 
 
+def test_grasps_that_the_arm_cannot_approach_with_the_fingers_as_they_are_are_left_out(scene) -> None:
+    rospy.set_param("top_down_grasp_generator/object_name", "box")
+    scene.blocked_for_current_fingers = 0.0
+    success, text = generate()
+    scene.blocked_for_current_fingers = 1.0
+    assert not success
+    assert "with the fingers as they are now, the arm is in collision there ('palm' with 'wall')" in text
+    assert generate()[0]
+
+
 def test_a_wrong_parameter_is_named_and_the_node_lives_on(scene) -> None:
     rospy.set_param("top_down_grasp_generator/object_name", "box")
     rospy.set_param("top_down_grasp_generator/approach_distance", "far")

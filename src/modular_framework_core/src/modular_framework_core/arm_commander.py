@@ -292,10 +292,35 @@ class ArmCommander:
             touching = self._ik(pose, seed, avoid_collisions=False)
             what = f"link '{self.group.tip_link}' cannot get to {describe_pose(pose)}: "
             if touching:
-                return IkResult({}, result.error_code, what + self._contacts(touching.joints, seed))
+                return IkResult({}, result.error_code, what + (self.contacts(touching.joints, seed) or result.reason))
             return IkResult({}, result.error_code, what + f"the pose is out of reach ({result.reason})")
         except CallError as error:
             return IkResult({}, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
+
+    def contacts(self, joints: Mapping[str, float], start: StartState = None) -> str:
+        """Says what collides with the arm at given joint positions.
+
+        Args:
+            joints: {joint: position} [rad or m].
+            start: Positions of all other joints; None for the current state.
+
+        Returns:
+            The pairs that are in collision; empty when the state is valid.
+
+        Raises:
+            CallError: move_group does not answer.
+        """
+        request = GetStateValidityRequest(group_name=self.group_name)
+        state = robot_state(start)
+        merged = dict(zip(state.joint_state.name, state.joint_state.position, strict=False)) | dict(joints)
+        state.joint_state = JointState(name=list(merged), position=list(merged.values()))
+        request.robot_state = state
+        proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
+        response = call_service(proxy, request, SERVICE_TIMEOUT_S)
+        if response.valid:
+            return ""
+        pairs = sorted({f"'{contact.contact_body_1}' with '{contact.contact_body_2}'" for contact in response.contacts})
+        return f"in collision there ({', '.join(pairs[:3]) or 'no contact was reported'})"
 
     def execute_plan(self, plan: RobotTrajectory | PlanResult,
                      stop_requested: Callable[[], bool] = stop_requested) -> ExecutionResult:
@@ -392,17 +417,6 @@ class ArmCommander:
         if missing:
             return IkResult({}, MoveItErrorCodes.FAILURE, f"the solution of compute_ik lacks the joints {missing}")
         return IkResult(joints, code, "")
-
-    def _contacts(self, joints: Mapping[str, float], seed: StartState) -> str:
-        request = GetStateValidityRequest(group_name=self.group_name)
-        state = robot_state(seed)
-        merged = dict(zip(state.joint_state.name, state.joint_state.position, strict=False)) | dict(joints)
-        state.joint_state = JointState(name=list(merged), position=list(merged.values()))
-        request.robot_state = state
-        proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
-        response = call_service(proxy, request, SERVICE_TIMEOUT_S)
-        pairs = sorted({f"'{contact.contact_body_1}' with '{contact.contact_body_2}'" for contact in response.contacts})
-        return f"in collision there ({', '.join(pairs[:3]) or 'no contact was reported'})"
 
     def _read_group(self) -> Group:
         urdf, srdf = rospy.get_param("robot_description", ""), rospy.get_param("robot_description_semantic", "")

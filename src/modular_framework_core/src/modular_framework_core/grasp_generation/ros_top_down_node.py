@@ -226,6 +226,9 @@ class TopDownGraspGenerator:
                 raise CallError(result.reason)
             if not result:
                 return f"at the {stage} pose, {result.reason}"
+            if stage == "pregrasp" and (touching := self._commander.contacts(result.joints)):
+                # the arm arrives there with the fingers as they are now, and takes the posture afterwards
+                return f"at the pregrasp pose, with the fingers as they are now, the arm is {touching}"
             seed = seed | result.joints
         return ""
 
