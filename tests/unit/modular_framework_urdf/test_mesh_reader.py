@@ -241,6 +241,10 @@ STRIP = '<tristrips count="1"><input semantic="VERTEX" source="#v1" offset="0"/>
     ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
                 b"element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
      "no whole PLY"),
+    ("huge.ply", b"ply\nformat ascii 1.0\nelement vertex 1000000000000\nproperty float x\nend_header\n0\n",
+     "1 values where the header declares 1000000000000"),
+    ("back.ply", b"ply\nformat binary_little_endian 1.0\nelement face 1000000000000\n"
+                 b"property list char char vertex_indices\nend_header\n\xff", "a list has -1 entries"),
     ("body.step", b"", "'.step'")])
 def test_a_mesh_that_is_not_whole_is_refused_and_named(tmp_path: Path, name: str, content: bytes, words: str) -> None:
     (tmp_path / name).write_bytes(content)

@@ -82,32 +82,41 @@ def _ply(content: bytes) -> int:
 
 
 def _ply_text(words: list[bytes], elements: list[tuple[str, int, list[list[str]]]]) -> int:
-    place = triangles = 0
+    offset = triangles = 0
     for name, count, properties in elements:
+        if all(one[0] != "list" for one in properties):  # a header may declare any number
+            offset += count * len(properties)
+            continue
         for _ in range(count):
             for one in properties:
-                length = int(words[place]) if one[0] == "list" else 0
+                length = _length(int(words[offset])) if one[0] == "list" else 0
                 triangles += length - 2 if name == "face" and one[-1].startswith("vert") else 0
-                place += 1 + length
-    if place > len(words):
-        raise ValueError(f"{len(words)} values where the header declares {place}")
+                offset += 1 + length
+    if offset > len(words):
+        raise ValueError(f"{len(words)} values where the header declares {offset}")
     return triangles
 
 
-def _ply_binary(content: bytes, place: int, elements: list[tuple[str, int, list[list[str]]]], order: str) -> int:
+def _length(length: int) -> int:
+    if length < 0:
+        raise ValueError(f"a list has {length} entries")
+    return length
+
+
+def _ply_binary(content: bytes, offset: int, elements: list[tuple[str, int, list[list[str]]]], order: str) -> int:
     triangles = 0
     for name, count, properties in elements:
         if all(one[0] != "list" for one in properties):
-            place += count * struct.calcsize(order + "".join(_PLY_SIZES[one[0]] for one in properties))
+            offset += count * struct.calcsize(order + "".join(_PLY_SIZES[one[0]] for one in properties))
             continue
         for _ in range(count):
             for one in properties:
                 if one[0] != "list":
-                    place += struct.calcsize(_PLY_SIZES[one[0]])
+                    offset += struct.calcsize(_PLY_SIZES[one[0]])
                     continue
-                length = struct.unpack_from(order + _PLY_SIZES[one[1]], content, place)[0]
+                length = _length(struct.unpack_from(order + _PLY_SIZES[one[1]], content, offset)[0])
                 triangles += length - 2 if name == "face" and one[-1].startswith("vert") else 0
-                place += struct.calcsize(_PLY_SIZES[one[1]]) + length * struct.calcsize(_PLY_SIZES[one[2]])
-    if place > len(content):
-        raise ValueError(f"{len(content)} bytes where the header declares {place}")
+                offset += struct.calcsize(_PLY_SIZES[one[1]]) + length * struct.calcsize(_PLY_SIZES[one[2]])
+    if offset > len(content):
+        raise ValueError(f"{len(content)} bytes where the header declares {offset}")
     return triangles
