@@ -18,6 +18,7 @@ from modular_framework_core.option_uses import (
 from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
 from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence
+from modular_framework_core.task_constructor.option_types import complaint
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
 
@@ -62,6 +63,8 @@ class _Checker:
         source = self._state.source
         for option in source.options.values():
             node = self._state.nodes.get(option.name)
+            if node is not None and complaint(option.type, node):
+                continue  # noted already: more would only follow from it
             value = option.default if node is None else node.plain()
             for use in option.uses:
                 self._check_use(use, option.name, value, node)
@@ -166,7 +169,8 @@ def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
         for option in state.source.options.values():
             for use in option.uses:
                 if isinstance(use, Named) and use.made:
-                    found.setdefault(use.kind, set()).add(str(state.options.get(option.name, option.default)))
+                    name = state.options.get(option.name, option.default)
+                    found.setdefault(use.kind, set()).update([name] if isinstance(name, str) else [])
     return {kind: frozenset(names - {""}) for kind, names in found.items()}
 
 

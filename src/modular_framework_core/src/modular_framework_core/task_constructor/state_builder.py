@@ -78,7 +78,7 @@ class StateBuilder:
             elif option.name in options and option.name not in STATE_KEYS:
                 wrong = complaint(option.type, options[option.name])
                 if wrong is not None:
-                    self._faults.add_cause(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
+                    self._faults.add(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
         self._faults.harmless += len(self._faults) - before
         for key in STATE_KEYS:
             if key in options:
