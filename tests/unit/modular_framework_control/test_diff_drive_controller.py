@@ -225,6 +225,36 @@ def test_while_the_hardware_has_a_fault_the_wheels_stand_and_commands_are_refuse
     assert base.joint("left").command == pytest.approx(5.0)
 
 
+def test_a_command_that_comes_just_as_the_fault_does_is_gone_when_the_fault_is_over(
+        make_base: Callable[..., Base]) -> None:
+    base = make_base(cmd_vel_timeout=60.0)
+
+    class FaultMeanwhile(BaseVelocity):
+        """A command; the fault comes while it is checked."""
+
+        @property
+        def finite(self) -> bool:
+            base.controller.on_hardware_fault(base.loop.time_s, "protective stop")
+            return True
+
+    base.controller.submit(FaultMeanwhile(1.0, 0.0))
+    base.loop.step()
+    base.controller.on_hardware_recovered(base.loop.time_s)
+    base.loop.run(0.1)
+    assert [base.joint(name).command for name in WHEELS] == [0.0, 0.0]
+
+
+def test_odometry_comes_at_the_rate_that_is_set_while_the_controller_runs(make_base: Callable[..., Base]) -> None:
+    base = make_base(publish_rate=0.0)
+    base.loop.run(1.0)
+    assert base.odometry == []
+    for rate in (20.0, 0.0, 50.0):
+        base.controller.settings = replace(base.controller.settings, publish_rate=rate)
+        base.odometry.clear()
+        base.loop.run(1.0)
+        assert len(base.odometry) == pytest.approx(rate, abs=1)
+
+
 @pytest.mark.parametrize(("parameters", "fault"), [
     ({"right_wheel": []}, "expected a list of joint names"),
     ({"left_wheel": None}, "/base/left_wheel: got None"),

@@ -26,7 +26,7 @@ def point(time_s: float, position: float, velocity: float | None = None,
                            () if acceleration is None else (acceleration,))
 
 
-def told(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0, here: float = 0.0) -> str:
+def refusal(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0, here: float = 0.0) -> str:
     spline = Spline(JointTrajectory(("a",), points))
     return excesses_of(spline, ("a",), limits, np.array([here])).text(first, first + 1)
 
@@ -43,41 +43,41 @@ def told(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0,
 ])
 def test_what_is_beyond_a_limit_is_told_with_point_joint_value_and_limit(points: tuple[TrajectoryPoint, ...],
                                                                          words: str) -> None:
-    assert words in told(*points)
+    assert words in refusal(*points)
 
 
 @pytest.mark.parametrize("points", [
     (point(0.0, 0.0), point(1.0, 2.0005)), (point(0.0, 0.0, 3.1), point(0.5, 1.5, 3.1)),
     (point(0.0, 0.0), point(0.5, 1.55)), (point(0.0, -2.0), point(4.0, 2.0)), (point(1.0, 0.0),)])
 def test_rounding_and_a_little_too_much_speed_are_allowed(points: tuple[TrajectoryPoint, ...]) -> None:
-    assert told(*points) == ""
+    assert refusal(*points) == ""
 
 
 def test_where_no_limit_is_known_everything_finite_is_allowed() -> None:
-    assert told(point(0.0, -1e9, 1e6), point(1e-3, 1e9, -1e6), limits=FREE) == ""
+    assert refusal(point(0.0, -1e9, 1e6), point(1e-3, 1e9, -1e6), limits=FREE) == ""
 
 
 def test_points_that_are_left_out_do_not_count() -> None:
     points = (point(0.0, 9.0), point(0.1, 0.0), point(1.0, 0.5))
-    assert told(*points) and told(*points, first=1) == ""
+    assert refusal(*points) and refusal(*points, first=1) == ""
 
 
 def test_of_very_many_faults_only_a_few_are_told_and_the_rest_counted() -> None:
-    text = told(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)))
+    text = refusal(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)))
     assert "point 7: position" in text and "point 8: position" not in text
     assert text.endswith("and 9991 more")     # 5000 positions, and the velocities of 4999 ways
-    text = told(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)), first=4997)
+    text = refusal(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)), first=4997)
     assert text.count("position of joint") == 3 and text.count("on the way") == 2 and "more" not in text
 
 
 def test_a_joint_that_stands_outside_its_range_may_come_back_but_not_go_further() -> None:
-    assert told(point(0.0, 2.4), point(1.0, 1.0), here=2.4) == ""
+    assert refusal(point(0.0, 2.4), point(1.0, 1.0), here=2.4) == ""
     assert ("point 1: position of joint 'a' is 2.5; its limits are -2 to 2 (it stands outside, at 2.4)"
-            in told(point(0.0, 2.4), point(1.0, 2.5), here=2.4))
+            in refusal(point(0.0, 2.4), point(1.0, 2.5), here=2.4))
 
 
 def test_limits_hold_for_a_joint_whose_position_is_not_a_number() -> None:
-    assert "position of joint 'a' is 2.5; its limits are -2 to 2" in told(point(1.0, 2.5), here=math.nan)
+    assert "position of joint 'a' is 2.5; its limits are -2 to 2" in refusal(point(1.0, 2.5), here=math.nan)
 
 
 @settings(max_examples=60, deadline=None)
@@ -91,7 +91,7 @@ def test_the_speed_between_points_is_that_of_scipys_curve(rows: list[tuple[float
     points = [point(float(t), *row) for t, row in zip(times_s, rows, strict=True)]
     for share, refused in ((0.95 / 1.05, True), (1.01 / 1.05, False)):
         limits = MotionLimits.of([JointLimits(max_velocity=share * fastest + (0.0 if refused else 1e-9))])
-        assert bool(told(*points, limits=limits)) == refused
+        assert bool(refusal(*points, limits=limits)) == refused
 
 
 def sampled(track: Track, begun_s: float) -> np.ndarray:

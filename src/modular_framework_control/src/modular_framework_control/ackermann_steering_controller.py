@@ -11,9 +11,10 @@ from modular_framework_control.mobile_base_controller import (
     BaseVelocity,
     MobileBaseController,
     TwistLimits,
+    read_name,
     read_positive,
 )
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_control.node_handle import NodeHandle, ParameterError
 from modular_framework_control.wheel_geometry import WheelGeometry
 
 
@@ -33,8 +34,8 @@ class AckermannSteeringController(MobileBaseController):
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
-        wheel = _joint_name(controller_nh, "rear_wheel", "rear_wheel_joint")
-        steer = _joint_name(controller_nh, "front_steer", "front_steer_joint")
+        wheel = read_name(controller_nh, "rear_wheel", "rear_wheel_joint", "joint")
+        steer = read_name(controller_nh, "front_steer", "front_steer_joint", "joint")
         base = (read_positive(controller_nh, "wheel_separation_h", 1.0) if controller_nh.has_param("wheel_separation_h")
                 else _wheel_base_of(WheelGeometry(root_nh, "wheel_separation_h"), wheel, steer))
         radius = (read_positive(controller_nh, "wheel_radius", 1.0) if controller_nh.has_param("wheel_radius")
@@ -85,16 +86,9 @@ class AckermannSteeringController(MobileBaseController):
             self._steer.command = self._steer.position
 
 
-def _joint_name(handle: NodeHandle, key: str, default: str) -> str:
-    value = handle.get_param(key, default)
-    if not isinstance(value, str) or not value:
-        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a joint's name")
-    return value
-
-
 def _wheel_base_of(geometry: WheelGeometry, wheel: str, steer: str) -> float:
     base = abs(float(geometry.between(wheel, steer)[0]))
     if base <= 0.0:
         raise ParameterError(f"robot_description: joint '{steer}' is not ahead of joint '{wheel}'; expected axles that "
-                             "are apart; set wheel_separation_h, or mend the description")
+                             "are apart; set wheel_separation_h, or correct the description")
     return base

@@ -197,5 +197,5 @@ def _separation_of(geometry: WheelGeometry, left: str, right: str) -> float:
     separation = geometry.distance(left, right)
     if separation <= 0.0:
         raise ParameterError(f"robot_description: joints '{left}' and '{right}' are at the same place; expected wheels "
-                             "that are apart; set wheel_separation, or mend the description")
+                             "that are apart; set wheel_separation, or correct the description")
     return separation

@@ -219,5 +219,5 @@ def _read_geometry(root_nh: NodeHandle, controller_nh: NodeHandle, wheels: list[
             or geometry.track <= 2.0 * geometry.steering_offset):
         raise ParameterError(f"parameters {join_names(controller_nh.namespace, '')}: the wheels are at {geometry}; "
                              "expected track, wheel_base and wheel_radius above 0, and wheel_steering_y_offset below "
-                             "half the track; set them, or mend robot_description")
+                             "half the track; set them, or correct robot_description")
     return geometry

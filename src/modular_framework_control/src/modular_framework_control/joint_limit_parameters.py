@@ -114,7 +114,7 @@ def _number(joint: str, element: ElementTree.Element, key: str, default: str) ->
         value = math.nan
     if math.isnan(value):
         raise ParameterError(f"robot_description:{line_of(element)}: <{element.tag}> of joint '{joint}': {key} is "
-                             f"'{text}'; expected a number; mend the description")
+                             f"'{text}'; expected a number; correct the description")
     return value
 
 

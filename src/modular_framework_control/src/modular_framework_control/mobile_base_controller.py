@@ -10,7 +10,7 @@ from typing import Any
 from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 from modular_framework_control.planar_odometry import PlanarOdometry
-from modular_framework_control.rates import next_due, period_of
+from modular_framework_control.rates import first_due, next_due, period_of
 from modular_framework_control.speed_limiter import SpeedLimiter, read_speed_limiter
 
 Diagonal = tuple[float, float, float, float, float, float]
@@ -115,13 +115,13 @@ class MobileBaseController(Controller):
         self._latest: Any = None
         self._latest_seen: Any = None
         self._seen_s = -math.inf
-        self._next_s = -math.inf
+        self._rate = self._next_s = math.inf
         self._refusal = "the controller is not running; start it first"
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         self.settings = self._read_settings(controller_nh)
-        self.frames = BaseFrames(_name(controller_nh, "odom_frame_id", "odom"),
-                                 _name(controller_nh, "base_frame_id", "base_link"),
+        self.frames = BaseFrames(read_name(controller_nh, "odom_frame_id", "odom", "frame"),
+                                 read_name(controller_nh, "base_frame_id", "base_link", "frame"),
                                  _diagonal(controller_nh, "pose_covariance_diagonal"),
                                  _diagonal(controller_nh, "twist_covariance_diagonal"))
         self._open_loop = read_bool(controller_nh, "open_loop", False)
@@ -163,7 +163,7 @@ class MobileBaseController(Controller):
     def starting(self, time_s: float) -> None:
         self._brake()
         self._forget()
-        self._next_s = time_s
+        self._rate = math.inf      # of no settings: they are taken over in the first cycle
         self.odometry.start(time_s)
         self._refusal = ""
 
@@ -192,10 +192,13 @@ class MobileBaseController(Controller):
 
     def _report(self, time_s: float) -> bool:
         """Hand the odometry out if that is due; answers whether it is."""
+        settings, pose = self.settings, self.odometry
+        period_s = period_of(settings.publish_rate)
+        if settings.publish_rate != self._rate:
+            self._rate, self._next_s = settings.publish_rate, first_due(period_s, time_s)
         if self.on_odometry is None or time_s < self._next_s:
             return False
-        settings, pose = self.settings, self.odometry
-        self._next_s = next_due(self._next_s, period_of(settings.publish_rate), time_s)
+        self._next_s = next_due(self._next_s, period_s, time_s)
         self.on_odometry(OdometrySnapshot(time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular,
                                           settings.enable_odom_tf))
         return True
@@ -271,10 +274,15 @@ def read_positive(handle: NodeHandle, key: str, default: float) -> float:
     return value
 
 
-def _name(handle: NodeHandle, key: str, default: str) -> str:
+def read_name(handle: NodeHandle, key: str, default: str, what: str) -> str:
+    """A parameter that names something: `what` says what, for the message.
+
+    Raises:
+        ParameterError: not a text, or an empty one.
+    """
     value = handle.get_param(key, default)
     if not isinstance(value, str) or not value:
-        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a frame's name")
+        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a {what}'s name")
     return value
 
 

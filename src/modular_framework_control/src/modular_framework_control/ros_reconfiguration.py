@@ -50,20 +50,20 @@ class Reconfiguration:
     """Serves NAMESPACE/{set_parameters, parameter_descriptions, parameter_updates}."""
 
     def __init__(self, namespace: str, table: Sequence[Adjustable], holder: Any, attribute: str) -> None:
-        """Takes what is adjusted.
+        """Say what is adjusted.
 
         Args:
             namespace: absolute, or beginning with "~".
             table: the settings that may be changed.
-            holder, attribute: where the settings are, a frozen dataclass that is replaced as a whole, so that whoever
-                reads it while it is adjusted sees the old settings or the new ones.
+            holder, attribute: where the settings are, a frozen dataclass that is replaced as a whole, so that its
+                readers see the old settings or the new ones, never some of each.
         """
         self._namespace, self._table = namespace, tuple(table)
         self._holder, self._attribute = holder, attribute
         self._server: _Server | None = None
 
     def connect(self) -> None:
-        """Starts to serve."""
+        """Start to serve."""
         settings = getattr(self._holder, self._attribute)
         defaults = {item.name: getattr(settings, item.name) for item in self._table}
         for name, value in defaults.items():  # the server reads them, and knows no faulty ones
@@ -71,7 +71,7 @@ class Reconfiguration:
         self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
 
     def close(self) -> None:
-        """Ends to serve; may be called twice."""
+        """Stop serving; may be called twice."""
         server, self._server = self._server, None
         if server is not None:
             server.set_service.shutdown("its owner was closed")

@@ -27,7 +27,7 @@ class WheelGeometry:
 
     def __init__(self, root_nh: NodeHandle, wanted_for: str) -> None:
         self._where = f"parameter {join_names(root_nh.namespace, 'robot_description')}"
-        self._remedy = f"set {wanted_for} in the controller's parameters, or mend the description"
+        self._remedy = f"set {wanted_for} in the controller's parameters, or correct the description"
         description = root_nh.get_param("robot_description")
         if not isinstance(description, str):
             raise ParameterError(f"{self._where} is not set, and {wanted_for} is looked up there; load the robot "
