@@ -170,6 +170,21 @@ def test_a_command_controller_does_what_it_is_told_and_refuses_nonsense(
     assert seen(handle), handle
 
 
+@pytest.mark.parametrize(("family", "more"), [("position", {}), ("velocity", {"pid": {"p": 20.0}}),
+                                              ("effort", {"pid": STIFF})])
+def test_a_position_that_is_not_a_number_is_never_commanded(start: Callable[..., Any], family: str,
+                                                            more: dict[str, Any]) -> None:
+    loop = start(family, "JointPositionController", joint="a", **more)
+    loop.controllers["c"].submit([0.3])
+    loop.run(0.5)
+    handle, controller = joint(loop, family), loop.controllers["c"]
+    handle.state.position = math.nan
+    for step in (lambda: controller.update(loop.time_s, 0.01), lambda: controller.stopping(loop.time_s),
+                 lambda: controller.starting(loop.time_s), lambda: controller.update(loop.time_s, 0.01)):
+        step()
+        assert handle.command == pytest.approx(0.3 if family == "position" else 0.0)
+
+
 @pytest.mark.parametrize(("family", "controller"), [("velocity", "JointVelocityController"),
                                                     ("effort", "JointEffortController")])
 def test_no_velocity_or_effort_is_left_when_a_command_controller_is_stopped(start: Callable[..., Any], family: str,

@@ -76,6 +76,13 @@ def test_a_joint_that_stands_outside_its_range_may_come_back_but_not_go_further(
             in refusal(point(0.0, 2.4), point(1.0, 2.5), here=2.4))
 
 
+def test_a_joint_that_may_not_move_at_all_is_said_to_have_a_wrong_limit() -> None:
+    still = MotionLimits.of([JointLimits(max_velocity=0.0)])
+    assert "its limit is 0; with it the joint may not move at all: correct it in robot_description" in refusal(
+        point(0.0, 0.0), point(1.0, 0.5), limits=still)
+    assert refusal(point(0.0, 0.5), point(1.0, 0.5), limits=still, here=0.5) == ""
+
+
 def test_limits_hold_for_a_joint_whose_position_is_not_a_number() -> None:
     assert "position of joint 'a' is 2.5; its limits are -2 to 2" in refusal(point(1.0, 2.5), here=math.nan)
 

@@ -294,6 +294,21 @@ def test_a_fault_of_the_hardware_leaves_the_steering_where_it_is(rover: Callable
     assert loop.robot_hw.steerings["s_front_left"].command == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize("what", ["a wheel's velocity", "a steering's position"])
+def test_a_rover_whose_wheels_are_not_known_comes_to_rest(rover: Callable[..., Any], what: str) -> None:
+    loop = rover()
+    pose = drive(loop, SteeringCommand(0.2, 0.3, 0.3), 1.0)
+    before, hardware = (pose.x, pose.y, pose.heading), loop.robot_hw
+    if what == "a wheel's velocity":
+        hardware.wheels["rear_left"].state.velocity = math.nan
+    else:
+        hardware.steerings["s_rear_left"].state.position = math.nan
+    loop.controllers["c"].update(loop.time_s, 0.01)
+    assert {wheel.command for wheel in hardware.wheels.values()} == {0.0}
+    assert all(math.isfinite(steering.command) for steering in hardware.steerings.values())
+    assert (pose.x, pose.y, pose.heading) == before
+
+
 @pytest.mark.parametrize("command", [SteeringCommand(math.nan, 0.0, 0.0), SteeringCommand(0.1, math.inf, 0.0),
                                      SteeringCommand(0.1, 0.0, math.nan)])
 def test_a_steering_command_that_is_not_finite_is_refused(rover: Callable[..., Any], command: SteeringCommand) -> None:

@@ -25,6 +25,7 @@ WAY_MARGIN = 1e-2
 the first point that is followed [rad|m]."""
 _MOST_FAULTS = 8
 _SEGMENTS_AT_ONCE = 1024
+_NO_SPEED = "with it the joint may not move at all: correct it in robot_description or joint_limits"
 
 # Chebyshev nodes, whose largest sample is at most 2 % (velocity) below the largest value of a quintic segment.
 _NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 33))
@@ -120,14 +121,14 @@ class Excesses:
                 return (f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within "
                         "them")
             case _Kind.POINT_VELOCITY:
-                return (f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; give a "
-                        "lower velocity")
+                return (f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; "
+                        + ("give a lower velocity" if fastest > 0.0 else _NO_SPEED))
             case _Kind.WAY_POSITION:
                 return (f"on the way to point {point} joint '{name}' comes to {value:.6g}; {allowed}; give the points "
                         " other velocities, or points in between")
             case _Kind.WAY_VELOCITY:
                 return (f"on the way to point {point} joint '{name}' reaches the velocity {value:.6g}; its limit is "
-                        f"{fastest:.6g}; give the point a later time_from_start")
+                        f"{fastest:.6g}; " + ("give the point a later time_from_start" if fastest > 0.0 else _NO_SPEED))
 
     def _range(self, joint: int) -> str:
         lowest, highest, here = self._limits.lowest[joint], self._limits.highest[joint], self._here[joint]
