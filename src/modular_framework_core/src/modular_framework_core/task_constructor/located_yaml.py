@@ -10,13 +10,12 @@ from typing import Any, Union
 
 import yaml
 
+from modular_framework_core.shallow_yaml import MAX_DEPTH
 from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault, listing, nearest
 from modular_framework_core.whole_files import read_whole
 
 MAX_NODES = 500_000
 """Largest number of values in a file after its aliases are expanded: a guard against files that blow up."""
-MAX_DEPTH = 100
-"""Deepest nesting of lists and mappings in a file."""
 
 _TAG = "tag:yaml.org,2002:"
 _MERGE_KEY = "<<"

@@ -25,7 +25,7 @@ class StateBuilder:
         """Use these states."""
         self._states = states
         self._faults = faults
-        self._with_imports_told: set[str] = set()
+        self._imports_checked: set[str] = set()
 
     def spelt(self, label: str, body: Mapping) -> Mapping:
         """Return the fields of a state with known keys only; note the unknown ones, and a source that is missing."""
@@ -96,9 +96,9 @@ class StateBuilder:
         )
 
     def _check_imports(self, label: str, body: Mapping, source: StateSource) -> None:
-        """Note what the file of a state imports in vain, at the first state that is made of it."""
-        if source.name not in self._with_imports_told:
-            self._with_imports_told.add(source.name)
+        """Note imports of a state that Python does not find, at the first state that is made of it."""
+        if source.name not in self._imports_checked:
+            self._imports_checked.add(source.name)
             for missing in source.missing_imports:
                 self._faults.add(body.entries["source"].place, f"state '{label}': {missing}")
 
