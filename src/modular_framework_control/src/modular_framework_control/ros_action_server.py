@@ -56,7 +56,11 @@ class SteadyActionServer(ActionServer):
         later.start()
 
     def _tell_end(self, status: Any, result: Any) -> None:
-        super().publish_result(status, result)
+        try:
+            super().publish_result(status, result)
+        except rospy.ROSException:
+            if not going_down():
+                raise
         self._told_s = time.monotonic()
         self._ends_to_tell.discard(threading.current_thread())  # type: ignore[arg-type]
 
