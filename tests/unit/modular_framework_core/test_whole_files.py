@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import resource
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,51 +26,50 @@ from modular_framework_simulation.mesh_files import ConvexParts
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 
-@pytest.fixture()
+@contextmanager
 def full_disk() -> Iterator[None]:
-    """A disk that takes 100 bytes of a file: what a full one answers, without one."""
+    """A disk that takes 100 bytes of a file, for the code inside only: pytest itself may write to a file."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def left_in(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-@pytest.mark.usefixtures("full_disk")
 def test_a_failed_save_leaves_the_old_file_alone_and_names_its_path(tmp_path: Path) -> None:
     path = tmp_path / "kept.yaml"
     path.write_text("old")
-    with pytest.raises(MessageFileError, match="kept.yaml cannot be written: .*free space.*kept.yaml"):
+    with pytest.raises(MessageFileError, match="kept.yaml cannot be written: .*free space.*kept.yaml"), full_disk():
         message_files.save(path, "joint state", {"a": JointState(name=["a" * 200])}, [])
     assert (path.read_text(), left_in(tmp_path)) == ("old", ["kept.yaml"])
 
 
-@pytest.mark.usefixtures("full_disk")
 def test_a_state_machine_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
     class Task:
         name = "pick"
 
-    with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick.py'"):
+    with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick.py'"), full_disk():
         generator.write(Task(), "x" * 200, tmp_path)
     assert left_in(tmp_path) == []
 
 
-@pytest.mark.usefixtures("full_disk")
 def test_a_record_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
     record = StateRecord("A" * 200, 0.0)
-    with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick_.*json'"):
+    with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick_.*json'"), full_disk():
         write_record(tmp_path, "pick", 0.0, "done", True, "", (record,))
     assert left_in(tmp_path) == []
 
 
-@pytest.mark.usefixtures("full_disk")
 def test_a_cache_of_meshes_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
     solid = TriangleMesh([[0.123456789] * 3] * 8, [[0, 2, 1], [0, 1, 3]])
     parts = ConvexParts(tmp_path)
-    with pytest.raises(DescriptionError, match="block-hull.*cannot be written.*free space, or set ROS_HOME"):
+    refused = pytest.raises(DescriptionError, match="block-hull.*cannot be written.*free space, or set ROS_HOME")
+    with refused, full_disk():
         parts._write_atomically(tmp_path / "block-hull", [solid])
     assert list(tmp_path.iterdir()) == []
 
