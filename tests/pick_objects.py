@@ -104,7 +104,7 @@ class Picker:
             exit_code, log = run.returncode, run.stdout + run.stderr
         held = rospy.wait_for_message("/gazebo/grasped_object", String, WAIT_S).data
         return {"case": case, "exit_code": exit_code, "lifted_m": height(name) - before, "held": held == name,
-                "log": log[-6000:]}
+                "log": log[-30000:]}
 
     def clear(self, case: str) -> None:
         """Takes the object away, and waits until the planning scene has forgotten it."""
