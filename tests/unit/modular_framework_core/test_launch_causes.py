@@ -49,7 +49,7 @@ def test_a_wrong_argument_is_refused_with_what_is_allowed(tmp_path: Path, argume
      "run_framework: node 'gazebo' died (was killed by signal 9), and everything was stopped: because")])
 def test_the_cause_is_the_last_line(capsys: pytest.CaptureFixture[str], died: tuple[str, int], code: int,
                                     last: str) -> None:
-    watcher = EndWatcher("task")
+    watcher = EndWatcher("task", ends_with_task=True)
     watcher.process_died(*died)
     watcher.process_died("late-3", 1)
     assert watcher.last_process == died[0]

@@ -14,10 +14,13 @@ from pathlib import Path
 import rosgraph
 import roslaunch
 import roslaunch.arg_dump
+import roslaunch.config
 import roslaunch.core
+import roslaunch.loader
 import roslaunch.parent
 import roslaunch.pmon
 import roslaunch.rlutil
+import roslaunch.xmlloader
 import rospkg
 
 from modular_framework_core.launch_causes import cause_of_death
@@ -36,12 +39,14 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
 
     Attributes:
         task_name: name of the node whose exit code is the launch's own.
+        ends_with_task: whether the end of the task ends the launch.
         task_exit_code: exit code of that node; None while it runs.
         dead_node: name and exit code of the first other node that died; None if none did.
         last_process: roslaunch's name of the process that ended the launch.
     """
 
     task_name: str
+    ends_with_task: bool
     task_exit_code: int | None = None
     dead_node: tuple[str, int | None] | None = None
     last_process: str = ""
@@ -54,6 +59,8 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
             return
         if name == self.task_name and exit_code is not None and exit_code >= 0:
             self.task_exit_code = exit_code
+            if not self.ends_with_task:
+                return
         elif exit_code != 0 or self._is_required(name):
             self.dead_node = (name, exit_code)
         else:
@@ -83,10 +90,10 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an
         argument is wrong.
     """
-    watcher = EndWatcher(task_name)
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([package, launch_file])[0]
         _check_arguments(path, arguments)
+        watcher = EndWatcher(task_name, _ends_with_task(path, arguments))
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
         roslaunch.configure_logging(uuid)
         # The task is not a required node here: the watcher ends the launch, without roslaunch's banner of a death.
@@ -102,6 +109,15 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         return EXIT_BAD_LAUNCH
     log_file = Path(rospkg.get_log_dir()) / uuid / f"{watcher.last_process}.log"
     return _verdict(watcher, cause_of_death(log_file))
+
+
+def _ends_with_task(path: str, arguments: list[str]) -> bool:
+    """Returns the value that `end_with_task` has with these arguments, its default included."""
+    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False, args_only=True)
+    roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False,
+                                         assign_machines=False)
+    value = loader.root_context.resolve_dict["arg"]["end_with_task"]
+    return bool(roslaunch.loader.convert_value(value, "bool"))
 
 
 def _check_arguments(path: str, arguments: list[str]) -> None:
