@@ -13,10 +13,18 @@ def run_node(module: str, function: str = "main") -> NoReturn:
 
     An interrupt (SIGINT) before the node handles signals itself ends the process at once, without a traceback:
     roslaunch sends it to all nodes when one of them died, and the reason of that death is what the user needs to see.
+    One that comes while rospy starts the node ends the process too.
 
     Args:
         module: Full name of the module.
         function: Name of the function; it takes no argument and returns the exit code.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    sys.exit(getattr(importlib.import_module(module), function)())
+    import rospy
+
+    try:
+        sys.exit(getattr(importlib.import_module(module), function)())
+    except rospy.exceptions.ROSInitException:
+        if not rospy.core.is_shutdown():
+            raise
+        sys.exit(128 + signal.SIGINT)
