@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -92,7 +93,7 @@ class BaseFrames:
     twist_covariance: Diagonal
 
 
-class MobileBaseController(Controller):
+class MobileBaseController(Controller, ABC):
     """Base of controllers of wheels.
 
     Parameters, below the controller's name: `publish_rate` [1/s] 50, `open_loop` false: odometry from what is commanded
@@ -214,17 +215,17 @@ class MobileBaseController(Controller):
         """Forget commands, also those that limits go by."""
         self._latest = self._latest_seen = None
 
+    @abstractmethod
     def _follow_wheels(self, time_s: float) -> bool:
         """Bring the odometry up to date; answers whether it is known how the wheels stand."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
         """Command the joints so that the base does what is asked for; with None it comes to rest within its limits."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _brake(self) -> None:
         """Command the joints to stand still at once."""
-        raise NotImplementedError
 
 
 class TwistLimits:
