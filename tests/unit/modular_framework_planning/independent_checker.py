@@ -243,6 +243,17 @@ class IndependentChecker:
             best = min(best, fcl.distance(first, second, fcl.DistanceRequest(), fcl.DistanceResult()))
         return float(best)
 
+    def depths(self, positions: Mapping[str, float], bodies: tuple[str, str]) -> list[float]:
+        """How deep FCL says the parts of two bodies are in each other in one state, one entry a contact [m]."""
+        poses = self._part_poses(positions, 1)[0]
+        result = fcl.CollisionResult()
+        for pair in self._pairs:
+            if {self.parts[k].body for k in pair} == set(bodies):
+                first, second = (fcl.CollisionObject(self.parts[k].solid.geometry,
+                                                     fcl.Transform(poses[k, :3, :3], poses[k, :3, 3])) for k in pair)
+                fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=100, enable_contact=True), result)
+        return [contact.penetration_depth for contact in result.contacts]
+
     def touching_pairs(self, joint_names: Sequence[str], samples: np.ndarray,
                        rest: Mapping[str, float]) -> dict[int, tuple[str, str]]:
         """The first pair of bodies that touches, for each of many states (n, joints) in which one does."""

@@ -17,7 +17,7 @@ from modular_framework_urdf.mimics import Mimic
 if TYPE_CHECKING:
     from modular_framework_planning.constraints import KinematicConstraints
 
-PARTS_OF_MOTION_STEP = 16
+PARTS_OF_MOTION_STEP = 100  # costs nothing away from contact: a known clearance covers many samples at once
 SAME_POSITION = 1.0e-4  # [rad or m]; positions of joints that follow each other need not agree better
 
 
