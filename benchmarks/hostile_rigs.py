@@ -28,13 +28,13 @@ from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.trajectory_goal import GoalRejectedError, TrajectoryGoal, TrajectoryTicket
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
-from modular_framework_simulation.mesh_files import ConvexParts, default_cache_folder
-from modular_framework_simulation.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
-from modular_framework_simulation.robot_body import RobotBody
-from modular_framework_simulation.robot_description import read_robot
+from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.physics.robot_body import RobotBody
 
 PERIOD_S = 0.008
 READY_S = 60.0

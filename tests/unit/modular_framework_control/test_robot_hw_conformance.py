@@ -22,14 +22,14 @@ from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
-from modular_framework_simulation.mesh_files import ConvexParts
-from modular_framework_simulation.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
-from modular_framework_simulation.robot_body import RobotBody
-from modular_framework_simulation.robot_description import read_robot
-from modular_framework_simulation.sdf_resources import no_packages
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.models.sdf_resources import no_packages
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.physics.robot_body import RobotBody
 
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>

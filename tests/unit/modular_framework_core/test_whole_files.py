@@ -22,7 +22,7 @@ from modular_framework_core.task_constructor import generator
 from modular_framework_core.task_record import StateRecord, write_record
 from modular_framework_core.whole_files import read_whole, write_whole
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.mesh_files import ConvexParts
+from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.mesh_files import ConvexParts
-from modular_framework_simulation.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
 
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated_samples import solid  # noqa: E402

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
 
 LIFT_ROBOT = """<robot name="lifter">
   <link name="world"/>

@@ -12,14 +12,14 @@ import pytest
 import trimesh
 from simulated_samples import solid
 
-from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.errors import DescriptionError, DuplicateModelError, UnknownEntityError
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.sdf_reader import read_model_text
-from modular_framework_simulation.sdf_resources import Resources
-from modular_framework_simulation.simulated_body import BodyState, Twist
-from modular_framework_simulation.urdf_model import read_urdf_model
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_reader import read_model_text
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.urdf_model import read_urdf_model
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 
 CUBE = specs.Box((0.05, 0.05, 0.05))
 

@@ -14,16 +14,16 @@ from xacro_rospkg import expand
 
 from modular_framework_control.hardware_interface import PositionJointInterface
 from modular_framework_control.node_handle import MappingNodeHandle
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.mesh_files import ConvexParts
-from modular_framework_simulation.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
-from modular_framework_simulation.robot_body import RobotBody
-from modular_framework_simulation.robot_description import read_robot
-from modular_framework_simulation.sdf_reader import read_model_file
-from modular_framework_simulation.sdf_resources import Resources
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.models.sdf_reader import read_model_file
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.physics.robot_body import RobotBody
 
 ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
 START = dict(zip(ARM, (1.57, -1.57, 1.57, -1.57, -1.57, 0.0), strict=True))

@@ -20,19 +20,19 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.node_handle import MappingNodeHandle
-from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.mesh_files import ConvexParts
-from modular_framework_simulation.pacing import Pacer
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
-from modular_framework_simulation.request_queue import RequestQueue
-from modular_framework_simulation.robot_body import RobotBody, Role
-from modular_framework_simulation.robot_description import read_robot
-from modular_framework_simulation.sdf_resources import no_packages
-from modular_framework_simulation.simulation_loop import Actors, SimulationLoop
-from modular_framework_simulation.snapshots import take_snapshot
+from modular_framework_simulation.loop.pacing import Pacer
+from modular_framework_simulation.loop.request_queue import RequestQueue
+from modular_framework_simulation.loop.simulation_loop import Actors, SimulationLoop
+from modular_framework_simulation.loop.snapshots import take_snapshot
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.models.sdf_resources import no_packages
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.physics.robot_body import RobotBody, Role
 
 Script = Callable[[float], None]
 

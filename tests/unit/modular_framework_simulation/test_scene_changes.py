@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.scene_changes import Attach, Detach, Move, Put, Remove, SceneChanges
-from modular_framework_simulation.sdf_specs import Link
-from modular_framework_simulation.snapshots import HeldObject, LinkSnapshot, ModelSnapshot, WorldSnapshot
+from modular_framework_simulation.gazebo_ros.scene_changes import Attach, Detach, Move, Put, Remove, SceneChanges
+from modular_framework_simulation.loop.snapshots import HeldObject, LinkSnapshot, ModelSnapshot, WorldSnapshot
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_specs import Link
 
 LINK = Link("link", Pose(), None, (), ())
 CUBE = ("cube", "link")

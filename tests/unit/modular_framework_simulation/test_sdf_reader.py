@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.sdf_reader import read_model_text, read_world
-from modular_framework_simulation.sdf_resources import Resources
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.sdf_reader import read_model_text, read_world
+from modular_framework_simulation.models.sdf_resources import Resources
 
 TETRAHEDRON = "\n".join(["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1", "f 1 3 2", "f 1 2 4", "f 2 3 4", "f 1 4 3"])
 

@@ -11,12 +11,12 @@ import pytest
 import trimesh
 
 from modular_framework_simulation.errors import DescriptionError, LoopTimeoutError
-from modular_framework_simulation.grasp_watch import GraspWatch
-from modular_framework_simulation.mesh_files import ConvexParts, load_mesh
-from modular_framework_simulation.pacing import Pacer
-from modular_framework_simulation.request_queue import RequestQueue
-from modular_framework_simulation.sdf_specs import Mesh
-from modular_framework_simulation.starting_pose import parse_starting_pose
+from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
+from modular_framework_simulation.loop.grasp_watch import GraspWatch
+from modular_framework_simulation.loop.pacing import Pacer
+from modular_framework_simulation.loop.request_queue import RequestQueue
+from modular_framework_simulation.models.mesh_files import ConvexParts, load_mesh
+from modular_framework_simulation.models.sdf_specs import Mesh
 
 
 class FakeTime:

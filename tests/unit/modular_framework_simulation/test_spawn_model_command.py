@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.spawn_model_command import Format, Source, parse_spawn_command
+from modular_framework_simulation.gazebo_ros.spawn_model_command import Format, Source, parse_spawn_command
+from modular_framework_simulation.models.poses import Pose
 
 
 def test_a_full_command_line_is_understood() -> None:

@@ -74,29 +74,29 @@ def _core_gripper(text: str, _folder: Path) -> None:
 
 
 def _simulated_robot(text: str, folder: Path) -> None:
-    from modular_framework_simulation.mesh_files import ConvexParts
-    from modular_framework_simulation.robot_description import read_robot
+    from modular_framework_simulation.models.mesh_files import ConvexParts
+    from modular_framework_simulation.models.robot_description import read_robot
 
     read_robot(text, str, ConvexParts(folder), False)
 
 
 def _simulated_sdf(text: str, _folder: Path) -> None:
-    from modular_framework_simulation.sdf_reader import read_model_text
-    from modular_framework_simulation.sdf_resources import Resources
+    from modular_framework_simulation.models.sdf_reader import read_model_text
+    from modular_framework_simulation.models.sdf_resources import Resources
 
     read_model_text(text, "request", Resources((), str))
 
 
 def _simulated_urdf(text: str, _folder: Path) -> None:
-    from modular_framework_simulation.sdf_resources import Resources
-    from modular_framework_simulation.urdf_model import read_urdf_model
+    from modular_framework_simulation.models.sdf_resources import Resources
+    from modular_framework_simulation.models.urdf_model import read_urdf_model
 
     read_urdf_model(text, "request", Resources((), str))
 
 
 def _world_file(text: str, folder: Path) -> None:
-    from modular_framework_simulation.sdf_reader import read_world
-    from modular_framework_simulation.sdf_resources import Resources
+    from modular_framework_simulation.models.sdf_reader import read_world
+    from modular_framework_simulation.models.sdf_resources import Resources
 
     read_world(_file(folder, "table.world", text), Resources((), str))
 

@@ -13,7 +13,7 @@ import rospkg
 from scipy.spatial import ConvexHull, QhullError
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.robot_description import mesh_path
+from modular_framework_simulation.models.robot_description import mesh_path
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 
 Array = npt.NDArray[np.float64]

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.robot_description import RobotDescription, RobotJoint
-from modular_framework_simulation.simulated_body import SimulatedBody
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.robot_description import RobotDescription, RobotJoint
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import SimulatedBody
 
 _POSITION_GAIN = 0.2
 """Share of a position error that a drive corrects within one physics step; velocities are fed forward in full."""

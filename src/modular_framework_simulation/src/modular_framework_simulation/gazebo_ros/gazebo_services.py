@@ -17,14 +17,14 @@ from gazebo_msgs import msg, srv
 from geometry_msgs.msg import Vector3
 from std_srvs.srv import Empty, EmptyResponse
 
-from modular_framework_simulation import conversions, ros_names
 from modular_framework_simulation.errors import SimulationError
-from modular_framework_simulation.physics_world import WORLD_FRAMES
-from modular_framework_simulation.sdf_reader import read_model_text
-from modular_framework_simulation.sdf_resources import Resources
-from modular_framework_simulation.sdf_specs import Model
-from modular_framework_simulation.simulation_loop import SimulationLoop
-from modular_framework_simulation.urdf_model import read_urdf_model
+from modular_framework_simulation.gazebo_ros import conversions, ros_names
+from modular_framework_simulation.loop.simulation_loop import SimulationLoop
+from modular_framework_simulation.models.sdf_reader import read_model_text
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.sdf_specs import Model
+from modular_framework_simulation.models.urdf_model import read_urdf_model
+from modular_framework_simulation.physics.physics_world import WORLD_FRAMES
 
 _ANSWER_TIMEOUT_S = 30.0
 

@@ -8,14 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from modular_framework_simulation.grasp_watch import GraspWatch
-from modular_framework_simulation.pacing import Pacer
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.pybullet_robot_hw import PyBulletRobotHW
-from modular_framework_simulation.request_queue import RequestQueue
-from modular_framework_simulation.robot_body import RobotBody
-from modular_framework_simulation.snapshots import HeldObject
+from modular_framework_simulation.loop.grasp_watch import GraspWatch
+from modular_framework_simulation.loop.pacing import Pacer
+from modular_framework_simulation.loop.request_queue import RequestQueue
+from modular_framework_simulation.loop.snapshots import HeldObject
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
+from modular_framework_simulation.physics.robot_body import RobotBody
 
 _PAUSED_TICK_S = 0.05
 _HALT_S = (0.1, 0.5)

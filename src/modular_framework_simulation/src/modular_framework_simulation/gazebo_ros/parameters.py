@@ -9,7 +9,7 @@ from typing import Any
 import rospy
 
 from modular_framework_control.node_handle import ParameterError
-from modular_framework_simulation.starting_pose import parse_starting_pose
+from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.mesh_files import ConvexParts
-from modular_framework_simulation.sdf_resources import PackageFinder
-from modular_framework_simulation.sdf_specs import Mesh
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.sdf_resources import PackageFinder
+from modular_framework_simulation.models.sdf_specs import Mesh
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mimics import Mimic, resolved

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from modular_framework_simulation.poses import Pose, Vector3
+from modular_framework_simulation.models.poses import Pose, Vector3
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_simulation.errors import DescriptionError, SimulationError
-from modular_framework_simulation.physics_settings import PhysicsSettings
-from modular_framework_simulation.poses import Vector3
+from modular_framework_simulation.models.poses import Vector3
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_urdf import xml_text
 
 BASE_INDEX = -1

@@ -24,9 +24,9 @@ from moveit_msgs.msg import (
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
 from std_msgs.msg import ColorRGBA
 
-from modular_framework_simulation import conversions, ros_names
 from modular_framework_simulation.errors import SimulationError
-from modular_framework_simulation.scene_changes import (
+from modular_framework_simulation.gazebo_ros import conversions, ros_names
+from modular_framework_simulation.gazebo_ros.scene_changes import (
     Attach,
     Change,
     Detach,
@@ -35,7 +35,7 @@ from modular_framework_simulation.scene_changes import (
     Remove,
     SceneChanges,
 )
-from modular_framework_simulation.snapshots import WorldSnapshot
+from modular_framework_simulation.loop.snapshots import WorldSnapshot
 
 _SYNC_PERIOD_S = 0.1
 _PRESENCE_PERIOD_S = 0.5

@@ -11,13 +11,18 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.sdf_frames import FrameTree, pose_of
-from modular_framework_simulation.sdf_resources import Resources
-from modular_framework_simulation.sdf_shapes import SUPPORTED_VERSIONS, read_collision, read_inertial, read_visual
-from modular_framework_simulation.xml_nodes import XmlNode, parse_xml, read_xml
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_frames import FrameTree, pose_of
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.sdf_shapes import (
+    SUPPORTED_VERSIONS,
+    read_collision,
+    read_inertial,
+    read_visual,
+)
+from modular_framework_simulation.models.xml_nodes import XmlNode, parse_xml, read_xml
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.8)
 """What SDF defines for a world that names no gravity [m/s^2]."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.physics_world import PhysicsWorld
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.simulated_body import BodyState
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import BodyState
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import math
 
-from modular_framework_simulation import sdf_specs as specs
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.sdf_frames import pose_of
-from modular_framework_simulation.sdf_resources import Resources
-from modular_framework_simulation.xml_nodes import XmlNode
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_frames import pose_of
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
 

@@ -12,8 +12,13 @@ from gazebo_msgs import srv
 from std_srvs.srv import Empty
 
 from modular_framework_control.ros_start_up import start_timeout, wait_for_start
-from modular_framework_simulation import conversions, ros_names
-from modular_framework_simulation.spawn_model_command import Format, Source, SpawnCommand, parse_spawn_command
+from modular_framework_simulation.gazebo_ros import conversions, ros_names
+from modular_framework_simulation.gazebo_ros.spawn_model_command import (
+    Format,
+    Source,
+    SpawnCommand,
+    parse_spawn_command,
+)
 
 
 class SpawnError(Exception):

@@ -12,9 +12,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.mesh_files import ConvexParts
-from modular_framework_simulation.poses import Pose, rpy_from_quaternion
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose, rpy_from_quaternion
 
 STATIC_LINK = "static"
 """Name of the one link of a static model in the written URDF."""

@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.snapshots import WorldSnapshot
+from modular_framework_simulation.loop.snapshots import WorldSnapshot
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
 
 ObjectKey = tuple[str, str]
 """Model and link name."""

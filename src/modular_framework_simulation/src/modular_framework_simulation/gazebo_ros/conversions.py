@@ -13,10 +13,10 @@ from shape_msgs.msg import Mesh as MeshMsg
 from shape_msgs.msg import MeshTriangle, SolidPrimitive
 from shape_msgs.msg import Plane as PlaneMsg
 
-from modular_framework_simulation import sdf_specs as specs
-from modular_framework_simulation.mesh_files import load_mesh
-from modular_framework_simulation.poses import Pose, normalised_quaternion
-from modular_framework_simulation.simulated_body import BodyState, Twist
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import load_mesh
+from modular_framework_simulation.models.poses import Pose, normalised_quaternion
+from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_reader import TriangleMesh
 

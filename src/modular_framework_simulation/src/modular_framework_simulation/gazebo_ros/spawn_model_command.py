@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from modular_framework_simulation.poses import Pose
+from modular_framework_simulation.models.poses import Pose
 
 
 class Format(Enum):

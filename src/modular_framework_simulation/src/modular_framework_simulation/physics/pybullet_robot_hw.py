@@ -29,8 +29,8 @@ from modular_framework_control.joint_limits import (
 )
 from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.robot_hw import RobotHW
-from modular_framework_simulation.robot_body import Drive, Mode, RobotBody
-from modular_framework_simulation.robot_description import RobotJoint
+from modular_framework_simulation.models.robot_description import RobotJoint
+from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 
 _INTERFACES = {
     Mode.POSITION: PositionJointInterface,

@@ -10,9 +10,9 @@ from gazebo_msgs.msg import LinkStates, ModelStates
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from modular_framework_simulation import conversions, ros_names
-from modular_framework_simulation.physics_world import SCOPE, PhysicsWorld
-from modular_framework_simulation.simulated_body import BodyState
+from modular_framework_simulation.gazebo_ros import conversions, ros_names
+from modular_framework_simulation.physics.physics_world import SCOPE, PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import BodyState
 
 
 class WorldTopics:

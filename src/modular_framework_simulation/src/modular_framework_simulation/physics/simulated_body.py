@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from modular_framework_simulation.errors import UnknownEntityError
-from modular_framework_simulation.physics_engine import BASE_INDEX, PhysicsEngine
-from modular_framework_simulation.poses import Pose, Vector3, rotate_vector
-from modular_framework_simulation.sdf_specs import Model
+from modular_framework_simulation.models.poses import Pose, Vector3, rotate_vector
+from modular_framework_simulation.models.sdf_specs import Model
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
 
 
 @dataclass(frozen=True, slots=True)

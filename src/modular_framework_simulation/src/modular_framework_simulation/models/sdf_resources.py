@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.xml_nodes import XmlNode, read_xml
+from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
 
 PackageFinder = Callable[[str], str]
 """Returns the folder of a ROS package; raises an exception naming the package when it is not there."""

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.poses import Pose
-from modular_framework_simulation.xml_nodes import XmlNode
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.xml_nodes import XmlNode
 
 _MODEL_FRAME = "__model__"
 

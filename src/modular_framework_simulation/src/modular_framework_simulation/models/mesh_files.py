@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.sdf_specs import Mesh
+from modular_framework_simulation.models.sdf_specs import Mesh
 from modular_framework_urdf.mesh_reader import MeshError, TriangleMesh, read_mesh
 
 _CACHE_VERSION = "2"
