@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes what a benchmark has found out about faults as a table into a README, where it can be renewed."""
+"""Writes what a benchmark found out about faults as a table into a page of docs/reference, and renews it there."""
 from __future__ import annotations
 
 import re

@@ -30,8 +30,8 @@ PARAMETERS = f"""<launch>
 
 
 def guide_planner() -> str:
-    """The planner that the guide shows."""
-    section = (ROOT / "docs/guide.md").read_text().split("### A planner of your own")[1]
+    """The planner that docs/planning.md shows."""
+    section = (ROOT / "docs/planning.md").read_text().split("### A planner of your own")[1]
     block = re.search(r"```python\n(.*?)```", section, re.DOTALL)
     assert block is not None
     return block[1]

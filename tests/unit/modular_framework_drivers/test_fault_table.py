@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of faults in the README are renewed by their benchmarks, each between its own marks."""
+"""The tables of faults in docs/reference are renewed by their benchmarks, each between its own marks."""
 from __future__ import annotations
 
 import sys

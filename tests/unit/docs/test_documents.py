@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The documents hold: links lead to pages and headings that exist, and the task of the first lesson is in order."""
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from modular_framework_core.task_constructor.faults import FaultList
+from modular_framework_core.task_constructor.located_yaml import loads
+from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
+from modular_framework_core.task_constructor.task_builder import TaskBuilder
+from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
+
+ROOT = Path(__file__).parents[3]
+STATES = ROOT / "src/modular_framework_states/src/modular_framework_states/states"
+TEMPLATES = ROOT / "src/modular_framework_core/templates"
+LINK = re.compile(r"(?<!!)\[[^\]]*\]\(([^)\s]+)\)")
+PATH = re.compile(r"`((?:src|docs|tests|benchmarks)/[\w./*-]+)`")
+
+
+def documents() -> list[Path]:
+    command = ["git", "ls-files", "-z", "*.md"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, check=False).stdout.decode()
+    found = [ROOT / name for name in listed.split("\0") if name]
+    found = found or [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *ROOT.glob("src/**/*.md")]
+    return sorted(file for file in found if file.exists())
+
+
+def anchors(file: Path) -> set[str]:
+    """The anchors that GitHub makes of the headings of a page."""
+    text = re.sub(r"```.*?```", "", file.read_text(), flags=re.DOTALL)
+    headings = re.findall(r"^#+ +(.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("document", documents(), ids=lambda file: str(file.relative_to(ROOT)))
+def test_links_lead_to_pages_and_headings_that_exist(document: Path) -> None:
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    for link in LINK.findall(text):
+        if "://" in link:
+            continue
+        name, _, anchor = link.partition("#")
+        target = (document.parent / name).resolve() if name else document
+        assert target.exists(), f"{document}: {link}"
+        if anchor:
+            assert anchor in anchors(target), f"{document}: {link}; headings are {sorted(anchors(target))}"
+
+
+@pytest.mark.parametrize("document", sorted((ROOT / "docs").rglob("*.md")), ids=lambda file: file.name)
+def test_files_that_a_page_names_exist(document: Path) -> None:
+    missing = [path for path in PATH.findall(document.read_text()) if not list(ROOT.glob(path))]
+    assert not missing
+
+
+def test_the_task_of_the_first_lesson_is_in_order() -> None:
+    block = re.search(r"```yaml\n(.*?)```", (ROOT / "docs/first_task.md").read_text(), re.DOTALL)
+    assert block is not None
+    faults = FaultList()
+    builder = TaskBuilder(StateCatalogue([STATES]), TemplateCatalogue([TEMPLATES]), faults)
+    assert builder.build(loads(block[1], "first.yaml", faults), "first.yaml").name == "to_stability"
