@@ -240,7 +240,7 @@ compile_loops() {
 
 run_compile_loops() (
   source_workspace
-  "$VENV/bin/python3" -m modular_framework_planning.compile_loops
+  "$VENV/bin/python3" -m modular_framework_planning.process_setup.compile_loops
 )
 
 find_underlay() {

@@ -252,7 +252,7 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
 
 def robot_checker() -> IndependentChecker:
     """The shipped robot, as the parameter server has it."""
-    from modular_framework_planning.urdf_document import package_resolver
+    from modular_framework_planning.robot_model.urdf_document import package_resolver
 
     return IndependentChecker(str(rospy.get_param("robot_description")),
                               str(rospy.get_param("robot_description_semantic")), package_resolver)

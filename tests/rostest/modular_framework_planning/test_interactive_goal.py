@@ -17,8 +17,8 @@ from planning_wire import ARM, DOWN, LAUNCH, OK, START, FakeArm, add, box, call,
 from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
 
-from modular_framework_planning.ros_interactive_goal import InteractiveGoal
-from modular_framework_planning.ros_move_group_client import planners_of_group
+from modular_framework_planning.visualization.interactive_goal import InteractiveGoal
+from modular_framework_planning.visualization.move_group_client import planners_of_group
 
 NODE = "/interactive_goal"
 LAUNCH_FILE = "$(find modular_framework_planning)/launch/interactive_goal.launch"

@@ -22,8 +22,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 
-from modular_framework_planning.octomap_encoding import read_file, read_stream
-from modular_framework_planning.voxel_map import VoxelMap
+from modular_framework_planning.octomap.encoding import read_file, read_stream
+from modular_framework_planning.octomap.voxel_map import VoxelMap
 
 LAUNCH = """<launch>
   <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">

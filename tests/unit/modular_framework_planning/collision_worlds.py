@@ -9,10 +9,15 @@ import pinocchio as pin
 import trimesh
 from independent_checker import IndependentChecker, Part, Solid, box, cone, cylinder, mesh, sphere
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Shape, Sphere
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Shape, Sphere
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 TIP = "wrist_3_link"
 NEAR = 0.002  # [m]; nearer than that a free state may be refused

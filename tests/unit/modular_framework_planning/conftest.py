@@ -13,8 +13,8 @@ sys.path += [str(ROOT / "src/modular_framework_planning/src"), str(ROOT / "src/m
              str(Path(__file__).parent)]
 
 from modular_framework_planning.errors import ModelError  # noqa: E402
-from modular_framework_planning.robot_model import RobotModel  # noqa: E402
-from modular_framework_planning.urdf_document import package_resolver  # noqa: E402
+from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
+from modular_framework_planning.robot_model.urdf_document import package_resolver  # noqa: E402
 
 LIMITS = {name: {"has_velocity_limits": True, "max_velocity": 3.0, "has_acceleration_limits": True,
                  "max_acceleration": 5.0}

@@ -11,25 +11,25 @@ import pinocchio as pin
 from independent_checker import IndependentChecker
 from independent_checker import box as solid_box
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constraint_kinds import JointConstraint
-from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.constraints.constraint_kinds import JointConstraint
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.ompl_planning import OmplPlanner
-from modular_framework_planning.pilz.command_planner import CommandPlanner
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planning_request import (
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planners.ompl.planner import OmplPlanner
+from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
+from modular_framework_planning.planners.stomp import StompPlanner
+from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
     PlanningAnswer,
     PlanningRequest,
     PoseGoal,
 )
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
-from modular_framework_planning.stomp import StompPlanner
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 GROUP, TIP = "arm_and_manipulator", "eg_manipulator"
 BOXES = 6

@@ -7,10 +7,10 @@ import pytest
 from collision_worlds import Verdicts, compare_verdicts, world_with
 from independent_checker import IndependentChecker
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.urdf_document import package_resolver
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.urdf_document import package_resolver
 
 WORLDS, STATES_PER_WORLD = 5, 120
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from modular_framework_planning.constraint_kinds import (
+from modular_framework_planning.constraints.constraint_kinds import (
     FrameOnRobot,
     JointConstraint,
     OrientationConstraint,
@@ -17,10 +17,17 @@ from modular_framework_planning.constraint_kinds import (
     PositionConstraint,
     euler_xyz,
 )
-from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import GeometryError
-from modular_framework_planning.regions import BoxSolid, ConeSolid, CylinderSolid, HullSolid, Solid, SphereSolid
-from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.geometry.regions import (
+    BoxSolid,
+    ConeSolid,
+    CylinderSolid,
+    HullSolid,
+    Solid,
+    SphereSolid,
+)
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 TIP = "eg_manipulator"
 SEEDS = st.integers(0, 2**32 - 1)

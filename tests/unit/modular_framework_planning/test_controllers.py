@@ -9,7 +9,11 @@ from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResour
 from genpy import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from modular_framework_planning.controllers import (
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.messages.execution_messages import MotionPart, gripper_goal, split, trajectory_goal
+from modular_framework_planning.move_group.controllers.fake_controllers import positions_at
+from modular_framework_planning.move_group.controllers.ros_control import running_claims, spec_of
+from modular_framework_planning.trajectory_execution.controllers import (
     ACTION_KINDS,
     FAKE_KINDS,
     ControllerSpec,
@@ -17,10 +21,6 @@ from modular_framework_planning.controllers import (
     choose_controllers,
     parse_controllers,
 )
-from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.execution_messages import MotionPart, gripper_goal, split, trajectory_goal
-from modular_framework_planning.ros_control_controllers import running_claims, spec_of
-from modular_framework_planning.ros_fake_controllers import positions_at
 
 
 def spec(name: str, joints: str, **more: Any) -> ControllerSpec:

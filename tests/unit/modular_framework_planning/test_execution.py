@@ -14,12 +14,15 @@ import rospy
 from moveit_msgs.msg import RobotTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_planning.controllers import ControllerSpec
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.execution_messages import MotionPart
-from modular_framework_planning.execution_settings import ExecutionSettings, parse_execution_settings
-from modular_framework_planning.ros_controllers import ActionControllers
-from modular_framework_planning.ros_execution import TrajectoryExecution
+from modular_framework_planning.messages.execution_messages import MotionPart
+from modular_framework_planning.move_group.controllers.action_controllers import ActionControllers
+from modular_framework_planning.move_group.controllers.execution import TrajectoryExecution
+from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
+from modular_framework_planning.trajectory_execution.execution_settings import (
+    ExecutionSettings,
+    parse_execution_settings,
+)
 
 WHEEL = ControllerSpec("base", "follow", "FollowJointTrajectory", ("wheel",))
 ARM = ControllerSpec("arm", "follow", "FollowJointTrajectory", ("elbow",))

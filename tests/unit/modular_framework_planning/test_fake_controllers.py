@@ -13,10 +13,10 @@ import rospy
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from modular_framework_planning.controllers import FAKE_KINDS, ControllerSpec
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.execution_messages import MotionPart
-from modular_framework_planning.ros_fake_controllers import FakeMotion, initial_positions
+from modular_framework_planning.messages.execution_messages import MotionPart
+from modular_framework_planning.move_group.controllers.fake_controllers import FakeMotion, initial_positions
+from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, ControllerSpec
 
 SPEC = SimpleNamespace(group_states={"arm": {"ready": {"a": 1.0, "b": 2.0, "gone": 3.0}}, "hand": {}})
 MODEL = SimpleNamespace(index={"a": 0, "b": 1}, semantics=SPEC)
@@ -96,7 +96,7 @@ def test_a_stopped_motion_stays_on_its_way(kind: str) -> None:
 
 
 def test_a_motion_nobody_shows_on_joint_states_is_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("modular_framework_planning.ros_fake_controllers.SEEN_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("modular_framework_planning.move_group.controllers.fake_controllers.SEEN_TIMEOUT_S", 0.1)
     motion = begin("last point", Echo(passes_on=False))
     with pytest.raises(PlanningError, match="does not show where fake controller 'fake' put a, b .*source_list"):
         wait(motion.is_done)

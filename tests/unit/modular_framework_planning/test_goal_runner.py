@@ -10,7 +10,7 @@ from typing import Any
 
 from moveit_msgs.msg import ExecuteTrajectoryAction
 
-from modular_framework_planning.ros_goal_runner import GoalRunner
+from modular_framework_planning.move_group.goal_runner import GoalRunner
 
 
 class Handle:

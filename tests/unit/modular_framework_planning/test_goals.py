@@ -8,23 +8,28 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constraint_kinds import (
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.constraints.constraint_kinds import (
     FrameOnRobot,
     JointConstraint,
     OrientationConstraint,
     PositionConstraint,
 )
-from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.goals import GoalResolver
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.planning_request import ConstraintGoal, JointGoal, PlanningRequest, PoseGoal
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.regions import BoxSolid
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
+from modular_framework_planning.geometry.regions import BoxSolid
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.goals import GoalResolver
+from modular_framework_planning.planning_interface.planning_request import (
+    ConstraintGoal,
+    JointGoal,
+    PlanningRequest,
+    PoseGoal,
+)
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_urdf.mimics import Mimic
 
 GROUP, TIP = "arm_and_manipulator", "eg_manipulator"

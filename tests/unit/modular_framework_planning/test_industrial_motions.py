@@ -10,22 +10,22 @@ import pinocchio as pin
 import pytest
 
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.pilz.command_planner import CommandPlanner
-from modular_framework_planning.pilz.velocity_profile import ROUNDING_S
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planning_request import (
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.kinematics.pose_follower import PoseFollower
+from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
+from modular_framework_planning.planners.pilz.velocity_profile import ROUNDING_S
+from modular_framework_planning.planning_interface.planning_request import (
     AuxiliaryPoint,
     JointGoal,
     PipelineSettings,
     PlanningRequest,
     PoseGoal,
 )
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.pose_follower import PoseFollower
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
-from modular_framework_planning.trajectory import Trajectory
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 GROUP, LINK = "arm_and_manipulator", "eg_manipulator"
 HOME = (1.57, -1.57, 1.2, -1.2, -1.57, 0.0)

@@ -9,9 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
-from modular_framework_planning.pilz.cartesian_limits import CartesianLimits, read_cartesian_limits
-from modular_framework_planning.pilz.pose_path import LinePath, arc_around_centre, arc_through_interim, timed
-from modular_framework_planning.pilz.velocity_profile import ROUNDING_S, SHORTEST_GAP_S, fastest_profile, sample_times
+from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits, read_cartesian_limits
+from modular_framework_planning.planners.pilz.pose_path import LinePath, arc_around_centre, arc_through_interim, timed
+from modular_framework_planning.planners.pilz.velocity_profile import (
+    ROUNDING_S,
+    SHORTEST_GAP_S,
+    fastest_profile,
+    sample_times,
+)
 
 LIMITS = CartesianLimits(1.0, 2.25, 5.0, 1.57)
 

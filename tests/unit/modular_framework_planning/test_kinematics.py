@@ -14,15 +14,15 @@ from independent_arms import (
     ur5_tool,
 )
 
-from modular_framework_planning import compiled_kinematics
-from modular_framework_planning.chain_model import tree_of
-from modular_framework_planning.compiled_kinematics import joint_placements, rotation_vector
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool
-from modular_framework_planning.kinematics_settings import NUMERIC, KinematicsSettings, settings_from
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.solution_choice import clearest
-from modular_framework_planning.spatial import pose_difference
+from modular_framework_planning.geometry.spatial import pose_difference
+from modular_framework_planning.kinematics import compiled_kinematics
+from modular_framework_planning.kinematics.chain_model import tree_of
+from modular_framework_planning.kinematics.compiled_kinematics import joint_placements, rotation_vector
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
+from modular_framework_planning.kinematics.kinematics_settings import NUMERIC, KinematicsSettings, settings_from
+from modular_framework_planning.kinematics.solution_choice import clearest
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 TIP = "eg_manipulator"
 

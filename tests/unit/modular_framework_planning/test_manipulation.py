@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.end_effectors import choose_end_effector, hand_links
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.manipulation import Translation, allowing
-from modular_framework_planning.manipulation_messages import Hand, posture, translation
-from modular_framework_planning.planning_scene import PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
+from modular_framework_planning.messages.manipulation_messages import Hand, posture, translation
+from modular_framework_planning.pick_place.manipulation import Translation, allowing
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, empty_scene
+from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
+from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_urdf.mimics import Mimic
 
 EFFECTOR = "ezgripper_finger_1_ee"

@@ -7,7 +7,7 @@ import sys
 
 BUSY = """
 import ctypes, sys, threading
-from modular_framework_planning import many_threads
+from modular_framework_planning.process_setup import many_threads
 if sys.argv[1] == "prepared":
     many_threads.prepare()
 libc, all_here = ctypes.CDLL(None), threading.Barrier(8)

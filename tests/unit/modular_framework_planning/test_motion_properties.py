@@ -8,7 +8,7 @@ import pytest
 from independent_checker import IndependentChecker
 from motion_properties import examine
 
-from modular_framework_planning.urdf_document import package_resolver
+from modular_framework_planning.robot_model.urdf_document import package_resolver
 
 SHARE = {"ompl": 8, "ptp": 16, "lin": 30, "stomp": 5}
 LEAST_SOLVED = {"ompl": 0.95, "ptp": 0.25, "lin": 0.25, "stomp": 0.8}  # straight motions are refused where they touch

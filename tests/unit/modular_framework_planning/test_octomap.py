@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modular_framework_planning.errors import GeometryError
-from modular_framework_planning.octomap_encoding import read_file, read_stream, write_binary, write_file, write_full
-from modular_framework_planning.shapes import Octree
-from modular_framework_planning.voxel_map import HIGHEST, VoxelMap, cells_of_keys, empty_map, keys_of_cells
+from modular_framework_planning.octomap.encoding import read_file, read_stream, write_binary, write_file, write_full
+from modular_framework_planning.octomap.octree import Octree
+from modular_framework_planning.octomap.voxel_map import HIGHEST, VoxelMap, cells_of_keys, empty_map, keys_of_cells
 
 REFERENCE = json.loads((Path(__file__).parent / "octomap_reference.json").read_text())
 NOTHING = np.empty((0, 3))

@@ -14,11 +14,11 @@ import trimesh
 from collision_worlds import shape_of, world_with
 from independent_checker import IndependentChecker
 
-from modular_framework_planning import collision
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.urdf_document import package_resolver
+from modular_framework_planning.collision_detection import collision_checker
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.urdf_document import package_resolver
 
 ARM_WORLDS, ARM_PATHS = 5, 6
 BARS_PATHS, OBSTACLES = 150, 30
@@ -126,10 +126,10 @@ def assert_many_graze(counts: list[int]) -> None:
     assert counts.count(0) > len(counts) / 10 and sum(0 < count <= 5 for count in counts) > len(counts) / 3, counts
 
 
-@pytest.mark.parametrize("most_undecided", [collision.MOST_UNDECIDED, 1])
+@pytest.mark.parametrize("most_undecided", [collision_checker.MOST_UNDECIDED, 1])
 def test_no_touching_sample_of_an_arms_path_is_passed_over_and_no_free_path_is_refused(
         robot: object, monkeypatch: pytest.MonkeyPatch, most_undecided: int) -> None:
-    monkeypatch.setattr(collision, "MOST_UNDECIDED", most_undecided)
+    monkeypatch.setattr(collision_checker, "MOST_UNDECIDED", most_undecided)
     rng = np.random.default_rng(31 + most_undecided)
     assert_many_graze([world.touching_samples(world.grazing_path(rng)) for world in arm_worlds(robot, rng)
                        for _ in range(ARM_PATHS)])

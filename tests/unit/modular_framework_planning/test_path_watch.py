@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.path_watch import PathWatch
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_execution.path_watch import PathWatch
 
 ARM = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

@@ -12,24 +12,34 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constraint_kinds import FrameOnRobot, OrientationConstraint
-from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot, OrientationConstraint
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.ompl_planners import PLANNERS, parameter_faults
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.pipeline_parts import DEFAULT_ADAPTERS, PipelineSpec, make_adapters, make_planner
-from modular_framework_planning.planner_configurations import PlannerConfigurations
-from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem
-from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningAnswer, PlanningRequest
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.scene_pickling import from_bytes, to_bytes
-from modular_framework_planning.seeded_planning import SeededPlanning
-from modular_framework_planning.shapes import Box
-from modular_framework_planning.trajectory import Trajectory
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planners.ompl.planner_settings import PLANNERS, parameter_faults
+from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planning_request import (
+    JointGoal,
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+)
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_parts import (
+    DEFAULT_ADAPTERS,
+    PipelineSpec,
+    make_adapters,
+    make_planner,
+)
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
+from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 GROUP = "arm_and_manipulator"
 TIP = "eg_manipulator"

@@ -11,24 +11,29 @@ import pytest
 from independent_checker import IndependentChecker
 from independent_checker import box as solid_box
 
-from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planning_request import (
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.geometry.spatial import pose_difference
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
     PlanningAnswer,
     PlanningRequest,
     PoseGoal,
 )
-from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
-from modular_framework_planning.spatial import pose_difference
-from modular_framework_planning.time_parameterization import WINDOW_S
-from modular_framework_planning.urdf_document import package_resolver
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.urdf_document import package_resolver
+from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S
 
 GROUP = "arm_and_manipulator"
 PALM = "ezgripper_palm_link"

@@ -8,14 +8,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
-from modular_framework_planning.collision import CollisionChecker
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.errors import GeometryError, PlanningError, UnknownNameError
-from modular_framework_planning.motion_problems import read_scene
-from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Cylinder, Mesh, Plane, Sphere
-from modular_framework_planning.spatial import make_transform, pose_difference
+from modular_framework_planning.geometry.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from modular_framework_planning.geometry.spatial import make_transform, pose_difference
+from modular_framework_planning.planning_interface.motion_problems import read_scene
+from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 PALM = "ezgripper_palm_link"
 

@@ -8,14 +8,20 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from modular_framework_planning.allowed_collisions import AllowedCollisionMatrix
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.padding import Padding, uniform_padding
-from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Mesh, Octree, Shape, Sphere
-from modular_framework_planning.sight_mask import bodies_in_scene
-from modular_framework_planning.voxel_map import empty_map
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
+from modular_framework_planning.octomap.octree import Octree
+from modular_framework_planning.octomap.voxel_map import empty_map
+from modular_framework_planning.perception.self_filter import bodies_in_scene
+from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix
+from modular_framework_planning.planning_scene.padding import Padding, uniform_padding
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 HAND, FOREARM, GAP = "ezgripper_palm_link", "forearm_link", 0.01
 NOTHING = np.empty((0, 3))

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning import ros_markers
-from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.move_group.markers import scene_markers
+from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 RED = (0.75, 0.12, 0.12, 1.0)
 
@@ -25,8 +25,8 @@ def box(name: str) -> CollisionObject:
 def published(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The messages that were published."""
     messages: list[Any] = []
-    monkeypatch.setattr(ros_markers.rospy, "Publisher", lambda *_, **__: None)
-    monkeypatch.setattr(ros_markers, "tell", lambda _, message: messages.append(message))
+    monkeypatch.setattr(scene_markers.rospy, "Publisher", lambda *_, **__: None)
+    monkeypatch.setattr(scene_markers, "tell", lambda _, message: messages.append(message))
     return messages
 
 
@@ -35,7 +35,7 @@ def test_objects_have_their_own_colours_and_are_opaque_without_one_too(model: Ro
     scene = empty_scene(model, model.default_positions()).with_object(box("can")).with_object(box("crate"))
     held = AttachedObject(box("held"), "ezgripper_palm_link", frozenset())
     scene = scene.with_attached(held).with_colors({"can": RED, "held": RED})
-    ros_markers.MarkerPublisher("world").show_scene(scene)
+    scene_markers.MarkerPublisher("world").show_scene(scene)
     colours = {marker.ns: marker.color for marker in published[0].markers[1:]}
     for name in ("can", "held"):
         assert (colours[name].r, colours[name].g, colours[name].b, colours[name].a) == pytest.approx(RED)

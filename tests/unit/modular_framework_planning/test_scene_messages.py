@@ -25,20 +25,20 @@ from moveit_msgs.msg import (  # noqa: E402
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive  # noqa: E402
 
 from modular_framework_planning.errors import PlanningError  # noqa: E402
-from modular_framework_planning.octomap_encoding import write_binary  # noqa: E402
-from modular_framework_planning.padding import Padding, uniform_padding  # noqa: E402
-from modular_framework_planning.planning_scene import PlanningScene as Scene  # noqa: E402
-from modular_framework_planning.planning_scene import empty_scene  # noqa: E402
-from modular_framework_planning.robot_model import RobotModel  # noqa: E402
-from modular_framework_planning.scene_conversions import (  # noqa: E402
+from modular_framework_planning.messages.scene_conversions import (  # noqa: E402
     apply_attached_object,
     apply_collision_object,
     with_matrix_of,
 )
-from modular_framework_planning.scene_difference import difference_message  # noqa: E402
-from modular_framework_planning.scene_messages import apply_scene, scene_message  # noqa: E402
-from modular_framework_planning.shapes import Octree  # noqa: E402
-from modular_framework_planning.voxel_map import VoxelMap, empty_map  # noqa: E402
+from modular_framework_planning.messages.scene_difference import difference_message  # noqa: E402
+from modular_framework_planning.messages.scene_messages import apply_scene, scene_message  # noqa: E402
+from modular_framework_planning.octomap.encoding import write_binary  # noqa: E402
+from modular_framework_planning.octomap.octree import Octree  # noqa: E402
+from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map  # noqa: E402
+from modular_framework_planning.planning_scene.padding import Padding, uniform_padding  # noqa: E402
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene as Scene  # noqa: E402
+from modular_framework_planning.planning_scene.planning_scene import empty_scene  # noqa: E402
+from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 
 PALM, WRIST = "ezgripper_palm_link", "wrist_3_link"
 OPERATIONS = {"add": CollisionObject.ADD, "append": CollisionObject.APPEND, "move": CollisionObject.MOVE,
@@ -175,7 +175,7 @@ def test_a_matrix_that_was_read_and_sent_back_means_the_same(scene: Scene) -> No
     assert matrix.allows("a", "b") and not matrix.allows("a", "c"), "an entry goes before a default"
     assert matrix.allows("a", "new") and matrix.allows("<octomap>", "new") and not matrix.allows("b", "new")
     back = PlanningScene()
-    from modular_framework_planning.scene_conversions import write_matrix
+    from modular_framework_planning.messages.scene_conversions import write_matrix
 
     write_matrix(matrix, back.allowed_collision_matrix)
     assert back.allowed_collision_matrix.entry_names == ["a", "b", "c", "<octomap>"]

@@ -11,7 +11,11 @@ import pinocchio as pin
 import pytest
 import rospy
 
-from modular_framework_planning.depth_images import (
+from modular_framework_planning.errors import GeometryError, PlanningError
+from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Plane, Sphere
+from modular_framework_planning.move_group.monitors.joint_history import JointHistory
+from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
+from modular_framework_planning.perception.depth_images import (
     Pinhole,
     SeenPoints,
     cloud_array,
@@ -19,14 +23,7 @@ from modular_framework_planning.depth_images import (
     points_of_cloud,
     points_of_depth,
 )
-from modular_framework_planning.errors import GeometryError, PlanningError
-from modular_framework_planning.joint_history import JointHistory
-from modular_framework_planning.octomap_settings import DepthImageSettings, PointCloudSettings, read_sensors
-from modular_framework_planning.planning_scene import CollisionObject, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.ros_octomap_monitor import OctomapMonitor
-from modular_framework_planning.shapes import Box, Cone, Cylinder, Mesh, Plane, Sphere
-from modular_framework_planning.sight_mask import (
+from modular_framework_planning.perception.self_filter import (
     DEPTH_NOISE,
     RegionCache,
     SightMask,
@@ -34,6 +31,9 @@ from modular_framework_planning.sight_mask import (
     depth_mask_of,
     mask_of,
 )
+from modular_framework_planning.perception.sensor_settings import DepthImageSettings, PointCloudSettings, read_sensors
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 CAMERA = Pinhole(100.0, 100.0, 31.5, 23.5)
 CUBE = Mesh(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.1,

@@ -6,18 +6,23 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.constraint_kinds import JointConstraint
-from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.constraints.constraint_kinds import JointConstraint
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningAnswer, PlanningRequest
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box
-from modular_framework_planning.stomp import StompPlanner
-from modular_framework_planning.stomp.optimiser import Optimiser
-from modular_framework_planning.stomp.settings import StompSettings, read_settings
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planners.stomp import StompPlanner
+from modular_framework_planning.planners.stomp.optimiser import Optimiser
+from modular_framework_planning.planners.stomp.settings import StompSettings, read_settings
+from modular_framework_planning.planning_interface.planning_request import (
+    JointGoal,
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+)
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 GROUP = "arm_and_manipulator"
 START = (0.9, -1.57, 1.2, -1.2, -1.57, 0.0)

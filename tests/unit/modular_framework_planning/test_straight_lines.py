@@ -9,17 +9,22 @@ import pinocchio as pin
 import pytest
 from independent_arms import SEVEN_JOINT_SRDF, SEVEN_JOINT_URDF, seven_joint_flange
 
-from modular_framework_planning.cartesian_path import JumpThresholds, straight_line
+from modular_framework_planning.cartesian.cartesian_path import JumpThresholds, straight_line
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.kinematics import InverseKinematics, KinematicsPool
-from modular_framework_planning.line_timing import time_line
-from modular_framework_planning.pilz.command_planner import CommandPlanner
-from modular_framework_planning.pilz.sequence import PlannedItem, SequenceJoiner
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningRequest, PoseGoal
-from modular_framework_planning.planning_scene import empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.spatial import Array
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
+from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
+from modular_framework_planning.planners.pilz.sequence import PlannedItem, SequenceJoiner
+from modular_framework_planning.planning_interface.planning_request import (
+    JointGoal,
+    PipelineSettings,
+    PlanningRequest,
+    PoseGoal,
+)
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.line_timing import time_line
 
 BENT = np.array([0.1, -0.6, 0.1, -2.0, 0.1, 1.5, 0.7])
 LIMITS = {"max_trans_vel": 1.0, "max_trans_acc": 2.25, "max_trans_dec": -5.0, "max_rot_vel": 1.57}

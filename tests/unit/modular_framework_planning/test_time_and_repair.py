@@ -12,26 +12,26 @@ import pytest
 import trimesh
 from independent_checker import IndependentChecker, box
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.constrained_search import ConstrainedSearch
-from modular_framework_planning.constraint_kinds import FrameOnRobot, OrientationConstraint
-from modular_framework_planning.constraints import KinematicConstraints
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot, OrientationConstraint
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.goals import GoalResolver
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.last_check import GRACE_S, LastCheck
-from modular_framework_planning.motion_check import MotionChecker
-from modular_framework_planning.ompl_planning import OmplPlanner, connection
-from modular_framework_planning.path_repair import EdgeError, repaired
-from modular_framework_planning.pilz.command_planner import CommandPlanner
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem, no_path
-from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningRequest
-from modular_framework_planning.planning_scene import CollisionObject, PlanningScene, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Mesh
-from modular_framework_planning.time_parameterization import parameterize
-from modular_framework_planning.urdf_document import package_resolver
+from modular_framework_planning.geometry.shapes import Box, Mesh
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planners.ompl.constrained_search import ConstrainedSearch
+from modular_framework_planning.planners.ompl.planner import OmplPlanner, connection
+from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
+from modular_framework_planning.planning_interface.goals import GoalResolver
+from modular_framework_planning.planning_interface.path_repair import EdgeError, repaired
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_pipeline.last_check import GRACE_S, LastCheck
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.urdf_document import package_resolver
+from modular_framework_planning.trajectory_processing.time_parameterization import parameterize
 
 GROUP = "arm_and_manipulator"
 START = (1.57, -1.57, 1.2, -1.2, -1.57, 0.0)

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modular_framework_planning.blended_path import BlendedPath
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.last_check import LastCheck
-from modular_framework_planning.planner_interface import PlannedPath
-from modular_framework_planning.planning_request import PipelineSettings
-from modular_framework_planning.time_parameterization import WINDOW_S, parameterize
-from modular_framework_planning.trajectory import Trajectory
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath
+from modular_framework_planning.planning_interface.planning_request import PipelineSettings
+from modular_framework_planning.planning_pipeline.last_check import LastCheck
+from modular_framework_planning.trajectory_processing.blended_path import BlendedPath
+from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S, parameterize
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 VELOCITY = np.array([3.15, 3.15, 3.15, 3.2, 3.2, 3.2])
 ACCELERATION = np.array([5.0, 5.0, 5.0, 8.0, 8.0, 8.0])

@@ -8,23 +8,40 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.adapters.add_iterative_spline_parameterization import AddIterativeSplineParameterization
-from modular_framework_planning.adapters.add_ruckig_trajectory_smoothing import AddRuckigTrajectorySmoothing
-from modular_framework_planning.adapters.add_time_optimal_parameterization import AddTimeOptimalParameterization
-from modular_framework_planning.adapters.add_time_parameterization import AddTimeParameterization
-from modular_framework_planning.adapters.limit_max_cartesian_link_speed import LimitMaxCartesianLinkSpeed
-from modular_framework_planning.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
-from modular_framework_planning.jerk_limits import along_straight_lines, averaged_curve, slowed_to_limits
-from modular_framework_planning.joint_limits import JointLimits, tighten
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planner_interface import PlannedPath, PlanningProblem
-from modular_framework_planning.planning_request import JointGoal, PipelineSettings, PlanningAnswer, PlanningRequest
-from modular_framework_planning.planning_scene import empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.time_parameterization import parameterize
-from modular_framework_planning.trajectory import Trajectory
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planning_request import (
+    JointGoal,
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+)
+from modular_framework_planning.planning_pipeline.adapters.add_iterative_spline_parameterization import (
+    AddIterativeSplineParameterization,
+)
+from modular_framework_planning.planning_pipeline.adapters.add_ruckig_trajectory_smoothing import (
+    AddRuckigTrajectorySmoothing,
+)
+from modular_framework_planning.planning_pipeline.adapters.add_time_optimal_parameterization import (
+    AddTimeOptimalParameterization,
+)
+from modular_framework_planning.planning_pipeline.adapters.add_time_parameterization import AddTimeParameterization
+from modular_framework_planning.planning_pipeline.adapters.limit_max_cartesian_link_speed import (
+    LimitMaxCartesianLinkSpeed,
+)
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import empty_scene
+from modular_framework_planning.robot_model.joint_limits import JointLimits, tighten
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.jerk_limits import (
+    along_straight_lines,
+    averaged_curve,
+    slowed_to_limits,
+)
+from modular_framework_planning.trajectory_processing.time_parameterization import parameterize
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 GROUP = "arm_and_manipulator"
 START = (1.57, -1.57, 1.2, -1.2, -1.57, 0.0)

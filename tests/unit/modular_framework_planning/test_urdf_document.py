@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from modular_framework_planning.errors import ModelError
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Cylinder, Sphere
-from modular_framework_planning.urdf_document import load_urdf
+from modular_framework_planning.geometry.shapes import Box, Cylinder, Sphere
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.urdf_document import load_urdf
 
 URDF = """<robot name="r"><link name="a">
 <visual><origin xyz="0 0 0.5"/><geometry><box size="0.1 0.2 0.3"/></geometry></visual>

@@ -13,19 +13,20 @@ import numpy as np
 import pinocchio as pin
 from numba.core.dispatcher import Dispatcher
 
-from modular_framework_planning.collision import CollisionChecker
-from modular_framework_planning.compile_loops import compile_all
-from modular_framework_planning.kinematics import KinematicsPool
-from modular_framework_planning.octomap_encoding import read_stream, write_binary, write_full
-from modular_framework_planning.ompl_planning import OmplPlanner
-from modular_framework_planning.pipeline import PlanningPipeline
-from modular_framework_planning.planning_request import PipelineSettings, PlanningRequest, PoseGoal
-from modular_framework_planning.planning_scene import AttachedObject, CollisionObject, empty_scene
-from modular_framework_planning.robot_model import RobotModel
-from modular_framework_planning.shapes import Box, Octree
-from modular_framework_planning.sight_mask import RegionCache, bodies_in_scene, mask_of
-from modular_framework_planning.stomp import StompPlanner
-from modular_framework_planning.voxel_map import empty_map
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
+from modular_framework_planning.octomap.octree import Octree
+from modular_framework_planning.octomap.voxel_map import empty_map
+from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, mask_of
+from modular_framework_planning.planners.ompl.planner import OmplPlanner
+from modular_framework_planning.planners.stomp import StompPlanner
+from modular_framework_planning.planning_interface.planning_request import PipelineSettings, PlanningRequest, PoseGoal
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, empty_scene
+from modular_framework_planning.process_setup.compile_loops import compile_all
+from modular_framework_planning.robot_model.robot_model import RobotModel
 
 GROUP = "arm_and_manipulator"
 START = (0.9, -1.57, 1.2, -1.2, -1.57, 0.0)

@@ -32,13 +32,13 @@ def test_what_only_looks_like_one_is_read() -> None:
 
 
 def _planning_urdf(text: str, _folder: Path) -> None:
-    from modular_framework_planning.urdf_document import load_urdf
+    from modular_framework_planning.robot_model.urdf_document import load_urdf
 
     load_urdf(text)
 
 
 def _planning_srdf(text: str, _folder: Path) -> None:
-    from modular_framework_planning.srdf import parse_srdf
+    from modular_framework_planning.robot_model.srdf import parse_srdf
 
     parse_srdf(text)
 

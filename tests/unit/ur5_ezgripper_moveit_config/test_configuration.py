@@ -11,8 +11,8 @@ import rospkg
 import yaml
 from urdf_parser_py.urdf import URDF
 
-from modular_framework_planning import capability_names as names
-from modular_framework_planning.ompl_planning import PLANNERS
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.planners.ompl.planner import PLANNERS
 
 ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 KNUCKLE = "ezgripper_knuckle_palm_L1_1"

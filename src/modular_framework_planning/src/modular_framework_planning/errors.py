@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from modular_framework_planning.exact_collision import Contact
+    from modular_framework_planning.collision_detection.exact_collision import Contact
 
 
 class ErrorCode(IntEnum):

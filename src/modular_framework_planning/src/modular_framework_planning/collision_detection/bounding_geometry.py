@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes the stand-ins of collision geometries that compiled checks work on.
+
+Whatever Coal geometry a body has, it gets stand-ins: a surface of triangles, a solid in closed form, or both. A
+stand-in encloses the body; where it is larger, a hit with it is not final and the exact check is asked.
+"""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry
+from modular_framework_planning.collision_detection.kernels.compiled_collision import Surfaces
+from modular_framework_planning.collision_detection.kernels.compiled_distance import (
+    BOX,
+    CAPSULE,
+    CONE,
+    CYLINDER,
+    HALF_SPACE,
+    PLANE,
+    SPHERE,
+    SURFACE,
+)
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import build_sphere_tree, cut_long_edges
+from modular_framework_planning.geometry.shapes import Mesh, Shape
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.octomap.octree import Octree
+
+LONGEST_EDGE, LONGEST_SHARE = 0.02, 0.05  # [m], and as a share of a surface's extent; longer triangles are cut
+SIDES = 64  # of the prism around a cylinder or cone: 1.2 mm too wide at 1 m radius
+_lock = threading.Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class StandIn:
+    """What a geometry is checked as, in its own frame.
+
+    Attributes:
+        corners: gives the corners of the surface's triangles, shape (m, 9) [m]; None for no surface.
+        swell: radius of a ball around every point of the surface that belongs to it [m].
+        surface_is_exact: whether the swollen surface is the geometry's own.
+        kind, size: closed form, SURFACE for none; solid_is_exact: whether it is the geometry's own.
+        offset: pose of both in the geometry's frame.
+        is_closed: whether the surface has an inside.
+    """
+
+    corners: Callable[[], Array] | None
+    swell: float = 0.0
+    surface_is_exact: bool = True
+    kind: int = SURFACE
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    solid_is_exact: bool = True
+    offset: Transform = field(default_factory=pin.SE3.Identity)
+    is_closed: bool = False
+
+    @cached_property
+    def surface(self) -> Surfaces | None:
+        """Sphere tree over the triangles; built when it is asked for, as most solids are checked in closed form."""
+        return None if self.corners is None else _surface(self.corners())
+
+    @property
+    def radius(self) -> float:
+        """Radius of a ball around the closed form's origin that holds it [m]; infinite without a closed form."""
+        x, y, z = self.size
+        match self.kind:
+            case _ if self.kind == BOX:
+                return float(np.sqrt(x * x + y * y + z * z))
+            case _ if self.kind in (CYLINDER, CONE):
+                return float(np.hypot(x, y))
+            case _ if self.kind in (SPHERE, CAPSULE):
+                return x + y
+        return np.inf
+
+
+_of_shapes: WeakKeyDictionary[Shape, StandIn] = WeakKeyDictionary()
+
+
+def stand_in(part: PlacedGeometry) -> StandIn:
+    """Returns the stand-in of a geometry; that of a shape is made once."""
+    with _lock:
+        found = _of_shapes.get(part.source)
+        if found is None:
+            found = _of_shapes[part.source] = _make(part.source)
+        return found
+
+
+def _make(source: Shape) -> StandIn:
+    if isinstance(source, Octree):
+        points = np.tile(source.centers, 3)
+        return StandIn(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
+    if isinstance(source, Mesh):
+        vertices, faces = np.asarray(source.vertices, dtype=float), np.asarray(source.triangles, dtype=np.int64)
+        return StandIn(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
+    geometry = source.geometry
+    match geometry:
+        case coal.Box():
+            x, y, z = (float(value) for value in geometry.halfSide)
+            return StandIn(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
+        case coal.Sphere():
+            return StandIn(lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
+                           size=(float(geometry.radius), 0.0, 0.0))
+        case coal.Capsule():
+            radius, half = float(geometry.radius), float(geometry.halfLength)
+            return StandIn(lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
+                           kind=CAPSULE, size=(radius, half, 0.0))
+        case coal.Cylinder():
+            radius, half = float(geometry.radius), float(geometry.halfLength)
+            return StandIn(lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0))
+        case coal.Cone():
+            radius, half = float(geometry.radius), float(geometry.halfLength)
+            return StandIn(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
+        case coal.Plane() | coal.Halfspace():
+            normal = np.array(geometry.n, dtype=float)
+            kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
+            return StandIn(None, kind=kind, size=(float(normal[0]), float(normal[1]), float(normal[2])),
+                           offset=pin.SE3(np.eye(3), normal * float(geometry.d)))
+        case _:
+            return _bounding_box(geometry)
+
+
+def _bounding_box(geometry: Any) -> StandIn:
+    geometry.computeLocalAABB()
+    low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
+    x, y, z = (float(value) for value in 0.5 * (high - low))
+    middle = 0.5 * (low + high)
+    return StandIn(lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
+                   pin.SE3(np.eye(3), middle))
+
+
+def _surface(triangles: Array) -> Surfaces:
+    triangles = np.ascontiguousarray(triangles, dtype=float)
+    corners = triangles.reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    triangles = cut_long_edges(triangles, max(LONGEST_EDGE, LONGEST_SHARE * extent))
+    spheres, boxes, links = build_sphere_tree(triangles)
+    return Surfaces(spheres, boxes, links, triangles)
+
+
+def _is_closed(vertices: Array, faces: Any) -> bool:
+    """Whether every edge is passed as often in one direction as in the other: then the surface has an inside."""
+    order = np.lexsort(np.round(vertices, 7).T)
+    ranked = np.round(vertices[order], 7)
+    ranks = np.concatenate([[0], np.cumsum((np.diff(ranked, axis=0) != 0.0).any(axis=1))])
+    corners = np.empty(len(vertices), dtype=np.int64)
+    corners[order] = ranks
+    faces = corners[faces]
+    starts, ends = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    size = int(faces.max()) + 1
+    return bool(np.array_equal(np.sort(starts * size + ends), np.sort(ends * size + starts)))
+
+
+def _box_triangles(x: float, y: float, z: float) -> Array:
+    result = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+            face = np.insert(corners, axis, sign, axis=1) * (x, y, z)
+            result += [face[[0, 1, 2]], face[[0, 2, 3]]]
+    return np.array(result).reshape(-1, 9)
+
+
+def _prism_triangles(below: float, above: float, half: float) -> Array:
+    """A prism (or pyramid) around a cylinder (or cone) along z with the given radii at both ends."""
+    angles = np.arange(SIDES + 1) * 2.0 * np.pi / SIDES
+    rim = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / SIDES)
+    result = []
+    for here, there in zip(rim[:-1], rim[1:], strict=True):
+        a, b, c, d = ([*(point * radius), z] for z, radius in ((-half, below), (half, above))
+                      for point in (here, there))
+        result += [[a, b, [0, 0, -half]], [a, b, d], [a, d, c]]
+        if above > 0.0:
+            result.append([c, d, [0, 0, half]])
+    return np.array(result, dtype=float).reshape(-1, 9)
+
+
+def moved(triangles: Array, pose: Transform) -> Array:
+    """Returns triangles (m, 9) in the frame in which their own frame has the given pose."""
+    corners = triangles.reshape(-1, 3) @ pose.rotation.T + pose.translation
+    return np.ascontiguousarray(corners.reshape(-1, 9))
+
+
+def stacked(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:
+    """Returns surfaces in one set of arrays and the root node of each."""
+    nodes = np.cumsum([0, *(len(item.spheres) for item in surfaces)])
+    faces = np.cumsum([0, *(len(item.triangles) for item in surfaces)])
+    links = [np.where(item.links[:, :1] < 0, [[-1, 0]] + item.links * [[0, 1]] + [[0, face]], item.links + node)
+             for item, node, face in zip(surfaces, nodes, faces, strict=False)]
+    if not surfaces:
+        return Surfaces(np.zeros((0, 4)), np.zeros((0, 15)), np.zeros((0, 2), np.int32), np.zeros((0, 9))), []
+    return Surfaces(np.concatenate([item.spheres for item in surfaces]),
+                    np.concatenate([item.boxes for item in surfaces]),
+                    np.ascontiguousarray(np.concatenate(links), dtype=np.int32),
+                    np.concatenate([item.triangles for item in surfaces])), nodes[:-1].tolist()

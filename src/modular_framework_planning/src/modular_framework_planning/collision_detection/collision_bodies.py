@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lists the bodies that may bump into each other in a scene, and which pairs of them are watched."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_planning.geometry.shapes import Shape
+from modular_framework_planning.geometry.spatial import Transform
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+LINK, ATTACHED, WORLD = "robot_link", "robot_attached", "world_object"
+Joints = Sequence[int] | NDArray[np.int64] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What one collision geometry belongs to."""
+
+    name: str
+    kind: str
+    link: str = ""
+    touch_links: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedGeometry:
+    """A collision geometry of a body.
+
+    Attributes:
+        joint_id: Pinocchio's number of the joint it hangs on, 0 for the world.
+        placement: pose in that joint's frame.
+        source: the shape, which never changes.
+        margin: distance it keeps from bodies of the world [m].
+    """
+
+    body: Body
+    joint_id: int
+    placement: Transform
+    source: Shape
+    margin: float
+
+    @property
+    def geometry(self) -> Any:
+        """Coal's geometry, built when it is first asked for."""
+        return self.source.geometry
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedPair:
+    """Two geometries (by number) that may not come closer than `margin` [m]; `is_fixed` where no joint moves them."""
+
+    first: int
+    second: int
+    margin: float
+    is_fixed: bool
+
+
+def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
+    """Returns every collision geometry of a scene: links, held objects, then the world."""
+    model = scene.model
+    result = [PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape,
+                             float(margin))
+              for item, margin in zip(model.link_geometries, scene.link_margins(), strict=True)]
+    for held in scene.attached.values():
+        frame = model.pin_model.frames[model.frame_ids[held.link]]
+        body = Body(held.name, ATTACHED, held.link, held.touch_links)
+        for shape, pose in held.body.shapes:
+            placement = frame.placement * held.body.pose * pose
+            result.append(PlacedGeometry(body, frame.parentJoint, placement, shape,
+                                         scene.held_margin()))
+    for thing in scene.obstacles():
+        for shape, pose in thing.shapes:
+            result.append(PlacedGeometry(Body(thing.name, WORLD), 0, thing.pose * pose, shape, 0.0))
+    return result
+
+
+def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving: Joints) -> list[WatchedPair]:
+    """Returns the pairs that may not touch.
+
+    Args:
+        scene: whose allowed collisions count.
+        parts: geometries of the scene.
+        moving: joints that will move, as places in a position vector; all by default.
+    """
+    supports = _supports(scene.model, moving)
+    verdicts: dict[tuple[str, str, str, str], bool] = {}
+    result = []
+    for first, one in enumerate(parts):
+        if one.body.kind == WORLD:
+            break  # the world comes last and cannot move against itself
+        for second in range(first + 1, len(parts)):
+            other = parts[second]
+            if one.joint_id == other.joint_id and ATTACHED not in (one.body.kind, other.body.kind):
+                continue  # rigid to each other: touching says nothing about a motion
+            key = (one.body.kind, one.body.name, other.body.kind, other.body.name)
+            allowed = verdicts.get(key)
+            if allowed is None:
+                allowed = verdicts[key] = _may_touch(scene, one.body, other.body)
+            if not allowed:
+                result.append(WatchedPair(first, second, one.margin if other.body.kind == WORLD else 0.0,
+                                          supports[one.joint_id] == supports[other.joint_id]))
+    return result
+
+
+def _may_touch(scene: PlanningScene, first: Body, second: Body) -> bool:
+    if first.name == second.name and first.kind == second.kind:
+        return True
+    for held, other in ((first, second), (second, first)) if ATTACHED in (first.kind, second.kind) else ():
+        if held.kind == ATTACHED and other.kind == LINK and (
+                other.name == held.link or other.name in held.touch_links):
+            return True
+    return scene.acm.allows(first.name, second.name)
+
+
+def _supports(model: RobotModel, moving: Joints) -> list[frozenset[int]]:
+    """Returns, for each joint of the tree, which of the moving joints it depends on (mimics included)."""
+    chosen = set(range(len(model.joint_names))) if moving is None else {int(number) for number in moving}
+    chosen |= {follower for follower, leader, _, _ in model.mimics if leader in chosen}
+    return [frozenset(int(joint) - 1 for joint in chain if joint > 0) & chosen for chain in model.pin_model.supports]

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Answers "does this state or this motion collide?": compiled bounds first, Coal's exact check of what they leave open.
+
+A state is called free only where every pair of bodies was proved apart, or where Coal says so.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_planning.collision_detection.collision_bodies import (
+    ATTACHED,
+    LINK,
+    WORLD,
+    Body,
+    Joints,
+    PlacedGeometry,
+    WatchedPair,
+    placed_geometries,
+    watched_pairs,
+)
+from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
+from modular_framework_planning.collision_detection.exact_collision import Contact, ExactCollision
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
+from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
+from modular_framework_planning.collision_detection.kernels.compiled_paths import (
+    MOST_UNDECIDED,
+    check_polyline,
+    sample_at,
+)
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+__all__ = ["ATTACHED", "LINK", "WORLD", "Body", "CollisionChecker", "Contact"]
+DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may look through numerical noise
+EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can tell about
+
+
+class CollisionChecker:
+    """Checks states and paths of the robot in one snapshot of the scene.
+
+    Not for use from two threads at a time: it holds the working memory of the check. Pairs whose relative pose the
+    given joints cannot change are looked at once, in `fixed_contacts`.
+    """
+
+    def __init__(self, scene: PlanningScene, moving: Joints = None, tolerated: Sequence[Contact] = ()) -> None:
+        """Builds the checker.
+
+        Args:
+            scene: the snapshot to check in.
+            moving: joints that will move, as places in a position vector; all by default.
+            tolerated: contacts of held bodies that may stay but not deepen.
+        """
+        self.scene = scene
+        self.model: RobotModel = scene.model
+        self._parts: list[PlacedGeometry] = placed_geometries(scene)
+        self._pairs: list[WatchedPair] = watched_pairs(scene, self._parts, moving)
+        depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
+        self._tolerated: dict[int, float] = {}
+        self._moving: list[int] = []
+        for number, pair in enumerate(self._pairs):
+            depth = depths.get(frozenset((self._parts[pair.first].body.name, self._parts[pair.second].body.name)))
+            if not pair.is_fixed and depth is not None:
+                self._tolerated[number] = depth
+            elif not pair.is_fixed:
+                self._moving.append(number)
+        self._undecided = np.empty((MOST_UNDECIDED, 2), dtype=np.int64)
+
+    @cached_property
+    def _exact(self) -> ExactCollision:
+        return ExactCollision(self.model, self._parts, self._pairs)
+
+    @cached_property
+    def _compiled(self) -> CompiledWorld:
+        return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
+
+    def build(self, go_on: Callable[[], None]) -> None:
+        """Builds now what the first question would build: seconds for 100,000 triangles.
+
+        Args:
+            go_on: called between shapes; raises an exception to end the work. What was built is kept.
+        """
+        self._compiled = compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving], go_on)
+
+    @property
+    def world(self) -> World:
+        """The compiled stand-ins of all bodies, and the pairs the moving joints can bring together."""
+        return self._compiled.world
+
+    @property
+    def bodies(self) -> list[Body]:
+        """The body of each collision geometry: links, held objects, the world."""
+        return [part.body for part in self._parts]
+
+    def is_free(self, positions: Array) -> bool:
+        """Whether no pair that can move touches at these positions (of the whole robot)."""
+        return self.path_is_free(np.asarray(positions, dtype=float)[None, :], 1.0)
+
+    def path_is_free(self, vertices: Array, step: float, first: int = 0) -> bool:
+        """Whether the straight pieces between states are free at samples at most `step` apart in every joint.
+
+        Args:
+            vertices: positions of the whole robot, shape (n, joints) [rad or m].
+            step: distance of the samples [rad or m].
+            first: number of the first sample that has to be free: 1 leaves the first vertex out.
+        """
+        return self._colliding_sample(np.ascontiguousarray(vertices, dtype=float), step, first)[0] < 0
+
+    def colliding_state(self, vertices: Array, step: float) -> Array | None:
+        """Returns a colliding sample along straight pieces, as path_is_free looks at them, or None."""
+        path = np.ascontiguousarray(vertices, dtype=float)
+        number, numbers = self._colliding_sample(path, step, 0)
+        return sample_at(path, numbers, number) if number >= 0 else None
+
+    def _colliding_sample(self, path: Array, step: float, first: int) -> tuple[int, NDArray[np.int64]]:
+        """Returns the number of a colliding sample or -1, and the numbers of the samples at the vertices."""
+        status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
+        if status == TOUCHING:
+            return count, numbers
+        end = int(numbers[-1])
+        if status != CLEAR:
+            number = self._decide(path, numbers, range(first, end + 1), count)
+            if number >= 0:
+                return number, numbers
+        if self._tolerated or self._compiled.uncompiled:
+            for number in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
+                if not self._rest_is_free(sample_at(path, numbers, number)):
+                    return number, numbers
+        return -1, numbers
+
+    def _decide(self, path: Array, numbers: NDArray[np.int64], samples: range, count: int) -> int:
+        """Asks the exact check what the bounds left open; returns the number of a sample that touches, or -1."""
+        if count > MOST_UNDECIDED:
+            return next((number for number in samples
+                         if self._exact.touches(sample_at(path, numbers, number), self._moving)), -1)
+        members = self._compiled.members
+        return next((number for number, pair in self._undecided[:count].tolist()
+                     if self._exact.touches(sample_at(path, numbers, number),
+                                            (self._moving[member] for member in members[pair]))), -1)
+
+    def _rest_is_free(self, positions: Array) -> bool:
+        """Whether tolerated contacts stay shallow and pairs without bounds apart."""
+        if self._exact.touches(positions, (self._moving[number] for number in self._compiled.uncompiled)):
+            return False
+        return all(contact.depth <= self._tolerated[number] + DEPTH_SLACK
+                   for number, contact in self._exact.contacts(positions, self._tolerated))
+
+    def contacts(self, positions: Array, include_fixed: bool = True) -> list[Contact]:
+        """Returns every pair that touches, the deepest contact of each, deepest pair first.
+
+        A body wholly inside another one, touching none of its surface, is told only where no other pair touches.
+        """
+        numbers = [number for number, pair in enumerate(self._pairs) if include_fixed or not pair.is_fixed]
+        found = [contact for number, contact in self._exact.contacts(positions, numbers)
+                 if number not in self._tolerated or contact.depth > self._tolerated[number] + DEPTH_SLACK]
+        return sorted(found or self._surrounded(positions), key=lambda item: -item.depth)
+
+    def _surrounded(self, positions: Array) -> list[Contact]:
+        number = surrounded_pair_at(np.asarray(positions, dtype=float), *self._compiled.arguments)
+        if number < 0:
+            return []
+        inner = self._moving[self._compiled.members[number][0]]
+        pair = self._pairs[inner]
+        first, second = self._parts[pair.first], self._parts[pair.second]
+        depth = self._exact.distance(positions, [inner])
+        place = self._exact.position(positions, pair.second)
+        return [Contact(first.body, second.body, depth, place, np.zeros(3))]
+
+    def fixed_contacts(self, positions: Array) -> list[Contact]:
+        """Returns contacts of watched pairs the moving joints cannot change."""
+        numbers = [number for number, pair in enumerate(self._pairs) if pair.is_fixed]
+        return [contact for _, contact in self._exact.contacts(positions, numbers)]
+
+    def distance(self, positions: Array) -> float:
+        """Returns the smallest distance [m] between bodies that may not touch; 0 or less when they do."""
+        return self._exact.distance(positions, range(len(self._pairs)))

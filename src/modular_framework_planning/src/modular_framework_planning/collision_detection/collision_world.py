@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Puts the bodies of a scene and the pairs to watch into the arrays that compiled collision checks work on."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_planning.collision_detection.bounding_geometry import StandIn, moved, stacked, stand_in
+from modular_framework_planning.collision_detection.collision_bodies import (
+    LINK,
+    WORLD,
+    Body,
+    PlacedGeometry,
+    WatchedPair,
+)
+from modular_framework_planning.collision_detection.kernels.compiled_collision import (
+    CELLS,
+    UNKNOWN,
+    Surfaces,
+    World,
+    arguments,
+)
+from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.kinematics.chain_model import tree_of
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+KEPT_MODELS, KEPT_GROUPINGS, KEPT_SCENES = 4, 16, 2
+Grouping = tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompiledWorld:
+    """The arrays of a scene.
+
+    Attributes:
+        arguments: the world as compiled functions take it.
+        members: for every pair of the arrays, the watched pairs (by number) it stands for.
+        uncompiled: watched pairs that have no stand-in and need the exact check at every state.
+    """
+
+    world: World
+    arguments: tuple[NDArray[Any], ...]
+    members: tuple[tuple[int, ...], ...]
+    uncompiled: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Member:
+    """One body of the arrays: the stand-in, where it hangs, and where its surface begins."""
+
+    shape: StandIn
+    joint: int
+    pose: Array
+    root: int
+    scenic: bool
+    sphere: Array
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
+    """Stand-ins of all link geometries; surfaces without a closed form are moved into their joints' frames."""
+    result = []
+    for item in model.link_geometries:
+        part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.shape, 0.0)
+        shape = stand_in(part)
+        if shape.kind == SURFACE and shape.corners is not None:
+            shape = StandIn(partial(moved, shape.corners(), item.placement * shape.offset), is_closed=shape.is_closed)
+        result.append(shape)
+    return tuple(result)
+
+
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple[int, ...]]:
+    """Surfaces of groups of links that share a joint, and the root of each group."""
+    shapes = _link_stand_ins(model)
+    flat = [shapes[number].surface for group in groups for number in group]
+    surfaces, roots = stacked([item for item in flat if item is not None])
+    spheres, boxes, links = list(surfaces.spheres), list(surfaces.boxes), list(surfaces.links)
+    result, place = [], 0
+    for group in groups:
+        result.append(_joined(spheres, boxes, links, roots[place:place + len(group)]))
+        place += len(group)
+    return Surfaces(np.array(spheres).reshape(-1, 4), np.array(boxes).reshape(-1, 15),
+                    np.array(links, dtype=np.int32).reshape(-1, 2), surfaces.triangles), tuple(result)
+
+
+def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots: Sequence[int]) -> int:
+    """Appends nodes above some roots; returns the topmost."""
+    if len(roots) == 1:
+        return roots[0]
+    centres = np.array([spheres[root][:3] for root in roots])
+    order = [roots[number] for number in np.argsort(centres[:, np.argmax(np.ptp(centres, axis=0))])]
+    low, high = (_joined(spheres, boxes, links, part) for part in (order[:len(order) // 2], order[len(order) // 2:]))
+    one, two = spheres[low], spheres[high]
+    gap = float(np.linalg.norm(two[:3] - one[:3]))
+    radius = max(one[3], two[3], 0.5 * (gap + one[3] + two[3]))
+    share = 0.5 if gap < 1e-12 else min(max((radius - one[3]) / gap, 0.0), 1.0)
+    centre = one[:3] + share * (two[:3] - one[:3])
+    reach = max(float(np.linalg.norm(item[:3] - centre)) + item[3] for item in (one, two))
+    spheres.append(np.array([*centre, reach]))
+    boxes.append(np.array([*centre, *np.eye(3).ravel(), reach, reach, reach]))
+    links.append(np.array([low, high]))
+    return len(spheres) - 1
+
+
+def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> Grouping:
+    """Puts links together that hang on one joint, have surfaces and watch the same bodies at the same distance."""
+    partners: dict[int, set[tuple[int, float]]] = {}
+    for pair in pairs:
+        partners.setdefault(pair.first, set()).add((pair.second, pair.margin))
+        partners.setdefault(pair.second, set()).add((pair.first, pair.margin))
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for number, shape in enumerate(_link_stand_ins(model)):
+        if shape.kind == SURFACE and shape.corners is not None and number in partners:
+            groups.setdefault((parts[number].joint_id, frozenset(partners[number])), []).append(number)
+    return tuple(tuple(group) for group in groups.values())
+
+
+def _go_on() -> None:
+    """Lets a world be built however long that takes."""
+
+
+def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
+                  go_on: Callable[[], None] = _go_on) -> CompiledWorld:
+    """Builds the arrays. What was built for a shape is kept as long as the shape.
+
+    Args:
+        model: the robot.
+        parts: geometries of the scene, the model's links first.
+        pairs: the pairs to watch; those that no joint moves should not be among them.
+        go_on: called between shapes; raises an exception to end the work.
+    """
+    groups = _groups(model, parts, pairs)
+    robot, roots = _link_surfaces(model, groups)
+    members, place = _link_members(model, parts, groups, robot, roots)
+    scene = _add_others(model, parts, pairs, members, place, go_on)
+    found: dict[tuple[int, int, float], list[int]] = {}
+    uncompiled = []
+    orders: dict[tuple[int, int], tuple[int, int] | None] = {}
+    for number, pair in enumerate(pairs):
+        both = place[pair.first], place[pair.second]
+        if both not in orders:
+            orders[both] = _ordered(members, *both)
+        ordered = orders[both]
+        if ordered is None:
+            uncompiled.append(number)
+        else:
+            found.setdefault((*ordered, pair.margin), []).append(number)
+    world = _arrays(model, members, robot, scene, list(found))
+    scenic: list[bool] = np.any(world.scenic[world.pairs], axis=1).tolist()
+    keys = tuple(None if scenic[number] else _table_key(world, number) for number in range(len(found)))
+    chosen = tuple(key for key in keys if key is not None)
+    tables, joints = _tables(model, groups, chosen)
+    numbers = iter(range(len(chosen)))
+    world = world._replace(tables=tables, table_joints=joints, table_of=np.array(
+        [-1 if key is None else next(numbers) for key in keys], dtype=np.int64))
+    return CompiledWorld(world, arguments(world), tuple(tuple(item) for item in found.values()), tuple(uncompiled))
+
+
+def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Grouping, robot: Surfaces,
+                  roots: Sequence[int]) -> tuple[list[_Member], dict[int, int]]:
+    members, place = [], {}
+    for group, root in zip(groups, roots, strict=True):
+        shapes = [_link_stand_ins(model)[number] for number in group]
+        closed = all(shape.is_closed for shape in shapes)
+        shape = StandIn(None, is_closed=closed)
+        members.append(_Member(shape, parts[group[0]].joint_id - 1, np.eye(4)[:3], root, False, robot.spheres[root]))
+        place.update(dict.fromkeys(group, len(members) - 1))
+    return members, place
+
+
+def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
+                members: list[_Member], place: dict[int, int], go_on: Callable[[], None]) -> Surfaces:
+    """Appends links in closed form, held objects and the world; returns the surfaces they need."""
+    links = _link_stand_ins(model)
+    watched = {number for pair in pairs for number in (pair.first, pair.second)}
+    others = [number for number in sorted(watched) if number not in place]
+    shapes = []
+    for number in others:
+        shapes.append(links[number] if number < len(links) else stand_in(parts[number]))
+        go_on()
+    wanted = _with_surface(dict(zip(others, shapes, strict=True)), parts, pairs)
+    found = []
+    for number, shape in zip(others, shapes, strict=True):
+        if number in wanted and shape.surface is not None:
+            found.append(shape)
+            go_on()
+    surfaces, roots = _scene_surfaces(tuple(found))
+    remaining = iter(roots)
+    for number, shape in zip(others, shapes, strict=True):
+        root = next(remaining) if number in wanted and shape.corners is not None else -1
+        sphere = np.array([0.0, 0.0, 0.0, shape.radius]) if root < 0 else (
+            surfaces.spheres[root] + [0, 0, 0, shape.swell])
+        pose = (parts[number].placement * shape.offset).homogeneous[:3]
+        place[number] = len(members)
+        members.append(_Member(shape, parts[number].joint_id - 1, pose, root, True, sphere))
+    return surfaces
+
+
+@lru_cache(maxsize=KEPT_SCENES)
+def _scene_surfaces(shapes: tuple[StandIn, ...]) -> tuple[Surfaces, tuple[int, ...]]:
+    """Surfaces of a scene in one set of arrays; the next plan mostly has the same ones."""
+    together, roots = stacked([shape.surface for shape in shapes if shape.surface is not None])
+    return together, tuple(roots)
+
+
+def _with_surface(shapes: Mapping[int, StandIn], parts: Sequence[PlacedGeometry],
+                  pairs: Sequence[WatchedPair]) -> set[int]:
+    """Returns which bodies are checked by their surface.
+
+    A solid of the world against a body whose surface is its own is checked in closed form. Its triangles would not be
+    looked at, and to build a tree over them takes longer than many plans.
+    """
+    plain = {number for number, shape in shapes.items()
+             if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_is_exact}
+    inexact = {number for number, shape in shapes.items() if not shape.surface_is_exact}
+    needed = {number for pair in pairs for number, other in ((pair.first, pair.second), (pair.second, pair.first))
+              if number in plain and (other in inexact or other in plain)}
+    return set(shapes) - (plain - needed)
+
+
+def _is_exact(members: Sequence[_Member], first: int, second: int) -> bool:
+    other = members[second].shape
+    return members[first].shape.surface_is_exact and (
+        other.surface_is_exact if other.kind == SURFACE else other.solid_is_exact)
+
+
+def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, int] | None:
+    """Returns the two bodies such that the first one has a surface, the second a closed form if possible."""
+    choices = [(one, two) for one, two in ((first, second), (second, first))
+               if members[one].root >= 0 and (members[two].root >= 0 or members[two].shape.kind != SURFACE)]
+    return max(choices, default=None, key=lambda item: (
+        _is_exact(members, *item), members[item[1]].shape.kind != SURFACE))
+
+
+def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
+    """Returns roots and joints (one or two) of a pair of links, where one hangs on the other, or None."""
+    first, second = (int(number) for number in world.pairs[pair])
+    if world.joints[first] > world.joints[second]:
+        first, second = second, first
+    if world.margins[pair] > 0.0:
+        return None
+    between: list[int] = []
+    joint = int(world.joints[second])
+    while joint > world.joints[first] and len(between) < 3:
+        between.append(joint)
+        joint = int(world.tree.parents[joint])
+    if joint != world.joints[first] or not 1 <= len(between) <= 2 or world.tree.prismatic[between].any():
+        return None
+    return int(world.roots[first]), int(world.roots[second]), *between[::-1]
+
+
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _tables(model: RobotModel, groups: Grouping,
+            keys: tuple[tuple[int, ...], ...]) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    """Tables (all unknown at first) of pairs of links, kept as long as the robot: they hold in every scene."""
+    joints = np.array([(*key[2:], -1)[:2] for key in keys], dtype=np.int64).reshape(-1, 2)
+    return np.full((len(keys), CELLS, CELLS), UNKNOWN, dtype=np.int8), joints
+
+
+def _arrays(model: RobotModel, members: Sequence[_Member], robot: Surfaces, scene: Surfaces,
+            pairs: Sequence[tuple[int, int, float]]) -> World:
+    swell = [members[one].shape.swell + (members[two].shape.swell if members[two].shape.kind == SURFACE else 0.0)
+             for one, two, _ in pairs]
+    return World(
+        tree=tree_of(model),
+        joints=np.array([item.joint for item in members], dtype=np.int64),
+        poses=np.array([item.pose for item in members], dtype=float).reshape(-1, 3, 4),
+        roots=np.array([item.root for item in members], dtype=np.int64),
+        scenic=np.array([item.scenic for item in members], dtype=bool),
+        kinds=np.array([item.shape.kind for item in members], dtype=np.int64),
+        sizes=np.array([item.shape.size for item in members], dtype=float).reshape(-1, 3),
+        spheres=np.array([item.sphere for item in members], dtype=float).reshape(-1, 4),
+        closed=np.array([item.shape.is_closed for item in members], dtype=bool),
+        robot=robot, scene=scene,
+        pairs=np.array([item[:2] for item in pairs], dtype=np.int64).reshape(-1, 2),
+        margins=np.array([item[2] for item in pairs], dtype=float) + np.array(swell, dtype=float),
+        exact=np.array([_is_exact(members, one, two) for one, two, _ in pairs], dtype=bool),
+        tables=np.zeros((0, CELLS, CELLS), dtype=np.int8), table_joints=np.zeros((0, 2), dtype=np.int64),
+        table_of=np.full(len(pairs), -1, dtype=np.int64))

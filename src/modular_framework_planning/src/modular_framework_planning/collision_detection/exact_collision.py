@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Asks Coal whether single pairs of bodies touch, and how deep: exact geometry, one pair at a time."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_planning.collision_detection.collision_bodies import (
+    ATTACHED,
+    LINK,
+    Body,
+    PlacedGeometry,
+    WatchedPair,
+)
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+ROUNDING = 1.0e-9  # [m]
+MOST_CONTACTS = 20  # of a pair, among which the deepest is told
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Two bodies that touch; position [m] and normal (from first to second) in the planning frame, depth [m].
+
+    Where a distance has to be kept, touching means being closer, and the depth is what is missing.
+    """
+
+    first: Body
+    second: Body
+    depth: float
+    position: Array
+    normal: Array
+
+    def describe(self) -> str:
+        """Says which body touches which and how deep."""
+        return f"{_label(self.first)} touches {_label(self.second)}, {self.depth * 1000.0:.1f} mm deep"
+
+
+def _label(body: Body) -> str:
+    if body.kind == LINK:
+        return f"link '{body.name}'"
+    return f"object '{body.name}'" + (f" held by '{body.link}'" if body.kind == ATTACHED else "")
+
+
+class ExactCollision:
+    """Coal's verdicts on the watched pairs; not for two threads at a time: it holds the poses of one state."""
+
+    def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> None:
+        """Args: the robot, the geometries of a scene, the pairs (told by their numbers from now on)."""
+        self._model, self._parts, self._pairs = model, parts, pairs
+        self._data = model.pin_model.createData()
+        self._poses: dict[int, Any] = {}
+        self._balls: dict[int, tuple[Array, float]] = {}
+        self._at: Array | None = None
+
+    def _place(self, positions: Array) -> None:
+        if self._at is None or not np.array_equal(positions, self._at):
+            pin.forwardKinematics(self._model.pin_model, self._data, positions)
+            self._poses.clear()
+            self._balls.clear()
+            self._at = np.array(positions)
+
+    def _pose(self, number: int) -> Any:
+        if number not in self._poses:
+            part = self._parts[number]
+            self._poses[number] = _coal_transform(self._data.oMi[part.joint_id] * part.placement)
+        return self._poses[number]
+
+    def _is_far(self, number: int) -> bool:
+        """Whether balls around both bodies are apart: then Coal need not build or ask anything."""
+        pair = self._pairs[number]
+        (one, radius), (other, reach) = (self._ball(which) for which in (pair.first, pair.second))
+        return float(np.linalg.norm(one - other)) > radius + reach + pair.margin + ROUNDING
+
+    def _ball(self, which: int) -> tuple[Array, float]:
+        if which not in self._balls:
+            part = self._parts[which]
+            centre, radius = part.source.bounding_sphere
+            self._balls[which] = (self._data.oMi[part.joint_id] * part.placement).act(centre), radius
+        return self._balls[which]
+
+    def _collide(self, number: int, request: Any) -> Any:
+        pair = self._pairs[number]
+        request.security_margin = pair.margin
+        result = coal.CollisionResult()
+        coal.collide(self._parts[pair.first].geometry, self._pose(pair.first),
+                     self._parts[pair.second].geometry, self._pose(pair.second), request, result)
+        return result
+
+    def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
+        """Whether any of the pairs touches at these positions (of the whole robot)."""
+        self._place(positions)
+        return any(not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
+                   for number in numbers)
+
+    def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
+        """Returns those of the pairs that touch, each with its deepest contact."""
+        self._place(positions)
+        found = []
+        for number in numbers:
+            if self._is_far(number):
+                continue
+            if self._collide(number, coal.CollisionRequest()).isCollision():  # without contacts: much faster
+                result = self._collide(number, coal.CollisionRequest(coal.CONTACT, MOST_CONTACTS))
+                found.append((number, self._contact(number, result)))
+        return found
+
+    def _contact(self, number: int, result: Any) -> Contact:
+        pair = self._pairs[number]
+        deepest = max((result.getContact(i) for i in range(result.numContacts())),
+                      key=lambda item: self._depth(pair, item))
+        return Contact(self._parts[pair.first].body, self._parts[pair.second].body, self._depth(pair, deepest),
+                       np.array(deepest.pos), np.array(deepest.normal))
+
+    @staticmethod
+    def _depth(pair: WatchedPair, contact: Any) -> float:
+        distance = float(contact.penetration_depth)  # below 0 where the bodies overlap
+        return pair.margin - distance if pair.margin > 0.0 else abs(distance)
+
+    def position(self, positions: Array, number: int) -> Array:
+        """Returns where a geometry's own frame has its origin in the planning frame [m]."""
+        self._place(positions)
+        return np.array(self._pose(number).getTranslation())
+
+    def distance(self, positions: Array, numbers: Iterable[int]) -> float:
+        """Returns the smallest distance [m] of the pairs, 0 or less where they touch."""
+        self._place(positions)
+        return min((coal.distance(self._parts[pair.first].geometry, self._pose(pair.first),
+                                  self._parts[pair.second].geometry, self._pose(pair.second),
+                                  coal.DistanceRequest(), coal.DistanceResult())
+                    for pair in (self._pairs[number] for number in numbers)), default=np.inf)
+
+
+def _coal_transform(transform: Transform) -> Any:
+    return coal.Transform3s(transform.rotation, transform.translation)

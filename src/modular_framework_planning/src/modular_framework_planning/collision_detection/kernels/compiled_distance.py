@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bounds the distance between two bodies, compiled: fast where they are far apart, exact to 0.1 mm where they are not.
+
+A body is a tree of spheres over its triangles, or a solid whose distance to a point is known in closed form. Every
+answer is a lower bound of the true distance; an answer of 0 says whether a common point was found or the bodies are
+merely too close to tell.
+"""
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import (
+    halve_longest_edge,
+    triangle_distance,
+)
+
+SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # what a body's closed form is
+CLEAR, TOUCHING, TOO_CLOSE = range(3)
+
+SMALLEST_PIECE = 1.0e-4  # [m]; triangles are cut down to this radius before a pair is called too close to tell
+ROUNDING = 1.0e-6  # [m]; what the exact checker and floating point may differ by
+HOPELESS_SHARE = 0.3
+ACCEPTED_SHARE = 0.5  # a sphere of at most this share of its distance is not looked into
+MOST_PIECES = 4000
+MOST_PAIRS = 50_000  # of nodes looked at for one cell of a table
+STACK = 512
+
+
+@njit(cache=True, nogil=True)
+def solid_distance(kind, p0, p1, p2, x, y, z):  # type: ignore[no-untyped-def]
+    """Returns the distance [m] of a point from a solid in the solid's frame, below 0 inside it (never too large)."""
+    if kind == BOX:
+        dx, dy, dz = abs(x) - p0, abs(y) - p1, abs(z) - p2
+        inside = min(max(dx, max(dy, dz)), 0.0)
+        dx, dy, dz = max(dx, 0.0), max(dy, 0.0), max(dz, 0.0)
+        return inside + np.sqrt(dx * dx + dy * dy + dz * dz)
+    if kind == CYLINDER:
+        dr, dz = np.sqrt(x * x + y * y) - p0, abs(z) - p1
+        inside = min(max(dr, dz), 0.0)
+        dr, dz = max(dr, 0.0), max(dz, 0.0)
+        return inside + np.sqrt(dr * dr + dz * dz)
+    if kind == SPHERE:
+        return np.sqrt(x * x + y * y + z * z) - p0
+    if kind == CAPSULE:
+        dz = max(abs(z) - p1, 0.0)
+        return np.sqrt(x * x + y * y + dz * dz) - p0
+    if kind == CONE:
+        return _cone_distance(p0, p1, np.sqrt(x * x + y * y), z)
+    height = p0 * x + p1 * y + p2 * z
+    return abs(height) if kind == PLANE else height
+
+
+@njit(cache=True, nogil=True)
+def _cone_distance(radius, half, r, z):  # type: ignore[no-untyped-def]
+    """Distance in the half plane (r, z) from the triangle (0, -half), (radius, -half), (0, half)."""
+    slant = np.sqrt(radius * radius + 4.0 * half * half)
+    above_side = (2.0 * half * r + radius * (z - half)) / slant
+    below_base = -half - z
+    if above_side <= 0.0 and below_base <= 0.0:
+        return max(above_side, below_base)
+    share = (radius * (radius - r) + 2.0 * half * (z + half)) / (slant * slant)
+    share = min(max(share, 0.0), 1.0)
+    side_r, side_z = radius * (1.0 - share), -half + 2.0 * half * share
+    side = np.sqrt((r - side_r) ** 2 + (z - side_z) ** 2)
+    base_r = max(r - radius, 0.0)
+    base = np.sqrt(base_r * base_r + below_base * below_base)
+    return min(side, base)
+
+
+@njit(cache=True, nogil=True)
+def _gap(low, high, half):  # type: ignore[no-untyped-def]
+    return max(max(low - half, -half - high), 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _span_bound(kind, p0, p1, p2, t):  # type: ignore[no-untyped-def]
+    """Lower bound of a triangle's distance from a box or cylinder by the triangle's extent along the axes."""
+    gz = _gap(min(t[2], t[5], t[8]), max(t[2], t[5], t[8]), p2 if kind == BOX else p1)
+    gx = _gap(min(t[0], t[3], t[6]), max(t[0], t[3], t[6]), p0)
+    gy = _gap(min(t[1], t[4], t[7]), max(t[1], t[4], t[7]), p1 if kind == BOX else p0)
+    if kind == CYLINDER:  # its round side lies within the box of its extent, of which only one axis may count
+        return np.sqrt(max(gx, gy) ** 2 + gz * gz)
+    return np.sqrt(gx * gx + gy * gy + gz * gz)
+
+
+@njit(cache=True, nogil=True)
+def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type: ignore[no-untyped-def]
+    """Returns (status, lower bound capped at `limit`) of one triangle against a solid, cutting the triangle up."""
+    pieces = np.empty((64, 9))
+    for corner in range(3):
+        for row in range(3):
+            pieces[0, 3 * corner + row] = (
+                pose[row, 0] * triangle[3 * corner] + pose[row, 1] * triangle[3 * corner + 1]
+                + pose[row, 2] * triangle[3 * corner + 2] + pose[row, 3])
+    depth, work, status = 1, 0, CLEAR
+    while depth > 0:
+        depth -= 1
+        work += 1
+        t = pieces[depth]
+        if kind in (BOX, CYLINDER) and _span_bound(kind, p0, p1, p2, t) - margin >= limit:
+            continue
+        cx, cy, cz = (t[0] + t[3] + t[6]) / 3.0, (t[1] + t[4] + t[7]) / 3.0, (t[2] + t[5] + t[8]) / 3.0
+        radius = 0.0
+        for corner in range(3):
+            radius = max(radius, (t[3 * corner] - cx) ** 2 + (t[3 * corner + 1] - cy) ** 2
+                         + (t[3 * corner + 2] - cz) ** 2)
+        radius = np.sqrt(radius)
+        centre = solid_distance(kind, p0, p1, p2, cx, cy, cz) - margin
+        if centre - radius >= limit:
+            continue
+        if centre < -ROUNDING:
+            return TOUCHING, 0.0
+        if radius <= ACCEPTED_SHARE * centre or radius <= SMALLEST_PIECE < centre - ROUNDING:
+            limit = centre - radius
+            continue
+        if radius <= SMALLEST_PIECE or work > MOST_PIECES or depth > 60:
+            return TOO_CLOSE, 0.0
+        halve_longest_edge(pieces, depth, 0.0)
+        depth += 2
+    return status, limit
+
+
+@njit(cache=True, nogil=True)
+def _box_to_solid(box, pose, kind, p0, p1, p2):  # type: ignore[no-untyped-def]
+    """Lower bound of the distance of a tree's box from a solid, along the faces' normals of the boxes around both."""
+    if kind in (PLANE, HALF_SPACE):
+        return -np.inf
+    hx = p0
+    hy = p1 if kind == BOX else p0
+    hz = p2 if kind == BOX else (p0 if kind == SPHERE else (p0 + p1 if kind == CAPSULE else p1))
+    cx = pose[0, 0] * box[0] + pose[0, 1] * box[1] + pose[0, 2] * box[2] + pose[0, 3]
+    cy = pose[1, 0] * box[0] + pose[1, 1] * box[1] + pose[1, 2] * box[2] + pose[1, 3]
+    cz = pose[2, 0] * box[0] + pose[2, 1] * box[1] + pose[2, 2] * box[2] + pose[2, 3]
+    best, ex, ey, ez = -np.inf, hx, hy, hz
+    for axis in range(3):
+        a, b, c = box[3 + 3 * axis], box[4 + 3 * axis], box[5 + 3 * axis]
+        ax = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
+        ay = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
+        az = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
+        half = box[12 + axis]
+        best = max(best, abs(cx * ax + cy * ay + cz * az) - half - abs(hx * ax) - abs(hy * ay) - abs(hz * az))
+        ex, ey, ez = ex + half * abs(ax), ey + half * abs(ay), ez + half * abs(az)
+    gx, gy, gz = max(abs(cx) - ex, 0.0), max(abs(cy) - ey, 0.0), max(abs(cz) - ez, 0.0)
+    return max(best, np.sqrt(gx * gx + gy * gy + gz * gz))
+
+
+@njit(cache=True, nogil=True)
+def _box_to_box(box, other, pose):  # type: ignore[no-untyped-def]
+    """Lower bound of the distance of two trees' boxes along their faces' normals."""
+    dx = pose[0, 0] * box[0] + pose[0, 1] * box[1] + pose[0, 2] * box[2] + pose[0, 3] - other[0]
+    dy = pose[1, 0] * box[0] + pose[1, 1] * box[1] + pose[1, 2] * box[2] + pose[1, 3] - other[1]
+    dz = pose[2, 0] * box[0] + pose[2, 1] * box[1] + pose[2, 2] * box[2] + pose[2, 3] - other[2]
+    best = 0.0
+    e0, e1, e2 = other[12], other[13], other[14]
+    for axis in range(3):
+        a, b, c = box[3 + 3 * axis], box[4 + 3 * axis], box[5 + 3 * axis]
+        ax = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
+        ay = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
+        az = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
+        c0 = abs(ax * other[3] + ay * other[4] + az * other[5])
+        c1 = abs(ax * other[6] + ay * other[7] + az * other[8])
+        c2 = abs(ax * other[9] + ay * other[10] + az * other[11])
+        half = box[12 + axis]
+        best = max(best, abs(dx * ax + dy * ay + dz * az) - half - c0 * other[12] - c1 * other[13] - c2 * other[14])
+        e0, e1, e2 = e0 + half * c0, e1 + half * c1, e2 + half * c2
+    g0 = max(abs(dx * other[3] + dy * other[4] + dz * other[5]) - e0, 0.0)
+    g1 = max(abs(dx * other[6] + dy * other[7] + dz * other[8]) - e1, 0.0)
+    g2 = max(abs(dx * other[9] + dy * other[10] + dz * other[11]) - e2, 0.0)
+    return max(best, np.sqrt(g0 * g0 + g1 * g1 + g2 * g2))
+
+
+@njit(cache=True, nogil=True)
+def surface_to_solid(spheres, boxes, links, triangles, root, pose,  # type: ignore[no-untyped-def]
+                     kind, p0, p1, p2, margin, limit):
+    """Bounds the distance of a surface from a solid.
+
+    Args:
+        spheres, boxes, links: of a tree, see build_sphere_tree; triangles: (m, 9) corners.
+        root: node to start from; pose: (3, 4) of the surface in the solid's frame.
+        kind, p0, p1, p2: the solid; margin: what is taken off every distance [m].
+        limit: a distance [m] beyond which nothing needs to be known.
+
+    Returns:
+        (status, lower bound of the distance, at most `limit`).
+    """
+    stack = np.empty(STACK, np.int32)
+    bounds = np.empty(STACK)
+    stack[0], bounds[0] = root, -np.inf
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if bounds[depth] >= limit:
+            continue
+        if links[node, 0] < 0:
+            status, bound = _triangle_to_solid(triangles[links[node, 1]], pose, kind, p0, p1, p2, margin, limit)
+            if status != CLEAR:
+                return status, 0.0
+            limit = min(limit, bound)
+            continue
+        far, near = links[node, 0], links[node, 1]
+        far_gap = _centre_distance(spheres, far, pose, kind, p0, p1, p2) - margin
+        near_gap = _centre_distance(spheres, near, pose, kind, p0, p1, p2) - margin
+        if far_gap - spheres[far, 3] < near_gap - spheres[near, 3]:
+            far, near, far_gap, near_gap = near, far, near_gap, far_gap
+        for child, gap in ((far, far_gap), (near, near_gap)):  # the nearer one comes to lie on top of the stack
+            radius = spheres[child, 3]
+            if gap - radius >= limit:
+                continue
+            if radius <= ACCEPTED_SHARE * gap:
+                limit = gap - radius
+            elif _box_to_solid(boxes[child], pose, kind, p0, p1, p2) - margin < limit:
+                stack[depth], bounds[depth] = child, gap - radius
+                depth += 1
+    return CLEAR, limit
+
+
+@njit(cache=True, nogil=True)
+def _centre_distance(spheres, node, pose, kind, p0, p1, p2):  # type: ignore[no-untyped-def]
+    x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
+    return solid_distance(kind, p0, p1, p2, pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
+                          pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
+                          pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3])
+
+
+@njit(cache=True, nogil=True)
+def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-untyped-def]
+    x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
+    return np.sqrt(
+        (pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_spheres[other, 0]) ** 2
+        + (pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3] - other_spheres[other, 1]) ** 2
+        + (pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3] - other_spheres[other, 2]) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def surface_to_surface(spheres, boxes, links, triangles, root,  # type: ignore[no-untyped-def]
+                       other_spheres, other_boxes, other_links, other_triangles, other_root, pose, margin, limit):
+    """Bounds the distance of two surfaces; `pose` (3, 4) is the first one's in the frame of the other."""
+    stack = np.empty((STACK, 2), np.int32)
+    bounds = np.empty(STACK)
+    stack[0, 0], stack[0, 1], bounds[0] = root, other_root, -np.inf
+    depth, hopeless = 1, HOPELESS_SHARE * limit
+    while depth > 0:
+        depth -= 1
+        node, other = stack[depth, 0], stack[depth, 1]
+        if bounds[depth] >= limit:
+            continue
+        leaf, other_leaf = links[node, 0] < 0, other_links[other, 0] < 0
+        if leaf and other_leaf:
+            distance = _triangle_to_triangle(triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]],
+                                             margin)
+            if distance <= ROUNDING:
+                return (TOUCHING if distance <= 0.0 else TOO_CLOSE), 0.0
+            limit = min(limit, distance)
+            if limit < hopeless:  # of little use: all that is still asked is whether they touch
+                limit = min(limit, 2.0 * ROUNDING)
+            continue
+        if depth > STACK - 3:
+            return TOO_CLOSE, 0.0
+        if other_leaf or (not leaf and spheres[node, 3] >= other_spheres[other, 3]):
+            a, b, other_a, other_b = links[node, 0], links[node, 1], other, other
+        else:
+            a, b, other_a, other_b = node, node, other_links[other, 0], other_links[other, 1]
+        gap_a = _sphere_gap(spheres, a, other_spheres, other_a, pose) - margin
+        gap_b = _sphere_gap(spheres, b, other_spheres, other_b, pose) - margin
+        both_a, both_b = spheres[a, 3] + other_spheres[other_a, 3], spheres[b, 3] + other_spheres[other_b, 3]
+        if gap_a - both_a < gap_b - both_b:
+            a, b, other_a, other_b = b, a, other_b, other_a
+            gap_a, gap_b, both_a, both_b = gap_b, gap_a, both_b, both_a
+        for child, partner, gap, both in ((a, other_a, gap_a, both_a), (b, other_b, gap_b, both_b)):
+            if gap - both >= limit:
+                continue
+            if both <= ACCEPTED_SHARE * gap:
+                limit = gap - both
+            elif _box_to_box(boxes[child], other_boxes[partner], pose) - margin < limit:
+                stack[depth, 0], stack[depth, 1], bounds[depth] = child, partner, gap - both
+                depth += 1
+    return CLEAR, limit
+
+
+@njit(cache=True, nogil=True)
+def _triangle_to_triangle(triangle, pose, other, margin):  # type: ignore[no-untyped-def]
+    corners = np.empty(9)
+    for corner in range(3):
+        for row in range(3):
+            corners[3 * corner + row] = (
+                pose[row, 0] * triangle[3 * corner] + pose[row, 1] * triangle[3 * corner + 1]
+                + pose[row, 2] * triangle[3 * corner + 2] + pose[row, 3])
+    return triangle_distance(corners, other) - margin
+
+
+@njit(cache=True, nogil=True)
+def surfaces_stay_apart(spheres, boxes, links, triangles, root,  # type: ignore[no-untyped-def]
+                        other_spheres, other_boxes, other_links, other_triangles, other_root,
+                        pose, origins, axes, change):
+    """Whether two surfaces stay apart while the first one turns about some axes; False also where it is too near.
+
+    Args:
+        pose: of the first surface in the frame of the other, in the middle of the turn; shape (3, 4).
+        origins, axes: of the turns in the same frame, the one nearest to the first surface first; shape (k, 3).
+        change: by how much each turns to either side at most [rad], shape (k,).
+    """
+    stack = np.empty((STACK, 2), np.int32)
+    stack[0, 0], stack[0, 1] = root, other_root
+    depth, work = 1, 0
+    while depth > 0:
+        depth -= 1
+        work += 1
+        node, other = stack[depth, 0], stack[depth, 1]
+        x, y, z, radius = spheres[node, 0], spheres[node, 1], spheres[node, 2], spheres[node, 3]
+        px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
+        py = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
+        pz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
+        needed = ROUNDING
+        for turn in range(len(change)):
+            wx, wy, wz = px - origins[turn, 0], py - origins[turn, 1], pz - origins[turn, 2]
+            ax, ay, az = axes[turn, 0], axes[turn, 1], axes[turn, 2]
+            reach = np.sqrt((ay * wz - az * wy) ** 2 + (az * wx - ax * wz) ** 2 + (ax * wy - ay * wx) ** 2)
+            needed += change[turn] * (reach + radius + needed)
+        gap = _sphere_gap(spheres, node, other_spheres, other, pose)
+        if gap - radius - other_spheres[other, 3] >= needed or _box_to_box(
+                boxes[node], other_boxes[other], pose) >= needed:
+            continue
+        leaf, other_leaf = links[node, 0] < 0, other_links[other, 0] < 0
+        if leaf and other_leaf:
+            if _triangle_to_triangle(triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]],
+                                     0.0) < needed:
+                return False
+            continue
+        if depth > STACK - 3 or work > MOST_PAIRS:
+            return False
+        if other_leaf or (not leaf and radius >= other_spheres[other, 3]):
+            stack[depth, 0], stack[depth, 1] = links[node, 0], other
+            stack[depth + 1, 0], stack[depth + 1, 1] = links[node, 1], other
+        else:
+            stack[depth, 0], stack[depth, 1] = node, other_links[other, 0]
+            stack[depth + 1, 0], stack[depth + 1, 1] = node, other_links[other, 1]
+        depth += 2
+    return True

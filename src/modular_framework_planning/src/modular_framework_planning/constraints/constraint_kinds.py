@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The kinds of constraints on a state: of a joint, of where a link's point is, of how a link is turned.
+
+The meaning is that of MoveIt's kinematic constraints: a joint within its tolerances, a point of a link within one of
+several regions, the rotation of a link within a tolerance about each axis.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_planning.geometry.regions import Solid
+from modular_framework_planning.geometry.spatial import Array, Transform
+
+SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
+INSIDE = 1.0e-5  # [m]; projections aim this far inside a region, not at its border
+INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight ways between two states bulge
+TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
+Row = tuple[Array, float]  # one linearised condition: (joint velocities -> change, change that is wanted)
+
+
+class Parameterization(Enum):
+    """How the three tolerances of an orientation are read; numbers as in moveit_msgs/OrientationConstraint."""
+
+    XYZ_EULER_ANGLES = 0
+    ROTATION_VECTOR = 1
+
+
+@dataclass(frozen=True, slots=True)
+class ConstraintResult:
+    """What one constraint says of a state.
+
+    Attributes:
+        kind: "joint", "position" or "orientation".
+        name: the joint or the link.
+        distance: weighted deviation from the middle of what is allowed, as MoveIt reports it.
+        text: by how much what is off, for people.
+    """
+
+    kind: str
+    name: str
+    satisfied: bool
+    distance: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameOnRobot:
+    """A frame that moves with a joint of the robot; joint 0 is the planning frame, which does not move."""
+
+    name: str
+    joint: int
+    placement: Transform
+
+    def pose(self, data: Any) -> Transform:
+        """Returns the pose in the planning frame; `data` holds the joint placements of the state."""
+        return data.oMi[self.joint] * self.placement if self.joint else self.placement
+
+    def jacobian_at(self, model: Any, data: Any, point: Array) -> Array:
+        """Returns how joint velocities move this frame, linear at `point` above angular, shape (6, nv)."""
+        if not self.joint:
+            return np.zeros((6, model.nv))
+        jacobian = pin.getJointJacobian(model, data, self.joint, pin.LOCAL_WORLD_ALIGNED)
+        x, y, z = point - data.oMi[self.joint].translation
+        jacobian[:3] -= np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ jacobian[3:]
+        return jacobian
+
+
+@dataclass(frozen=True, slots=True)
+class JointConstraint:
+    """A joint that stays within [target - below, target + above] [rad or m]."""
+
+    name: str
+    index: int
+    target: float
+    below: float
+    above: float
+    is_continuous: bool = False
+    weight: float = 1.0
+
+    def deviation(self, positions: Array) -> float:
+        """Returns how far the joint is from its target; the short way round for a joint without ends."""
+        value = float(positions[self.index]) - self.target
+        return float(np.arctan2(np.sin(value), np.cos(value))) if self.is_continuous else value
+
+    def evaluate(self, _: Any, positions: Array) -> ConstraintResult:
+        """Returns the verdict on a state."""
+        value = self.deviation(positions)
+        kept = -self.below - SLACK <= value <= self.above + SLACK
+        text = (f"joint '{self.name}' is {value:+.4f} from {self.target:.4f}; allowed is -{self.below:.4f} to "
+                f"+{self.above:.4f}")
+        return ConstraintResult("joint", self.name, kept, self.weight * abs(value), text)
+
+    def conditions(self, *_: Any) -> tuple[bool, list[Row]]:
+        """Returns no condition: a projection keeps joints within their tolerance by clipping."""
+        return False, []
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PositionConstraint:
+    """A point of a link that stays in one of several regions.
+
+    Attributes:
+        link: frame of the link; offset: the point in it [m].
+        reference: frame the regions' poses are given in; it may move.
+        regions: solids and their poses.
+    """
+
+    link: FrameOnRobot
+    offset: Array
+    reference: FrameOnRobot
+    regions: tuple[tuple[Solid, Transform], ...]
+    weight: float = 1.0
+
+    def _gap(self, data: Any) -> tuple[float, Array, Array, Transform, Solid]:
+        """Returns distance to the closest region, the point there, the point in the region's frame, its pose, it."""
+        point = self.link.pose(data).act(self.offset)
+        reference = self.reference.pose(data)
+        best = None
+        for solid, pose in self.regions:
+            region = reference * pose
+            inside = region.actInv(point)
+            nearest = solid.nearest(inside)
+            distance = float(np.linalg.norm(nearest - inside))
+            if best is None or distance < best[0]:
+                best = (distance, nearest, inside, region, solid)
+        assert best is not None, "a position constraint has at least one region"
+        return best
+
+    def evaluate(self, data: Any, _: Array) -> ConstraintResult:
+        """Returns the verdict on the state whose joint placements `data` holds."""
+        distance, _nearest, inside, _region, _solid = self._gap(data)
+        text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
+        return ConstraintResult("position", self.link.name, distance <= SLACK,
+                                self.weight * float(np.linalg.norm(inside)), text)
+
+    def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
+        """Returns whether the point is outside, and what brings or keeps it inside; `data` holds joint Jacobians."""
+        distance, nearest, inside, region, solid = self._gap(data)
+        violated, tight = distance > SLACK, solid.extent <= TIGHT
+        if not (violated or tight):
+            return False, []
+        point = region.act(inside)
+        speed = self.link.jacobian_at(model, data, point)[:3] - self.reference.jacobian_at(model, data, point)[:3]
+        if tight:
+            return violated, list(zip(speed, (region.translation - point).tolist(), strict=True))
+        depth = float(np.linalg.norm(nearest))
+        wanted = region.rotation @ (nearest * (1.0 - min(INSIDE / depth, 0.5)) - inside if depth > 0.0 else -inside)
+        size = float(np.linalg.norm(wanted))
+        return violated, [(wanted / size @ speed, size)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OrientationConstraint:
+    """A link whose rotation stays near a given one.
+
+    Attributes:
+        target: the rotation in the reference frame, shape (3, 3).
+        tolerances: about x, y and z [rad]. Of intrinsic XYZ Euler angles of the deviation, or of its rotation vector
+            along the axes of the reference frame.
+    """
+
+    link: FrameOnRobot
+    reference: FrameOnRobot
+    target: Array
+    tolerances: Array
+    parameterization: Parameterization = Parameterization.XYZ_EULER_ANGLES
+    weight: float = 1.0
+
+    def deviation(self, data: Any) -> tuple[Array, Array]:
+        """Returns the three deviations [rad] and the deviating rotation."""
+        current = self.reference.pose(data).rotation.T @ self.link.pose(data).rotation
+        turned = self.target.T @ current
+        if self.parameterization is Parameterization.ROTATION_VECTOR:
+            return self.target @ pin.log3(turned), turned
+        angles, regular = euler_xyz(turned)
+        if not regular and abs(angles[0]) > self.tolerances[0]:
+            angles = np.array([0.0, angles[1], angles[0]])  # roll and yaw turn about one axis: either may take it
+        return angles, turned
+
+    def evaluate(self, data: Any, _: Array) -> ConstraintResult:
+        """Returns the verdict on the state whose joint placements `data` holds."""
+        angles = np.abs(self.deviation(data)[0])
+        excess = float((angles - self.tolerances).max())
+        text = (f"link '{self.link.name}' is turned {np.array2string(angles, precision=4)} rad about x, y, z; allowed "
+                f"is {np.array2string(self.tolerances, precision=4)}")
+        return ConstraintResult("orientation", self.link.name, excess <= SLACK, self.weight * float(angles.sum()), text)
+
+    def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
+        """Returns whether the rotation is off, and a condition per axis that brings or keeps it within the tolerances;
+        `data` holds the joint Jacobians.
+        """
+        angles, turned = self.deviation(data)
+        tight = self.tolerances <= TIGHT
+        violated = float((np.abs(angles) - self.tolerances).max()) > SLACK
+        limits = np.where(tight, 0.0, INNER_SHARE * self.tolerances)
+        chosen = np.flatnonzero(tight | (violated & (np.abs(angles) > limits)))
+        if not len(chosen):
+            return violated, []
+        reference = self.reference.pose(data)
+        where = self.link.pose(data).translation
+        spin = (self.link.jacobian_at(model, data, where) - self.reference.jacobian_at(model, data, where))[3:]
+        in_target = (reference.rotation @ self.target).T @ spin
+        if self.parameterization is Parameterization.ROTATION_VECTOR:
+            rates = self.target @ pin.Jlog3(turned) @ turned.T @ in_target
+        else:
+            rates = _euler_rates(angles) @ in_target
+        aims = np.clip(angles, -limits, limits) - angles
+        return violated, [(rates[number], float(aims[number])) for number in chosen]
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a random rotation within the tolerances, in the reference frame, shape (3, 3)."""
+        angles = rng.uniform(-1.0, 1.0, 3) * np.minimum(self.tolerances, np.pi)
+        if self.parameterization is Parameterization.ROTATION_VECTOR:
+            return self.target @ pin.exp3(self.target.T @ angles)
+        angles[1] = np.clip(angles[1], -0.5 * np.pi, 0.5 * np.pi)
+        return self.target @ _rotation_x(angles[0]) @ pin.rpy.rpyToMatrix(0.0, angles[1], 0.0) @ pin.rpy.rpyToMatrix(
+            0.0, 0.0, angles[2])
+
+
+def _rotation_x(angle: float) -> Array:
+    return pin.rpy.rpyToMatrix(angle, 0.0, 0.0)
+
+
+def euler_xyz(rotation: Array) -> tuple[Array, bool]:
+    """Returns intrinsic XYZ Euler angles [rad] of a rotation, and False where only roll plus or minus yaw is known."""
+    sine = min(max(float(rotation[0, 2]), -1.0), 1.0)
+    pitch = float(np.arcsin(sine))
+    if abs(sine) > 1.0 - 1.0e-12:
+        return np.array([np.arctan2(rotation[2, 1], rotation[1, 1]), pitch, 0.0]), False
+    roll = np.arctan2(-rotation[1, 2], rotation[2, 2])
+    return np.array([roll, pitch, np.arctan2(-rotation[0, 1], rotation[0, 0])]), True
+
+
+def _euler_rates(angles: Array) -> Array:
+    """Returns the matrix from angular velocity (in the frame the angles start in) to rates of XYZ Euler angles."""
+    sine, cosine = np.sin(angles[0]), np.cos(angles[0])
+    pitch_cosine, pitch_sine = np.cos(angles[1]), np.sin(angles[1])
+    pitch_cosine = float(np.copysign(max(abs(pitch_cosine), 1.0e-3), pitch_cosine))
+    tangent = pitch_sine / pitch_cosine
+    return np.array([[1.0, sine * tangent, -cosine * tangent], [0.0, cosine, sine],
+                     [0.0, -sine / pitch_cosine, cosine / pitch_cosine]])
+
+
+Constraint = JointConstraint | PositionConstraint | OrientationConstraint

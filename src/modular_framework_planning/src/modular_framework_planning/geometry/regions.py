@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Solids a point may be required to stay in: which point of the solid is nearest, and random points in it."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull, QhullError
+
+from modular_framework_planning.errors import GeometryError
+from modular_framework_planning.geometry.spatial import Array
+
+
+class Solid(Protocol):
+    """A convex solid around its own origin; points are in its own frame [m]."""
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point of the solid from its origin [m]."""
+
+    def nearest(self, point: Array) -> Array:
+        """Returns the point of the solid nearest to `point`: the point itself where it is inside."""
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a point uniformly distributed in the solid."""
+
+
+def _require_lengths(kind: str, **lengths: float) -> None:
+    for name, value in lengths.items():
+        if not np.isfinite(value) or value < 0.0:
+            raise GeometryError(f"{kind}: {name} is {value}; it must be a finite length of at least 0 m")
+
+
+@dataclass(frozen=True, slots=True)
+class BoxSolid:
+    """A box; edge lengths [m], 0 for a flat one."""
+
+    x: float
+    y: float
+    z: float
+
+    def __post_init__(self) -> None:
+        _require_lengths("box", x=self.x, y=self.y, z=self.z)
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return 0.5 * float(np.linalg.norm((self.x, self.y, self.z)))
+
+    def nearest(self, point: Array) -> Array:
+        """Returns the nearest point of the box."""
+        half = (0.5 * self.x, 0.5 * self.y, 0.5 * self.z)
+        return np.array([min(max(value, -edge), edge) for value, edge in zip(point, half, strict=True)])
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a random point of the box."""
+        return rng.uniform(-0.5, 0.5, 3) * (self.x, self.y, self.z)
+
+
+@dataclass(frozen=True, slots=True)
+class SphereSolid:
+    """A ball; radius [m]."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        _require_lengths("sphere", radius=self.radius)
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return self.radius
+
+    def nearest(self, point: Array) -> Array:
+        """Returns the nearest point of the ball."""
+        distance = float(np.linalg.norm(point))
+        return point if distance <= self.radius else point * (self.radius / distance)
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a random point of the ball."""
+        direction = rng.normal(size=3)
+        return direction * (self.radius * rng.uniform() ** (1.0 / 3.0) / float(np.linalg.norm(direction)))
+
+
+def _in_slice(point: Array, radius: float, z: float) -> Array:
+    """Returns the point in the half plane of `point` about the z axis at the given radius and height."""
+    distance = float(np.hypot(point[0], point[1]))
+    direction = point[:2] / distance if distance > 0.0 else np.array([1.0, 0.0])
+    return np.array([radius * direction[0], radius * direction[1], z])
+
+
+@dataclass(frozen=True, slots=True)
+class CylinderSolid:
+    """A cylinder along z, centred; height and radius [m]."""
+
+    height: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        _require_lengths("cylinder", height=self.height, radius=self.radius)
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return float(np.hypot(0.5 * self.height, self.radius))
+
+    def nearest(self, point: Array) -> Array:
+        """Returns the nearest point of the cylinder."""
+        distance = float(np.hypot(point[0], point[1]))
+        half = 0.5 * self.height
+        return _in_slice(point, min(distance, self.radius), min(max(float(point[2]), -half), half))
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a random point of the cylinder."""
+        angle, radius = rng.uniform(-np.pi, np.pi), self.radius * np.sqrt(rng.uniform())
+        return np.array([radius * np.cos(angle), radius * np.sin(angle), self.height * rng.uniform(-0.5, 0.5)])
+
+
+@dataclass(frozen=True, slots=True)
+class ConeSolid:
+    """A cone along z, tip up, the middle of its axis at the origin; height and radius of the base [m]."""
+
+    height: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        _require_lengths("cone", height=self.height, radius=self.radius)
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return float(np.hypot(0.5 * self.height, self.radius))
+
+    def nearest(self, point: Array) -> Array:
+        """Returns the nearest point of the cone, looked for in the triangle that makes the cone by turning."""
+        at = np.array([float(np.hypot(point[0], point[1])), float(point[2])])
+        base, tip = np.array([self.radius, -0.5 * self.height]), np.array([0.0, 0.5 * self.height])
+        side = tip - base
+        if base[1] <= at[1] <= tip[1] and at[0] * self.height <= self.radius * (tip[1] - at[1]):
+            return point
+        length = float(side @ side)
+        share = min(max(float((at - base) @ side) / length, 0.0), 1.0) if length > 0.0 else 0.0
+        on_side, on_base = base + share * side, np.array([min(at[0], self.radius), base[1]])
+        best = min((on_side, on_base), key=lambda item: float(np.linalg.norm(item - at)))
+        return _in_slice(point, float(best[0]), float(best[1]))
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a random point of the cone."""
+        from_tip = rng.uniform() ** (1.0 / 3.0)
+        angle, radius = rng.uniform(-np.pi, np.pi), self.radius * from_tip * np.sqrt(rng.uniform())
+        return np.array([radius * np.cos(angle), radius * np.sin(angle), self.height * (0.5 - from_tip)])
+
+
+class HullSolid:
+    """The convex hull of a mesh (as in MoveIt, whose mesh regions are hulls)."""
+
+    def __init__(self, vertices: Array) -> None:
+        """Args: vertices of the mesh, shape (n, 3) [m].
+
+        Raises:
+            GeometryError: they are fewer than four, not finite, or in one plane.
+        """
+        points = np.asarray(vertices, dtype=float).reshape(-1, 3)
+        if not np.isfinite(points).all():
+            raise GeometryError("mesh: a vertex is not finite; every coordinate must be finite")
+        try:
+            hull = ConvexHull(points)
+        except (QhullError, ValueError) as error:
+            raise GeometryError(f"mesh: its {len(points)} vertices enclose no volume; give a closed mesh") from error
+        self._vertices = points[hull.vertices]
+        self._normals, self._offsets = hull.equations[:, :3], hull.equations[:, 3]
+        self._middle = self._vertices.mean(axis=0)
+        self._corners = points[hull.simplices]
+        volumes = np.abs(np.linalg.det(self._corners - self._middle))
+        self._shares = volumes / volumes.sum()
+
+    @property
+    def extent(self) -> float:
+        """Greatest distance of a point from the origin [m]."""
+        return float(np.linalg.norm(self._vertices, axis=1).max())
+
+    def nearest(self, point: Array) -> Array:
+        """Returns the nearest point of the hull: the shortest convex combination of vertices seen from the point."""
+        if float((self._normals @ point + self._offsets).max()) <= 0.0:
+            return point
+        system = np.vstack([(self._vertices - point).T, np.ones(len(self._vertices))])
+        weights, _ = nnls(system, np.array([0.0, 0.0, 0.0, 1.0]))
+        return weights @ self._vertices / float(weights.sum())
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Returns a random point of the hull: of one of the tetrahedra between its middle and its faces."""
+        corners = self._corners[rng.choice(len(self._shares), p=self._shares)]
+        return rng.dirichlet(np.ones(4)) @ np.vstack([corners, self._middle])

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads moveit_msgs/Constraints, and refuses what has no meaning instead of guessing one."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from moveit_msgs.msg import ConstraintEvalResult, Constraints
+from shape_msgs.msg import SolidPrimitive
+
+from modular_framework_planning.constraints.constraint_kinds import (
+    ConstraintResult,
+    FrameOnRobot,
+    JointConstraint,
+    OrientationConstraint,
+    Parameterization,
+    PositionConstraint,
+)
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.errors import ErrorCode, GeometryError, PlanningError, UnknownNameError
+from modular_framework_planning.geometry.regions import (
+    BoxSolid,
+    ConeSolid,
+    CylinderSolid,
+    HullSolid,
+    Solid,
+    SphereSolid,
+)
+from modular_framework_planning.geometry.spatial import IDENTITY_XYZW, Transform, make_transform, quaternion_or_identity
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
+
+PRIMITIVES: dict[int, tuple[Callable[..., Solid], int]] = {
+    SolidPrimitive.BOX: (BoxSolid, 3), SolidPrimitive.SPHERE: (SphereSolid, 1),
+    SolidPrimitive.CYLINDER: (CylinderSolid, 2), SolidPrimitive.CONE: (ConeSolid, 2)}
+
+
+def constraints_from_message(scene: PlanningScene, message: Any, where: str,
+                             code: ErrorCode = ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                             tip: str = "") -> KinematicConstraints:
+    """Reads a Constraints message.
+
+    Args:
+        scene: gives frames their poses; those on the robot keep moving with it.
+        where: what the message belongs to, for error texts.
+        code: result code for constraints that have no meaning.
+        tip: link that constraints without a link_name are for.
+
+    Raises:
+        PlanningError: a visibility constraint, a name that does not exist, a number that is not finite, a tolerance
+            below 0, a rotation of no length, a region without a shape.
+    """
+    if message.visibility_constraints:
+        raise PlanningError(code, f"{where}: {len(message.visibility_constraints)} visibility constraints; they are "
+                            "not supported; use joint, position or orientation constraints")
+    reader = _Reader(scene, code, tip)
+    return KinematicConstraints(
+        scene.model,
+        [reader.joint(item, f"{where}.joint_constraints[{n}]") for n, item in enumerate(message.joint_constraints)],
+        [reader.position(item, f"{where}.position_constraints[{n}]")
+         for n, item in enumerate(message.position_constraints)],
+        [reader.orientation(item, f"{where}.orientation_constraints[{n}]")
+         for n, item in enumerate(message.orientation_constraints)], message.name)
+
+
+def evaluated_one_by_one(scene: PlanningScene, message: Any, where: str,
+                         tip: str) -> tuple[list[ConstraintResult], list[str]]:
+    """Returns what each constraint says of the scene's state, and why some are refused.
+
+    A refused one, of any kind, is not satisfied and infinitely far off; the results are in the order of
+    `KinematicConstraints.evaluate`, visibility constraints last.
+    """
+    results, faults = [], []
+    for kind in ("joint", "position", "orientation", "visibility"):
+        for number, item in enumerate(getattr(message, f"{kind}_constraints")):
+            place = f"{where}.{kind}_constraints[{number}]"
+            try:
+                alone = constraints_from_message(scene, Constraints(**{f"{kind}_constraints": [item]}), where, tip=tip)
+                results += alone.evaluate(scene.positions)
+            except PlanningError as error:
+                reason = error.reason.replace(f"{where}.{kind}_constraints[0]", place)
+                faults.append(reason if place in reason else f"{place}: {reason}")
+                name = getattr(item, f"{'joint' if kind == 'joint' else 'link'}_name", "")
+                results.append(ConstraintResult(kind, name, False, np.inf, faults[-1]))
+    return results, faults
+
+
+def result_messages(results: Sequence[ConstraintResult]) -> list[ConstraintEvalResult]:
+    """Writes one message a constraint, in the order of `KinematicConstraints.evaluate`."""
+    return [ConstraintEvalResult(result=item.satisfied, distance=item.distance) for item in results]
+
+
+def frame_on_robot(scene: PlanningScene, name: str) -> FrameOnRobot:
+    """Returns a frame as something that moves with the robot (links, attached objects) or stays (all others).
+
+    Raises:
+        UnknownNameError: no such frame.
+    """
+    name = name.removeprefix("/")
+    pose = scene.frame_transform(name)
+    holder = holding_link(scene, name)
+    if not holder:
+        return FrameOnRobot(name or scene.model.planning_frame, 0, pose)
+    frame = scene.model.pin_model.frames[scene.model.frame_ids[holder]]
+    placement = frame.placement * scene.frame_transform(holder).actInv(pose)
+    return FrameOnRobot(name, int(frame.parentJoint), placement)
+
+
+def holding_link(scene: PlanningScene, name: str) -> str:
+    """Returns the link a frame is fixed to: the link of that name, or the one that holds the object; else empty."""
+    if scene.model.has_link(name):
+        return name
+    if name in scene.objects:
+        return ""
+    return next((item.link for held, item in scene.attached.items() if name == held
+                 or (name.startswith(f"{held}/") and name.removeprefix(f"{held}/") in item.body.subframes)), "")
+
+
+class _Reader:
+    """Reads the constraints of one message."""
+
+    def __init__(self, scene: PlanningScene, code: ErrorCode, tip: str) -> None:
+        self._scene, self._code, self._tip = scene, code, tip
+
+    def _finite(self, where: str, **values: float) -> None:
+        bad = {name: value for name, value in values.items() if not np.isfinite(value)}
+        if bad:
+            raise PlanningError(self._code, f"{where}: {bad}; every number must be finite")
+
+    def _tolerance(self, where: str, name: str, value: float) -> float:
+        if not value >= 0.0:
+            raise PlanningError(self._code, f"{where}: {name} is {value}; it must be 0 or more")
+        return float(value)
+
+    def _weight(self, where: str, value: float) -> float:
+        self._finite(where, weight=value)
+        return float(value) if value > np.finfo(float).eps else 1.0  # as in MoveIt: a weight left at 0 counts as 1
+
+    def joint(self, message: Any, where: str) -> JointConstraint:
+        """Reads a JointConstraint."""
+        model = self._scene.model
+        if message.joint_name not in model.index:
+            raise UnknownNameError(self._code, f"{where}: joint", message.joint_name, model.joint_names)
+        self._finite(where, position=message.position)
+        number = model.index[message.joint_name]
+        target = min(max(message.position, model.lower[number]), model.upper[number])
+        if abs(target - message.position) > BEYOND_BOUND:
+            target = message.position  # whoever uses the constraint says that it cannot be met
+        return JointConstraint(message.joint_name, number, float(target),
+                               self._tolerance(where, "tolerance_below", message.tolerance_below),
+                               self._tolerance(where, "tolerance_above", message.tolerance_above),
+                               model.is_continuous(number), self._weight(where, message.weight))
+
+    def _link(self, name: str, where: str) -> FrameOnRobot:
+        name = (name or self._tip).removeprefix("/")
+        scene = self._scene
+        if not holding_link(scene, name):
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"{where}: link", name,
+                                   [*scene.model.frame_ids, *scene.attached])
+        return frame_on_robot(scene, name)
+
+    def position(self, message: Any, where: str) -> PositionConstraint:
+        """Reads a PositionConstraint."""
+        offset = message.target_point_offset
+        self._finite(f"{where}: target_point_offset", x=offset.x, y=offset.y, z=offset.z)
+        return PositionConstraint(self._link(message.link_name, where), np.array([offset.x, offset.y, offset.z]),
+                                  frame_on_robot(self._scene, message.header.frame_id),
+                                  self._regions(message.constraint_region, f"{where}: constraint_region"),
+                                  self._weight(where, message.weight))
+
+    def _regions(self, volume: Any, where: str) -> tuple[tuple[Solid, Transform], ...]:
+        regions = []
+        for kind, shapes, poses in (("primitive", volume.primitives, volume.primitive_poses),
+                                    ("mesh", volume.meshes, volume.mesh_poses)):
+            if len(shapes) != len(poses):
+                raise PlanningError(self._code, f"{where}: {len(shapes)} {kind} shapes and {len(poses)} poses; one "
+                                    "pose a shape is needed")
+            for number, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
+                place = f"{where} {kind} {number}"
+                regions.append((self._solid(shape, place), self._region_pose(shape, pose, place)))
+        if not regions:
+            raise PlanningError(self._code, f"{where} is empty; give at least one primitive or mesh with its pose")
+        return tuple(regions)
+
+    def _region_pose(self, shape: Any, pose: Any, where: str) -> Transform:
+        """Reads where a region is; a rotation left out is none, as in MoveIt, and for a ball nothing to warn of."""
+        p, q = pose.position, pose.orientation
+        rotation = (q.x, q.y, q.z, q.w)
+        is_ball = getattr(shape, "type", 0) == SolidPrimitive.SPHERE
+        try:
+            return make_transform((p.x, p.y, p.z), IDENTITY_XYZW if is_ball and not any(rotation) else
+                                  quaternion_or_identity(rotation, where), where)
+        except GeometryError as error:
+            raise PlanningError(self._code, error.reason) from error
+
+    def _solid(self, shape: Any, where: str) -> Solid:
+        try:
+            if hasattr(shape, "vertices"):
+                return HullSolid(np.array([(p.x, p.y, p.z) for p in shape.vertices], dtype=float))
+            if shape.type not in PRIMITIVES:
+                raise GeometryError(f"type {shape.type}; allowed are 1 box, 2 sphere, 3 cylinder, 4 cone")
+            build, count = PRIMITIVES[shape.type]
+            if len(shape.dimensions) < count:
+                raise GeometryError(f"type {shape.type} with {len(shape.dimensions)} dimensions; {count} are needed")
+            return build(*(float(value) for value in shape.dimensions[:count]))
+        except GeometryError as error:
+            raise PlanningError(self._code, f"{where}: {error.reason}") from error
+
+    def orientation(self, message: Any, where: str) -> OrientationConstraint:
+        """Reads an OrientationConstraint."""
+        q = message.orientation
+        try:
+            quaternion = quaternion_or_identity((q.x, q.y, q.z, q.w), f"{where}: orientation")
+            target = make_transform((0.0, 0.0, 0.0), quaternion, f"{where}: orientation").rotation
+        except GeometryError as error:
+            raise PlanningError(self._code, error.reason) from error
+        known = {item.value: item for item in Parameterization}
+        if message.parameterization not in known:
+            raise PlanningError(self._code, f"{where}: parameterization {message.parameterization}; allowed are "
+                                + ", ".join(f"{item.value} {item.name}" for item in Parameterization))
+        tolerances = [self._tolerance(where, name, abs(getattr(message, name)))
+                      for name in ("absolute_x_axis_tolerance", "absolute_y_axis_tolerance",
+                                   "absolute_z_axis_tolerance")]
+        return OrientationConstraint(self._link(message.link_name, where),
+                                     frame_on_robot(self._scene, message.header.frame_id), target,
+                                     np.minimum(tolerances, 2.0 * np.pi), known[message.parameterization],
+                                     self._weight(where, message.weight))

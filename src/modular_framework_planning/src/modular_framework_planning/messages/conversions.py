@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where messages meet the planner's own types: states, goals and trajectories."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import genpy
+import numpy as np
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import RobotState, RobotTrajectory
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_planning.collision_detection.collision_checker import ATTACHED, LINK, WORLD
+from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.geometry.spatial import Array, Transform, make_transform, pose_of
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.scene_conversions import apply_attached_object, attached_to_message
+from modular_framework_planning.planning_interface.planning_request import ConstraintGoal, JointGoal, PoseGoal
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+BODY_TYPES = {LINK: 0, WORLD: 1, ATTACHED: 2}
+
+
+def transform_from_pose(pose: Pose, where: str) -> Transform:
+    """Reads a pose; raises GeometryError."""
+    p, q = pose.position, pose.orientation
+    return make_transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), where)
+
+
+def pose_message(transform: Transform) -> Pose:
+    """Writes a pose."""
+    position, quaternion = pose_of(transform)
+    pose = Pose()
+    pose.position.x, pose.position.y, pose.position.z = (float(v) for v in position)
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = (float(v) for v in quaternion)
+    return pose
+
+
+def stamped_in_scene(scene: PlanningScene, stamped: PoseStamped, where: str) -> Transform:
+    """Returns a stamped pose in the planning frame; raises PlanningError for an unknown frame or bad numbers."""
+    return scene.frame_transform(stamped.header.frame_id) * transform_from_pose(stamped.pose, where)
+
+
+def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[float], where: str) -> dict[str, float]:
+    """Pairs names and positions; fixed joints are left out.
+
+    Raises:
+        PlanningError: lengths differ, a joint does not exist, or a value is not finite.
+    """
+    if len(names) != len(positions):
+        raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: {len(names)} joint names and {len(positions)} "
+                            "positions; one position per name is needed")
+    values = {}
+    for name, position in zip(names, positions, strict=True):
+        if name not in model.index:
+            if model.document.joint_kinds.get(name) == "fixed":
+                continue
+            raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint", name, model.joint_names)
+        if not np.isfinite(position):
+            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint '{name}' is {position}; "
+                                "a finite number is needed")
+        values[name] = float(position)
+    return values
+
+
+def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robot state") -> PlanningScene:
+    """Returns the scene with the robot in the state of a message.
+
+    Joints that are not named stay as they are. A state that names joints and is not a diff replaces the attached
+    objects; otherwise those of the message are added.
+    """
+    names = state.joint_state.name
+    if names:
+        values = joint_values(scene.model, names, state.joint_state.position, where)
+        scene = scene.with_positions(scene.model.merge(scene.positions, values))
+        if not state.is_diff:
+            scene = scene.without_attached(scene.attached)
+    for item in state.attached_collision_objects:
+        scene = apply_attached_object(scene, item)
+    return scene
+
+
+def state_message(scene: PlanningScene, positions: Array | None = None, with_attached: bool = True,
+                  with_geometry: bool = True) -> RobotState:
+    """Writes joint positions (the scene's by default) and attached objects."""
+    message = RobotState()
+    message.joint_state.header.frame_id = scene.model.planning_frame
+    message.joint_state.name = list(scene.model.joint_names)
+    message.joint_state.position = [float(v) for v in (scene.positions if positions is None else positions)]
+    if with_attached:
+        message.attached_collision_objects = [attached_to_message(scene, item, with_geometry)
+                                              for item in scene.attached.values()]
+    return message
+
+
+def goals_from_constraints(scene: PlanningScene, constraints: Sequence[Any],
+                           tip: str) -> tuple[JointGoal | PoseGoal | ConstraintGoal, ...]:
+    """Reads goal_constraints; each entry is one alternative.
+
+    Raises:
+        PlanningError: an entry is empty or has no meaning.
+    """
+    return tuple(_goal(scene, item, tip, f"goal_constraints[{number}]") for number, item in enumerate(constraints))
+
+
+def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | PoseGoal | ConstraintGoal:
+    constraints = constraints_from_message(scene, item, where, ErrorCode.INVALID_GOAL_CONSTRAINTS, tip)
+    if constraints.is_empty:
+        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: no constraint; give joint, position or "
+                            "orientation constraints")
+    joints = constraints.joints
+    if len({joint.name for joint in joints}) == len(joints) and not (constraints.positions or constraints.orientations):
+        return JointGoal({joint.name: joint.target for joint in joints}, {joint.name: joint.below for joint in joints},
+                         {joint.name: joint.above for joint in joints})
+    name = constraints.pose_link
+    if not name:
+        return ConstraintGoal(constraints)
+    link = holding_link(scene, name)
+    in_link = scene.frame_transform(link).actInv(scene.frame_transform(name))
+    return PoseGoal(link, constraints.pose_target(scene.positions) * in_link.inverse(), constraints)
+
+
+def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
+    """Raises PlanningError unless the constraints are empty: an answer that left them out would claim too much."""
+    if any((constraints.joint_constraints, constraints.position_constraints, constraints.orientation_constraints,
+            constraints.visibility_constraints)):
+        raise PlanningError(code, f"{where}: constraints are not supported here; leave them empty")
+
+
+def trajectory_message(trajectory: Trajectory, frame: str) -> RobotTrajectory:
+    """Writes a trajectory with positions, velocities and accelerations."""
+    message = RobotTrajectory()
+    message.joint_trajectory.header.frame_id = frame
+    message.joint_trajectory.joint_names = list(trajectory.joint_names)
+    message.joint_trajectory.points = [
+        JointTrajectoryPoint(positions=row.tolist(), velocities=speed.tolist(), accelerations=change.tolist(),
+                             time_from_start=genpy.Duration.from_sec(float(stamp)))
+        for stamp, row, speed, change in zip(trajectory.times, trajectory.positions, trajectory.velocities,
+                                             trajectory.accelerations, strict=True)]
+    return message

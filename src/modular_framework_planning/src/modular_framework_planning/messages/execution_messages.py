@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns a planned trajectory into what single controllers are told: checked, cut by joints, at another speed."""
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from control_msgs.msg import FollowJointTrajectoryGoal, GripperCommandGoal, JointTolerance
+from genpy import Duration
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
+
+
+@dataclass(frozen=True, slots=True)
+class MotionPart:
+    """The share of one controller in a motion."""
+
+    controller: ControllerSpec
+    trajectory: JointTrajectory
+
+    @property
+    def duration_s(self) -> float:
+        """Time of its last point."""
+        return float(self.trajectory.points[-1].time_from_start.to_sec())
+
+
+def check_trajectory(motion: JointTrajectory) -> None:
+    """Refuses trajectories no controller could follow; raises PlanningError."""
+    count = len(motion.joint_names)
+    if motion.points and not count:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory: {len(motion.points)} points but no "
+                            "joint_names; name the joint of each position")
+    before = -1.0
+    for number, point in enumerate(motion.points):
+        stamp = point.time_from_start.to_sec()
+        if len(point.positions) != count or not np.isfinite(point.positions).all():
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory point {number}: {len(point.positions)} "
+                                f"positions for {count} joints, all must be finite")
+        if stamp <= before:
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory point {number} at {stamp} s does not come "
+                                f"after the one before at {before} s; times must strictly increase")
+        before = stamp
+
+
+def split(motion: JointTrajectory, controllers: Sequence[ControllerSpec]) -> list[MotionPart]:
+    """Returns the part of every controller; joints none of them moves are left out."""
+    parts = []
+    for spec in controllers:
+        columns = [i for i, joint in enumerate(motion.joint_names) if joint in spec.joints]
+        if columns:
+            parts.append(MotionPart(spec, _columns(motion, columns)))
+    return parts
+
+
+def _columns(motion: JointTrajectory, columns: Collection[int]) -> JointTrajectory:
+    part = JointTrajectory(header=motion.header, joint_names=[motion.joint_names[i] for i in columns])
+    for point in motion.points:
+        part.points.append(JointTrajectoryPoint(
+            *([values[i] for i in columns] if values else [] for values in
+              (point.positions, point.velocities, point.accelerations, point.effort)),
+            point.time_from_start))
+    return part
+
+
+def at_speed(motion: JointTrajectory, factor: float) -> JointTrajectory:
+    """Returns the same motion, `factor` times as fast."""
+    if factor == 1.0:
+        return motion
+    faster = JointTrajectory(header=motion.header, joint_names=motion.joint_names)
+    for point in motion.points:
+        faster.points.append(JointTrajectoryPoint(
+            point.positions, [value * factor for value in point.velocities],
+            [value * factor ** 2 for value in point.accelerations], point.effort,
+            Duration.from_sec(point.time_from_start.to_sec() / factor)))
+    return faster
+
+
+def trajectory_goal(part: MotionPart) -> FollowJointTrajectoryGoal:
+    """Returns the goal of a trajectory controller, with the tolerances its configuration sets."""
+    spec = part.controller
+    moved = set(part.trajectory.joint_names)
+    goal = FollowJointTrajectoryGoal(trajectory=part.trajectory)
+    goal.path_tolerance, goal.goal_tolerance = (
+        [JointTolerance(item.joint, item.position, item.velocity, item.acceleration) for item in items
+         if item.joint in moved] for items in (spec.path_tolerances, spec.goal_tolerances))
+    goal.goal_time_tolerance = Duration.from_sec(spec.goal_time_tolerance)
+    return goal
+
+
+def gripper_goal(part: MotionPart) -> GripperCommandGoal:
+    """Returns the goal of a gripper: where the last point is, and the effort it asks for or else the configured one."""
+    names, last = part.trajectory.joint_names, part.trajectory.points[-1]
+    columns = [i for i, name in enumerate(names) if name in part.controller.command_joints] or [0]
+    goal: Any = GripperCommandGoal()
+    goal.command.position = sum(last.positions[i] for i in columns)
+    goal.command.max_effort = last.effort[columns[-1]] if last.effort else part.controller.max_effort
+    return goal

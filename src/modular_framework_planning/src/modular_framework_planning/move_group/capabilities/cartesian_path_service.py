@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Service compute_cartesian_path: straight lines through waypoints, timed, with the reason where they end early."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import rospy
+from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
+
+from modular_framework_planning.cartesian.cartesian_path import (
+    JumpThresholds,
+    Objection,
+    StraightLine,
+    collision_objection,
+    no_objection,
+    straight_line,
+)
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.conversions import (
+    scene_with_state,
+    state_message,
+    trajectory_message,
+    transform_from_pose,
+)
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import JointGroup
+from modular_framework_planning.trajectory_processing.line_timing import time_line
+from modular_framework_planning.trajectory_processing.link_speed import with_limited_link_speed
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lines:
+    """One request, read; `carried` is the pose of what follows the lines in the frame of `link`, which moves it."""
+
+    scene: PlanningScene
+    group: JointGroup
+    solver: InverseKinematics
+    link: str
+    carried: Transform
+    waypoints: tuple[Transform, ...]
+    motion: MotionChecker
+    checker: CollisionChecker | None
+
+
+class CartesianPathService:
+    """Offers compute_cartesian_path (moveit_msgs/GetCartesianPath).
+
+    As in MoveIt the answer is a success with the fraction that was found, also where that is less than 1; the log and
+    ~planning_report say at which waypoint and step it ended, and why. Waypoints in the frame of the moved link itself
+    are relative to the waypoint before.
+    """
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+
+    def connect(self) -> None:
+        """Advertises the service."""
+        rospy.Service(names.CARTESIAN_PATH_SERVICE, GetCartesianPath, self._serve)
+
+    def _serve(self, request: Any) -> GetCartesianPathResponse:
+        response = GetCartesianPathResponse()
+        details: dict[str, Any] = {"group": request.group_name, "fraction": 0.0}
+        try:
+            lines = self._read(request)
+            found = straight_line(lines.solver, lines.link, lines.scene.positions, lines.waypoints, request.max_step,
+                                  JumpThresholds(request.jump_threshold, request.prismatic_jump_threshold,
+                                                 request.revolute_jump_threshold), self._objection(lines, request),
+                                  lines.carried)
+            trajectory = self._timed(lines, found, request)
+        except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+            response.error_code.val = self._context.reporter.failure("cartesian_path", error, **details)
+            return response
+        response.start_state = state_message(lines.scene)
+        response.solution = trajectory_message(trajectory, lines.scene.model.planning_frame)
+        response.fraction = found.fraction
+        response.error_code.val = ErrorCode.SUCCESS
+        if found.stop:
+            rospy.logwarn("cartesian_path: %.1f %% of the lines were followed, until %s", 100.0 * found.fraction,
+                          found.stop)
+        self._context.reporter.report("cartesian_path", ErrorCode.SUCCESS, found.stop,
+                                      **{**details, "fraction": found.fraction, "points": len(trajectory.times)})
+        return response
+
+    def _read(self, request: Any) -> _Lines:
+        """Reads the message; raises PlanningError."""
+        group = self._context.model.group(request.group_name)
+        solver = self._context.kinematics.solver(group.name)
+        if not request.start_state.joint_state.name or request.start_state.is_diff:
+            self._context.monitor.wait_for_state()
+        scene = scene_with_state(self._context.monitor.snapshot(), request.start_state, "start_state")
+        name = (request.link_name or group.tip_link).removeprefix("/")
+        link = holding_link(scene, name)
+        if not link:
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link_name", name,
+                                   [*scene.model.frame_ids, *scene.attached])
+        carried = scene.frame_transform(link).actInv(scene.frame_transform(name))
+        checker = None
+        if request.avoid_collisions:
+            checker = self._context.pipeline("").checker(scene, group, scene.positions)
+        motion = MotionChecker(checker or CollisionChecker(scene, group.indices), group.indices, scene.positions)
+        return _Lines(scene, group, solver, link, carried, _waypoints(scene, name, request), motion, checker)
+
+    def _objection(self, lines: _Lines, request: Any) -> Objection:
+        """Returns what is asked about each step: path constraints, then collisions."""
+        constraints = constraints_from_message(lines.scene, request.path_constraints, "path_constraints",
+                                               tip=lines.link)
+        collides = no_objection
+        if lines.checker is not None:
+            collides = collision_objection(lines.checker, lines.motion,
+                                           self._context.pipeline("").settings.motion_step)
+
+        def objection(before: Array, after: Array) -> str:
+            if not constraints.is_empty and not constraints.satisfied(lines.motion.whole(after)):
+                return f"path_constraints: {constraints.describe(lines.motion.whole(after))}"
+            return collides(before, after)
+
+        return objection
+
+    def _timed(self, lines: _Lines, found: StraightLine, request: Any) -> Trajectory:
+        model, indices = lines.scene.model, lines.group.indices
+        velocity, acceleration = model.max_velocity[indices], model.max_acceleration[indices]
+        step = self._context.pipeline("").settings.motion_step
+
+        def is_free(curve: Array) -> bool:
+            moves = lines.checker is not None and len(found.rows) > 1
+            return not moves or lines.motion.colliding_state(curve, step) is None
+
+        trajectory = time_line(lines.group.joints, found.rows, velocity, acceleration, is_free)
+        if request.max_cartesian_speed <= 0.0:
+            return trajectory
+        link = request.cartesian_speed_limited_link or lines.link
+        if not model.has_link(link):
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "cartesian_speed_limited_link", link, model.frame_ids)
+        return with_limited_link_speed(model, trajectory, lines.motion.whole, link, request.max_cartesian_speed,
+                                       velocity, acceleration)
+
+
+def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Transform, ...]:
+    """Returns the waypoints in the planning frame; raises PlanningError for numbers or frames that cannot be used.
+
+    Args: the scene, the link or held object that follows the lines, the message.
+    """
+    if not math.isfinite(request.max_cartesian_speed):
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_cartesian_speed is {request.max_cartesian_speed}; a "
+                            "finite number is needed, 0 for no limit")
+    poses = [transform_from_pose(pose, f"waypoints[{number}]") for number, pose in enumerate(request.waypoints)]
+    frame = request.header.frame_id.removeprefix("/")
+    base = scene.frame_transform(frame)
+    if frame != follower:
+        return tuple(base * pose for pose in poses)
+    result = []
+    for pose in poses:
+        base = base * pose
+        result.append(base)
+    return tuple(result)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Services compute_ik and compute_fk."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.srv import (
+    GetPositionFK,
+    GetPositionFKResponse,
+    GetPositionIK,
+    GetPositionIKResponse,
+)
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_planning.kinematics.solution_choice import clearest, first_free
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.conversions import (
+    pose_message,
+    scene_with_state,
+    stamped_in_scene,
+    state_message,
+)
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import JointGroup
+
+LONGEST_TIMEOUT_S = 10.0
+MOST_COMPARED = 4  # free solutions whose clearance decides between them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wanted:
+    """What compute_ik is asked for.
+
+    Attributes:
+        link: the one that is moved.
+        placed: pose, in its frame, of what is to be placed: the link itself, a held object or one of its subframes.
+        target: where that shall be, in the planning frame.
+    """
+
+    link: str
+    placed: Transform
+    target: Transform
+
+    def solutions(self, solver: InverseKinematics, seed: Array, timeout_s: float | None) -> list[Array]:
+        """Returns positions of the whole robot, nearest to the seed first; of the position alone where the group's
+        settings say so."""
+        if solver.settings.position_only:
+            return solver.position_solutions(self.link, self.placed.translation, self.target.translation, seed,
+                                             timeout_s)
+        return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
+
+    def why_none(self, solver: InverseKinematics, seed: Array) -> str:
+        """Says why there is no solution."""
+        if solver.settings.position_only:
+            where = np.array2string(self.target.translation, precision=3, separator=", ")
+            return (f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
+                    f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)")
+        return solver.explain_unreachable(self.link, self.target * self.placed.inverse(), seed)
+
+
+class KinematicsService:
+    """Offers compute_ik (GetPositionIK) and compute_fk (GetPositionFK)."""
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+
+    def connect(self) -> None:
+        """Advertises both services."""
+        rospy.Service(names.IK_SERVICE, GetPositionIK, self._serve_ik)
+        rospy.Service(names.FK_SERVICE, GetPositionFK, self._serve_fk)
+
+    def _scene(self, state: Any) -> PlanningScene:
+        if not state.joint_state.name or state.is_diff:
+            self._context.monitor.wait_for_state()
+        scene = scene_with_state(self._context.monitor.snapshot(), state)
+        if not np.isfinite(scene.positions).all():
+            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
+        return scene
+
+    def _serve_ik(self, service: Any) -> GetPositionIKResponse:
+        request = service.ik_request
+        response = GetPositionIKResponse()
+        details = {"group": request.group_name}
+        try:
+            scene = self._scene(request.robot_state)
+            positions = self._solve(scene, request)
+        except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+            response.error_code.val = self._context.reporter.failure("ik", error, **details)
+            return response
+        response.solution = state_message(scene, positions)
+        response.error_code.val = ErrorCode.SUCCESS
+        self._context.reporter.report("ik", ErrorCode.SUCCESS, "", **details)
+        return response
+
+    def _solve(self, scene: PlanningScene, request: Any) -> Array:
+        """Returns the solution nearest to the seed; raises PlanningError with the cause."""
+        group = self._context.model.group(request.group_name)
+        solver = self._context.kinematics.solver(group.name)
+        wanted = self._target(scene, group, request)
+        link = wanted.link
+        found = wanted.solutions(solver, scene.positions, self._timeout(request))
+        if not found:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, wanted.why_none(solver, scene.positions))
+        kept = self._constrained(scene, request, found, link)
+        if not request.avoid_collisions:
+            return kept[0]
+        checker = CollisionChecker(scene, group.indices)
+        free = first_free(kept, checker.is_free, MOST_COMPARED)
+        if free:
+            return clearest(free, scene.positions, checker.distance)
+        contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
+        raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(kept)} inverse kinematics solutions for '{link}' "
+                            f"collide; the nearest: {contacts}")
+
+    @staticmethod
+    def _timeout(request: Any) -> float | None:
+        """Returns the time asked for; None for the group's own."""
+        asked = request.timeout.to_sec()
+        return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
+
+    @staticmethod
+    def _target(scene: PlanningScene, group: JointGroup, request: Any) -> _Wanted:
+        """Reads what is to be placed where; raises PlanningError."""
+        links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
+        if len(links) > 1 or len(poses) > 1:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"{len(links)} ik_link_names and {len(poses)} poses in "
+                                "pose_stamped_vector; several tips at once are not supported: ask for one link with "
+                                "ik_link_name and pose_stamped")
+        name = ((links[0] if links else request.ik_link_name) or group.tip_link).removeprefix("/")
+        target = stamped_in_scene(scene, poses[0] if poses else request.pose_stamped, "pose_stamped")
+        link = holding_link(scene, name)
+        if not link:
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name,
+                                   [*scene.model.frame_ids, *scene.attached])
+        return _Wanted(link, scene.frame_transform(link).actInv(scene.frame_transform(name)), target)
+
+    @staticmethod
+    def _constrained(scene: PlanningScene, request: Any, found: list[Array], link: str) -> list[Array]:
+        """Returns the solutions that satisfy the request's constraints; raises PlanningError where none does."""
+        constraints = constraints_from_message(scene, request.constraints, "ik_request.constraints",
+                                               ErrorCode.NO_IK_SOLUTION, link)
+        kept = [positions for positions in found if constraints.satisfied(positions)]
+        if not kept:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"none of {len(found)} inverse kinematics solutions for "
+                                f"'{link}' satisfies the constraints; the nearest: {constraints.describe(found[0])}")
+        return kept
+
+    def _serve_fk(self, request: Any) -> GetPositionFKResponse:
+        response = GetPositionFKResponse()
+        try:
+            if not request.fk_link_names:
+                raise PlanningError(ErrorCode.INVALID_LINK_NAME, "fk_link_names is empty; name at least one link")
+            scene = self._scene(request.robot_state)
+            base = scene.frame_transform(request.header.frame_id)
+            transforms = scene.model.link_transforms(scene.positions)
+            for link in request.fk_link_names:
+                if link not in transforms:
+                    raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, transforms)
+                stamped = PoseStamped(pose=pose_message(base.actInv(transforms[link])))
+                stamped.header.frame_id = request.header.frame_id or scene.model.planning_frame
+                stamped.header.stamp = rospy.Time.now()
+                response.pose_stamped.append(stamped)
+                response.fk_link_names.append(link)
+        except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+            code = self._context.reporter.failure("fk", error)
+            response = GetPositionFKResponse()
+            response.error_code.val = code
+            return response
+        response.error_code.val = ErrorCode.SUCCESS
+        return response

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Service check_state_validity: says whether a state is free, within bounds and keeps constraints, and what is off."""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import rospy
+from moveit_msgs.msg import ContactInformation
+from moveit_msgs.srv import GetStateValidity, GetStateValidityResponse
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker, Contact
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.messages.constraint_conversions import evaluated_one_by_one, result_messages
+from modular_framework_planning.messages.conversions import BODY_TYPES, scene_with_state
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.context import MoveGroupContext
+
+
+class StateValidationService:
+    """Offers check_state_validity (moveit_msgs/GetStateValidity)."""
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+
+    def connect(self) -> None:
+        """Advertises the service."""
+        rospy.Service(names.STATE_VALIDITY_SERVICE, GetStateValidity, self._serve)
+
+    def _serve(self, request: Any) -> GetStateValidityResponse:
+        try:
+            return self._answer(request)
+        except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+            self._context.reporter.failure("validity", error, group=request.group_name)
+            return GetStateValidityResponse(valid=False)
+
+    def _answer(self, request: Any) -> GetStateValidityResponse:
+        """Looks at the state; raises PlanningError for a request without meaning.
+
+        The response lists every contact and one result a constraint (joints, then positions, then orientations, then
+        visibility); one that is refused is not satisfied, its distance is infinite, the log has the reason. Cost
+        sources stay empty: the scene has no costs, a place is either free or not.
+        """
+        if not request.robot_state.joint_state.name or request.robot_state.is_diff:
+            self._context.monitor.wait_for_state()
+        scene = scene_with_state(self._context.monitor.snapshot(), request.robot_state)
+        model = self._context.model
+        if not np.isfinite(scene.positions).all():
+            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
+        group = model.group(request.group_name) if request.group_name else None
+        moving = [int(number) for number in (group.indices if group else range(len(model.joint_names)))]
+        contacts = CollisionChecker(scene, moving).contacts(scene.positions, include_fixed=group is None)
+        problems = model.bound_violations(scene.positions, moving, 1e-6)
+        results, refused = evaluated_one_by_one(scene, request.constraints, "constraints",
+                                                group.tip_link if group else "")
+        if refused:
+            self._context.reporter.report("validity", ErrorCode.INVALID_GOAL_CONSTRAINTS, "; ".join(refused),
+                                          group=request.group_name)
+        problems += [item.text for item in results if not item.satisfied]
+        if problems:
+            rospy.logdebug("state not valid: %s", "; ".join(problems))
+        return GetStateValidityResponse(valid=not contacts and not problems,
+                                        contacts=[self._contact(item, model.planning_frame) for item in contacts],
+                                        constraint_result=result_messages(results))
+
+    @staticmethod
+    def _contact(contact: Contact, frame: str) -> ContactInformation:
+        message = ContactInformation(depth=contact.depth, contact_body_1=contact.first.name,
+                                     body_type_1=BODY_TYPES[contact.first.kind], contact_body_2=contact.second.name,
+                                     body_type_2=BODY_TYPES[contact.second.kind])
+        message.header.frame_id = frame
+        message.position.x, message.position.y, message.position.z = (float(v) for v in contact.position)
+        message.normal.x, message.normal.y, message.normal.z = (float(v) for v in contact.normal)
+        return message

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Publishes tf of the objects in the planning scene, so that other nodes can ask where they are."""
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+
+from modular_framework_planning.geometry.spatial import Transform
+from modular_framework_planning.messages.conversions import pose_message
+from modular_framework_planning.move_group.context import MoveGroupContext
+
+DEFAULT_RATE_HZ = 10.0
+
+
+class TfPublisher:
+    """Broadcasts a frame for every world and attached object, and for each of their subframes ("object/subframe").
+
+    Parameters: ~planning_scene_frame_publishing_rate (10) [Hz], ~planning_scene_tf_prefix ("").
+    """
+
+    def __init__(self, context: MoveGroupContext) -> None:
+        self._context = context
+        self._rate_hz = float(rospy.get_param("~planning_scene_frame_publishing_rate", DEFAULT_RATE_HZ))
+        self._prefix = str(rospy.get_param("~planning_scene_tf_prefix", "")).rstrip("/")
+
+    def connect(self) -> None:
+        """Starts to broadcast."""
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._timer = rospy.Timer(rospy.Duration(1.0 / max(self._rate_hz, 0.1)), self._publish)
+
+    def _publish(self, _: Any) -> None:
+        scene = self._context.monitor.snapshot()
+        frames = []
+        bodies = [(body, scene.model.planning_frame) for body in scene.objects.values()]
+        bodies += [(held.body, held.link) for held in scene.attached.values()]
+        for body, parent in bodies:
+            frames.append(self._frame(parent, body.name, body.pose))
+            frames += [self._frame(parent, f"{body.name}/{name}", body.pose * pose)
+                       for name, pose in body.subframes.items()]
+        if frames:
+            self._broadcaster.sendTransform(frames)
+
+    def _frame(self, parent: str, name: str, pose: Transform) -> TransformStamped:
+        message = TransformStamped(child_frame_id=f"{self._prefix}/{name}" if self._prefix else name)
+        message.header.frame_id, message.header.stamp = parent, rospy.Time.now()
+        place = pose_message(pose)
+        t = message.transform.translation
+        t.x, t.y, t.z = place.position.x, place.position.y, place.position.z
+        message.transform.rotation = place.orientation
+        return message

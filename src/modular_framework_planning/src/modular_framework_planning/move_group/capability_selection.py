@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which endpoints the node offers: MoveIt's default set, with those that parameters add and without those they drop."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import rospy
+
+from modular_framework_planning.move_group.context import MoveGroupContext
+
+PIPELINES = "~planning_pipelines"
+
+
+class Endpoint(Protocol):
+    """Services, actions or topics that start with `connect`."""
+
+    def connect(self) -> None:
+        """Advertises."""
+
+
+@dataclass(frozen=True, slots=True)
+class Capability:
+    """An endpoint that parameters may name.
+
+    Attributes:
+        name: as MoveIt's plugin of the same purpose.
+        build: makes the endpoint.
+        default: offered unless `disable_capabilities` names it; otherwise only where `capabilities` does.
+    """
+
+    name: str
+    build: Callable[[MoveGroupContext], Endpoint]
+    default: bool = True
+
+
+def chosen_capabilities(table: Sequence[Capability]) -> list[Callable[[MoveGroupContext], Endpoint]]:
+    """Reads ~capabilities, ~planning_pipelines/*/capabilities and ~disable_capabilities, each separated by spaces.
+
+    An unknown name is a warning with the list of those that are known, as in MoveIt.
+    """
+    wanted = [(rospy.resolve_name("~capabilities"), name) for name in _words(rospy.get_param("~capabilities", ""))]
+    for pipeline, settings in (rospy.get_param(PIPELINES, {}) or {}).items():
+        if isinstance(settings, dict):
+            wanted += [(rospy.resolve_name(f"{PIPELINES}/{pipeline}/capabilities"), name)
+                       for name in _words(settings.get("capabilities", ""))]
+    disabled = [(rospy.resolve_name("~disable_capabilities"), name)
+                for name in _words(rospy.get_param("~disable_capabilities", ""))]
+    known = list(dict.fromkeys(item.name for item in table))
+    for where, name in (*wanted, *disabled):
+        if name not in known:
+            rospy.logwarn("%s names '%s', which is not offered; known: %s", where, name, ", ".join(known))
+    added, dropped = ({name for _, name in items} for items in (wanted, disabled))
+    return [item.build for item in table if (item.default or item.name in added) and item.name not in dropped]
+
+
+def _words(value: object) -> list[str]:
+    """Splits a parameter; a list is taken as it is."""
+    return [str(item) for item in value] if isinstance(value, list) else str(value or "").split()

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers of a robot as the executor sees them: which there are, and how one is told to move."""
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, GripperCommandAction
+
+from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.messages.execution_messages import MotionPart, gripper_goal, trajectory_goal
+from modular_framework_planning.trajectory_execution.controllers import (
+    ACTION_KINDS,
+    GRIPPER,
+    ControllerSpec,
+    parse_controllers,
+)
+
+POLL_S = 0.01
+ACTION_TYPES = dict(zip(ACTION_KINDS, (FollowJointTrajectoryAction, GripperCommandAction), strict=True))
+
+
+class RunningMotion(Protocol):
+    """A motion one controller is at."""
+
+    def is_done(self) -> bool:
+        """Whether the controller says that it has done it; raises PlanningError when it failed."""
+
+    def cancel(self) -> None:
+        """Asks the controller to stop; nothing happens when it has ended."""
+
+
+class ControllerManager(Protocol):
+    """All controllers of a robot."""
+
+    may_switch: bool
+
+    def connect(self) -> None:
+        """Starts to look for the controllers."""
+
+    def describe(self) -> str:
+        """Says how many controllers there are, or where they are asked for."""
+
+    def controllers(self) -> tuple[ControllerSpec, ...]:
+        """Returns the controllers there are now; raises PlanningError when they cannot be known."""
+
+    def prepare(self, parts: Sequence[MotionPart]) -> None:
+        """Waits until the controllers of these parts would take a goal; raises PlanningError."""
+
+    def begin(self, part: MotionPart) -> RunningMotion:
+        """Starts a motion."""
+
+
+def listed_controllers(kinds: Sequence[str] = ACTION_KINDS, default_kind: str = "") -> tuple[ControllerSpec, ...]:
+    """Returns the usable controllers of ~controller_list; what is wrong with the others goes to the log."""
+    where = rospy.resolve_name("~controller_list")
+    specs, faults = parse_controllers(rospy.get_param(where, None) or [], kinds, default_kind)
+    for fault in faults:
+        rospy.logerr("%s: %s; this controller is left out", where, fault)
+    return tuple(specs)
+
+
+class ActionControllers:
+    """The controllers of ~controller_list, each reached by its action; they are taken to be running.
+
+    Action clients: <name>/<action_ns> of every controller (control_msgs/FollowJointTrajectory or GripperCommand).
+    """
+
+    may_switch = False
+
+    def __init__(self, specs: tuple[ControllerSpec, ...], timeout_s: float) -> None:
+        self._specs = specs
+        self._timeout_s = timeout_s
+        self._clients: dict[str, Any] = {}
+
+    def connect(self) -> None:
+        """Starts to look for the actions."""
+        for spec in self._specs:
+            self._client(spec)
+
+    def describe(self) -> str:
+        """Says how many there are."""
+        return f"{len(self._specs)} controllers"
+
+    def controllers(self) -> tuple[ControllerSpec, ...]:
+        """Returns those listed."""
+        return self._specs
+
+    def _client(self, spec: ControllerSpec) -> Any:
+        if spec.action not in self._clients:
+            self._clients[spec.action] = SteadyActionClient(spec.action, ACTION_TYPES[spec.kind])
+        return self._clients[spec.action]
+
+    def prepare(self, parts: Sequence[MotionPart]) -> None:
+        """Waits for the actions; raises PlanningError naming one that is not there."""
+        for spec in (part.controller for part in parts):
+            # real time: while a simulation is paused, simulated time never runs out
+            deadline = time.monotonic() + self._timeout_s
+            while not _is_connected(self._client(spec).action_client):
+                if time.monotonic() > deadline or rospy.is_shutdown():
+                    raise PlanningError(ErrorCode.CONTROL_FAILED, f"action {rospy.resolve_name(spec.action)} of "
+                                        f"controller '{spec.name}' did not answer within {self._timeout_s:.1f} s; is "
+                                        "the controller running?")
+                rospy.rostime.wallsleep(POLL_S)
+
+    def begin(self, part: MotionPart) -> RunningMotion:
+        """Sends the goal."""
+        client = self._client(part.controller)
+        client.send_goal(gripper_goal(part) if part.controller.kind == GRIPPER else trajectory_goal(part))
+        return ActionMotion(part.controller, client)
+
+
+class ActionMotion:
+    """A goal some controller's action server works on."""
+
+    def __init__(self, spec: ControllerSpec, client: Any) -> None:
+        self._spec = spec
+        self._client = client
+
+    def is_done(self) -> bool:
+        """Whether the goal has ended well; raises PlanningError in the controller's words when it has not."""
+        # the status of the goal is final some time before its result is here; DONE means that both are
+        if self._client.simple_state != actionlib.SimpleGoalState.DONE:
+            return False
+        state, result = self._client.get_state(), self._client.get_result()
+        is_gripper = self._spec.kind == GRIPPER
+        if state == GoalStatus.SUCCEEDED and (is_gripper or getattr(result, "error_code", 0) == 0):
+            return True
+        if is_gripper and self._spec.allow_failure and state == GoalStatus.ABORTED:
+            rospy.loginfo("controller '%s' gave up, which its allow_failure permits", self._spec.name)
+            return True
+        code = getattr(result, "error_code", None)
+        text = getattr(result, "error_string", "") or self._client.get_goal_status_text()
+        raise PlanningError(ErrorCode.PREEMPTED if state == GoalStatus.PREEMPTED else ErrorCode.CONTROL_FAILED,
+                            f"controller '{self._spec.name}' ended with {GoalStatus.to_string(state)}"
+                            f"{'' if code is None else f', error_code {code}'}: {text or 'no text'}")
+
+    def cancel(self) -> None:
+        """Cancels the goal."""
+        self._client.cancel_goal()
+
+
+def _is_connected(client: actionlib.ActionClient) -> bool:
+    """Whether an action server listens to all that a client says, and the client to all that it says."""
+    ends = (client.pub_goal, client.pub_cancel, client.result_sub, client.feedback_sub, client.status_sub)
+    return all(end.get_num_connections() > 0 for end in ends)

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Executes trajectories: chooses controllers, checks the start, watches the time, listens for a stop."""
+from __future__ import annotations
+
+import math
+import threading
+from typing import Any
+
+import numpy as np
+import rospy
+from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
+
+from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
+from modular_framework_planning.messages.execution_messages import MotionPart, at_speed, check_trajectory, split
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.controllers.action_controllers import (
+    POLL_S,
+    ActionControllers,
+    ControllerManager,
+    RunningMotion,
+    listed_controllers,
+)
+from modular_framework_planning.move_group.controllers.fake_controllers import FakeControllers
+from modular_framework_planning.move_group.controllers.ros_control import RosControlControllers
+from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, GRIPPER, choose_controllers
+from modular_framework_planning.trajectory_execution.execution_settings import (
+    ExecutionSettings,
+    parse_execution_settings,
+)
+
+SETTLE_TIMEOUT_S = 1.0
+SETTLED_RAD = 1.0e-4
+STOP_TIMEOUT_S = 1.0
+START_STATE_TIMEOUT_S = 0.5
+SIMPLE_MANAGER = "moveit_simple_controller_manager/MoveItSimpleControllerManager"
+FAKE_MANAGER = "moveit_fake_controller_manager/MoveItFakeControllerManager"
+ROS_CONTROL_MANAGER = "moveit_ros_control_interface/MoveItControllerManager"
+ALL_ROS_CONTROL_MANAGERS = "moveit_ros_control_interface/MoveItMultiControllerManager"
+
+
+class TrajectoryExecution:
+    """Executes one motion at a time.
+
+    Subscribes: trajectory_execution_event (std_msgs/String "stop").
+
+    Args:
+        manager: the controllers; None where this node is only to plan.
+    """
+
+    def __init__(self, manager: ControllerManager | None, settings: ExecutionSettings, monitor: SceneMonitor) -> None:
+        self.manager = manager
+        self.settings = settings
+        self._monitor = monitor
+        self._stop = threading.Event()
+        self._busy = threading.Lock()
+
+    def connect(self) -> None:
+        """Starts to listen for stop events and to look for the controllers."""
+        rospy.Subscriber(names.EXECUTION_EVENT_TOPIC, String, self._on_event, queue_size=5)
+        if self.manager is not None:
+            self.manager.connect()
+
+    def close(self) -> None:
+        """Stops a motion under way and waits for that; to be called while topics are still open."""
+        self._stop.set()
+        if self._busy.acquire(timeout=STOP_TIMEOUT_S):
+            self._busy.release()
+
+    def _on_event(self, message: String) -> None:
+        if message.data == "stop":
+            rospy.loginfo("trajectory_execution_event: stopping the motion")
+            self._stop.set()
+        else:
+            rospy.logwarn("%s: event '%s' is not known; known: stop", rospy.resolve_name(names.EXECUTION_EVENT_TOPIC),
+                          message.data)
+
+    def describe(self) -> str:
+        """Says whose controllers execute motions."""
+        return "no execution of motions" if self.manager is None else self.manager.describe()
+
+    def execute(self, trajectory: Any, cancelled: threading.Event) -> None:
+        """Executes a RobotTrajectory and returns when the robot is there.
+
+        Raises:
+            PlanningError: what went wrong, in the controller's words where it spoke.
+        """
+        if self.manager is None:
+            raise PlanningError(ErrorCode.CONTROL_FAILED, f"{rospy.resolve_name('~allow_trajectory_execution')} is "
+                                "false: this move_group plans only")
+        if trajectory.multi_dof_joint_trajectory.points:
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "multi_dof_joint_trajectory is not supported")
+        check_trajectory(trajectory.joint_trajectory)
+        if not trajectory.joint_trajectory.points:
+            return
+        if not self._busy.acquire(blocking=False):
+            raise PlanningError(ErrorCode.CONTROL_FAILED, "another motion is under way; wait for its end or stop it")
+        try:
+            self._stop.clear()
+            motion = at_speed(trajectory.joint_trajectory, self.settings.execution_velocity_scaling)
+            parts = self._parts(motion, self.manager)
+            self._check_start(motion)
+            if self._is_there_already(motion, parts):
+                return
+            self.manager.prepare(parts)
+            self._run(parts, self.manager, _delay_s(motion), cancelled)
+            if self.settings.wait_for_trajectory_completion:
+                self._settle(motion.joint_names)
+        finally:
+            self._busy.release()
+
+    def _parts(self, motion: JointTrajectory, manager: ControllerManager) -> list[MotionPart]:
+        followers = self._monitor.model.follower_joints
+        joints = [joint for joint in motion.joint_names if joint not in followers]
+        return split(motion, choose_controllers(joints or motion.joint_names, manager.controllers(),
+                                                manager.may_switch))
+
+    def _check_start(self, motion: JointTrajectory) -> None:
+        if not any(self.settings.start_tolerance(joint) > 0.0 for joint in motion.joint_names):
+            return
+        self._monitor.wait_for_state()
+        away = self._far_joint(motion)
+        if away and self._monitor.wait_for_next_state(START_STATE_TIMEOUT_S):
+            away = self._far_joint(motion)
+        if away:
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, away)
+
+    def _far_joint(self, motion: JointTrajectory) -> str:
+        """Says which joint is furthest beyond its tolerance from the first point; empty where none is."""
+        model, now = self._monitor.model, self._monitor.positions()
+        worst, sentence = 0.0, ""
+        for joint, wanted in zip(motion.joint_names, motion.points[0].positions, strict=True):
+            tolerance, number = self.settings.start_tolerance(joint), model.index.get(joint)
+            if number is None or tolerance <= 0.0:
+                continue
+            gap = now[number] - wanted
+            gap = abs(math.remainder(gap, math.tau) if model.is_continuous(number) else gap)
+            if gap > max(worst, tolerance):
+                worst = gap
+                sentence = (f"joint '{joint}' is {gap:.4f} from the trajectory's first point (allowed_start_tolerance "
+                            f"{tolerance}); plan again from the current state")
+        return sentence
+
+    def _is_there_already(self, motion: JointTrajectory, parts: list[MotionPart]) -> bool:
+        """Whether a motion ends where it starts and was seen to start where the robot is.
+
+        Controllers refuse such a motion: its only point is due at once. Grippers do not: their goal is also a force.
+        """
+        return (motion.points[-1].time_from_start.to_sec() <= 0.0
+                and all(self.settings.start_tolerance(joint) > 0.0 for joint in motion.joint_names)
+                and all(part.controller.kind != GRIPPER for part in parts))
+
+    def _run(self, parts: list[MotionPart], manager: ControllerManager, delay_s: float,
+             cancelled: threading.Event) -> None:
+        begun = rospy.Time.now()
+        running: list[tuple[MotionPart, RunningMotion]] = []
+        try:
+            for part in parts:
+                running.append((part, manager.begin(part)))
+            while running:
+                if cancelled.is_set() or self._stop.is_set() or rospy.is_shutdown():
+                    raise PlanningError(ErrorCode.PREEMPTED, "the motion was stopped on request")
+                running = [item for item in running if not item[1].is_done()]
+                self._check_time([part for part, _ in running], (rospy.Time.now() - begun).to_sec() - delay_s)
+                cancelled.wait(POLL_S)
+        finally:
+            for _, motion in running:
+                motion.cancel()
+
+    def _check_time(self, parts: list[MotionPart], elapsed_s: float) -> None:
+        for part in parts if self.settings.execution_duration_monitoring else ():
+            scaling, margin_s = part.controller.duration_scaling, part.controller.duration_margin
+            allowed_s = part.duration_s * (self.settings.allowed_execution_duration_scaling if scaling is None
+                                           else scaling)
+            allowed_s += self.settings.allowed_goal_duration_margin if margin_s is None else margin_s
+            if elapsed_s > allowed_s:
+                raise PlanningError(ErrorCode.TIMED_OUT, f"the motion should take {part.duration_s:.2f} s and was not "
+                                    f"done after {elapsed_s:.2f} s (allowed {allowed_s:.2f} s); waiting for "
+                                    f"{', '.join(late.controller.name for late in parts)}")
+
+    def _settle(self, joint_names: list[str]) -> None:
+        """Waits until the joints stand still, so that the next plan starts from where the robot stays."""
+        index = self._monitor.model.index
+        numbers = [index[name] for name in joint_names if name in index]
+        end = rospy.Time.now() + rospy.Duration(SETTLE_TIMEOUT_S)
+        before = self._monitor.positions()[numbers]
+        while rospy.Time.now() < end and self._monitor.wait_for_next_state(SETTLE_TIMEOUT_S):
+            now = self._monitor.positions()[numbers]
+            if np.abs(now - before).max() < SETTLED_RAD:
+                return
+            before = now
+
+
+def _delay_s(motion: JointTrajectory) -> float:
+    """Returns how long a motion that is to begin at a given time still has to wait [s]."""
+    stamp = motion.header.stamp
+    return 0.0 if stamp.is_zero() else max((stamp - rospy.Time.now()).to_sec(), 0.0)
+
+
+def load_execution(monitor: SceneMonitor) -> TrajectoryExecution:
+    """Builds the executor from ~trajectory_execution, ~allow_trajectory_execution and ~moveit_controller_manager.
+
+    Raises:
+        ModelError: a controller manager of that name does not exist.
+    """
+    settings, faults = parse_execution_settings(rospy.get_param("~trajectory_execution", {}) or {})
+    for fault in faults:
+        rospy.logerr("%s/%s; the default is used", rospy.resolve_name("~trajectory_execution"), fault)
+    allowed = rospy.get_param("~allow_trajectory_execution", True)
+    manager = _load_manager(settings.controller_connection_timeout, monitor) if allowed else None
+    return TrajectoryExecution(manager, settings, monitor)
+
+
+def _load_manager(timeout_s: float, monitor: SceneMonitor) -> ControllerManager:
+    name = str(rospy.get_param("~moveit_controller_manager", "") or SIMPLE_MANAGER)
+    match name.replace("::", "/"):
+        case known if known == SIMPLE_MANAGER:
+            return ActionControllers(listed_controllers(), timeout_s)
+        case known if known == FAKE_MANAGER:
+            return FakeControllers(listed_controllers(FAKE_KINDS, FAKE_KINDS[0]), monitor)
+        case known if known in (ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS):
+            only = str(rospy.get_param("~ros_control_namespace", "/")) if known == ROS_CONTROL_MANAGER else None
+            may_switch = bool(rospy.get_param("~moveit_manage_controllers", False))
+            return RosControlControllers(listed_controllers(), only, may_switch, timeout_s)
+    raise ModelError(f"parameter {rospy.resolve_name('~moveit_controller_manager')}: '{name}' is not known; known: "
+                     f"{', '.join((SIMPLE_MANAGER, FAKE_MANAGER, ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS))}")

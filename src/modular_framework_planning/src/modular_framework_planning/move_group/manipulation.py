@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Works on a goal of pickup or place: tries its ways in order, says why each failed, executes the first that goes."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import genpy
+import numpy as np
+from moveit_msgs.msg import RobotTrajectory
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message
+from modular_framework_planning.messages.conversions import state_message, trajectory_message
+from modular_framework_planning.messages.manipulation_messages import Hand
+from modular_framework_planning.move_group.capabilities.move_action import check_options, scene_change
+from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.motion_watch import WatchedMotion
+from modular_framework_planning.pick_place.manipulation import Arm, Manoeuvre, ManoeuvrePlanner, SceneChange, Stage
+from modular_framework_planning.planning_interface.planning_request import PlanningRequest
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
+from modular_framework_planning.robot_model.robot_model import JointGroup
+
+DEFAULT_PLANNING_TIME_S = 5.0
+FINGER_SETTLE_S = 0.5
+REASONS_TOLD = 10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """What pickup and place differ in.
+
+    Attributes:
+        kind: of the report.
+        check: refuses goals that no way could save.
+        ways: numbers of the ways in the goal, best first.
+        read: returns the manoeuvre of a way.
+        accept: notes in the result which way was taken.
+    """
+
+    kind: str
+    goal: Any
+    group: str
+    end_effector: str
+    check: Callable[[PlanningScene], None]
+    ways: Sequence[int]
+    read: Callable[[PlanningScene, int, Hand], Manoeuvre]
+    accept: Callable[[int], None]
+
+
+@dataclass(slots=True)
+class _Attempts:
+    """Ways that failed so far."""
+
+    failures: list[tuple[str, PlanningError]] = field(default_factory=list)
+
+    def error(self) -> PlanningError:
+        """Joins the reasons; the code is that of all of them, or PLANNING_FAILED where they differ."""
+        codes = {error.code for _, error in self.failures}
+        told = [error.reason for _, error in self.failures[:REASONS_TOLD]]
+        more = len(self.failures) - len(told)
+        return PlanningError(codes.pop() if len(codes) == 1 else ErrorCode.PLANNING_FAILED,
+                             f"none of {len(self.failures)} ways can be done: " + " | ".join(told)
+                             + (f" | and {more} more" if more else ""))
+
+    def entries(self) -> list[dict[str, Any]]:
+        """For the report."""
+        return [{"id": name, "error_code": int(error.code), "reason": error.reason} for name, error in self.failures]
+
+
+class Manipulation:
+    """One goal."""
+
+    def __init__(self, context: MoveGroupContext, task: Task, cancelled: threading.Event,
+                 feedback: Callable[[str], None]) -> None:
+        self._context, self._task, self._cancelled, self._feedback = context, task, cancelled, feedback
+        self._attempts = _Attempts()
+        self._grasped = False
+
+    def run(self, result: Any) -> str:
+        """Fills the result and returns a sentence about it; failures come back as a code with their reason."""
+        task, options = self._task, self._task.goal.planning_options
+        details: dict[str, Any] = {"group": task.group}
+        try:
+            check_options(options)
+            tries = self._context.settings.plan_execution.attempts(options)
+            for number in range(tries):
+                try:
+                    self._once(result)
+                    break
+                except PlanningError as error:
+                    last = number + 1 == tries or self._grasped or self._cancelled.wait(options.replan_delay)
+                    if last or error.code != ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
+                        raise
+        except Exception as error:  # noqa: BLE001 - the client must get a code; the reporter logs the error
+            result.error_code.val = self._context.reporter.failure(task.kind, error, **details,
+                                                                   attempts=self._attempts.entries())
+            return str(error)
+        result.error_code.val = ErrorCode.SUCCESS
+        self._context.reporter.report(task.kind, ErrorCode.SUCCESS, "", **details, attempts=self._attempts.entries(),
+                                      stages=list(result.trajectory_descriptions))
+        return "planned" if options.plan_only else "planned and executed"
+
+    def _once(self, result: Any) -> None:
+        options = self._task.goal.planning_options
+        self._attempts.failures.clear()
+        self._feedback("PLANNING")
+        self._context.monitor.wait_for_state()
+        change = scene_change(options, not options.plan_only)
+        scene = change(self._context.monitor.snapshot())
+        stages = self._planned(scene, result)
+        result.trajectory_start = state_message(scene)
+        result.trajectory_stages = [self._message(stage) for stage in stages]
+        result.trajectory_descriptions = [stage.name for stage in stages]
+        if options.plan_only:
+            return
+        self._feedback("MONITOR")
+        for stage, message in zip(stages, result.trajectory_stages, strict=True):
+            self._execute(stage, message, change)
+
+    # ---------------------------------------------------------------- planning
+    def _planned(self, scene: PlanningScene, result: Any) -> tuple[Stage, ...]:
+        """Returns the stages of the first way that can be done; raises PlanningError with the reasons of all."""
+        task, begun = self._task, time.monotonic()
+        model = self._context.model
+        group, effector = choose_end_effector(model, task.group, task.end_effector)
+        fingers = frozenset(model.group(effector.group).joints)
+        hand = Hand(effector.parent_link, hand_links(model, effector), fingers,
+                    {name: mimic for name, mimic in model.document.mimics.items() if mimic.leader in fingers})
+        task.check(scene)
+        ways = [(way, task.read(scene, way, hand)) for way in task.ways]
+        planner = self._planner(scene, group, hand)
+        for number, (way, manoeuvre) in enumerate(ways):
+            if self._cancelled.is_set():
+                raise PlanningError(ErrorCode.PREEMPTED, "cancelled while planning")
+            try:
+                stages = planner.plan(manoeuvre, planner.remaining_s / (len(ways) - number))
+            except PlanningError as error:
+                if error.code == ErrorCode.PREEMPTED:
+                    raise
+                self._attempts.failures.append((manoeuvre.name, error))
+                continue
+            task.accept(way)
+            result.planning_time = time.monotonic() - begun
+            return stages
+        raise self._attempts.error()
+
+    def _planner(self, scene: PlanningScene, group: JointGroup, hand: Hand) -> ManoeuvrePlanner:
+        goal, model = self._task.goal, self._context.model
+        allowed_s = goal.allowed_planning_time
+        if not np.isfinite(allowed_s):
+            raise PlanningError(ErrorCode.TIMED_OUT, f"allowed_planning_time is {allowed_s}; a finite number of "
+                                "seconds is needed")
+        settings = self._context.pipeline("").settings
+        constraints = constraints_from_message(scene, goal.path_constraints, "path_constraints")
+        arm = Arm(group, hand.link, self._context.kinematics.solver(group.name),
+                  model.max_velocity[group.indices] * settings.default_velocity_scaling_factor,
+                  model.max_acceleration[group.indices] * settings.default_acceleration_scaling_factor)
+        request = PlanningRequest(scene, group.name, (), goal.planner_id, 1,
+                                  allowed_s if allowed_s > 0.0 else DEFAULT_PLANNING_TIME_S,
+                                  cancelled=self._cancelled.is_set,
+                                  path_constraints=None if constraints.is_empty else constraints)
+        return ManoeuvrePlanner(arm, self._context.plan, request, settings.start_state_contact_tolerance,
+                                self._context.settings.pick_place)
+
+    # ---------------------------------------------------------------- execution
+    def _message(self, stage: Stage) -> RobotTrajectory:
+        model = self._context.model
+        if stage.motion is not None:
+            return trajectory_message(stage.motion, model.planning_frame)
+        message = RobotTrajectory()
+        motion = message.joint_trajectory
+        motion.header.frame_id, motion.joint_names = model.planning_frame, list(stage.fingers)
+        numbers = [model.index[name] for name in stage.fingers]
+        start, end = stage.scene.positions[numbers], np.array(list(stage.fingers.values()))
+        if not len(numbers):
+            return message
+        duration_s = float((np.abs(end - start) / model.max_velocity[numbers]).max()) + FINGER_SETTLE_S
+        motion.points = [JointTrajectoryPoint(positions=start.tolist(), time_from_start=genpy.Duration(0)),
+                         JointTrajectoryPoint(positions=end.tolist(),
+                                              time_from_start=genpy.Duration.from_sec(duration_s))]
+        return message
+
+    def _execute(self, stage: Stage, message: RobotTrajectory, change: SceneChange) -> None:
+        """Executes a stage and makes its effect real; raises PlanningError naming the stage."""
+        try:
+            if stage.motion is not None:
+                WatchedMotion(self._context, message, stage.scene,
+                              lambda scene: stage.change(change(scene))).execute(self._cancelled)
+            elif stage.fingers:
+                self._context.execution.execute(self._from_here(message), self._cancelled)
+            if stage.effect is not None:
+                self._context.monitor.apply(stage.effect)
+                self._grasped = True
+        except PlanningError as error:
+            raise PlanningError(error.code, f"executing '{stage.name}': {error.reason}") from error
+
+    def _from_here(self, message: RobotTrajectory) -> RobotTrajectory:
+        """Lets the motion of the fingers begin where they are: what they hold keeps them from where they should be."""
+        positions, index = self._context.monitor.positions(), self._context.model.index
+        motion = message.joint_trajectory
+        motion.points[0].positions = [float(positions[index[name]]) for name in motion.joint_names]
+        return message

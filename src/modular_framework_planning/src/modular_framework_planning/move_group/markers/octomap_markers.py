@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows the octomap as cubes coloured by height, for an RViz without MoveIt's plugin."""
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from modular_framework_control.ros_telling import tell
+from modular_framework_planning.messages.conversions import pose_message
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.octomap.octree import Octree
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene
+
+MAX_CUBES = 100_000
+SHADES = [ColorRGBA(*colorsys.hsv_to_rgb(hue, 0.8, 0.9), 1.0) for hue in np.linspace(0.7, 0.0, 32)]  # blue to red
+
+
+class OctomapMarkers:
+    """Publishes ~octomap_markers (MarkerArray, latched) when the octomap is another one."""
+
+    def __init__(self) -> None:
+        self._publisher = rospy.Publisher(names.OCTOMAP_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
+        self._shown: object = None
+
+    def show(self, scene: PlanningScene) -> None:
+        """Publishes the occupied voxels of a scene, MAX_CUBES of them at most."""
+        if scene.octomap is self._shown:
+            return
+        self._shown = scene.octomap
+        markers = [Marker(action=Marker.DELETEALL)]
+        markers += [_cubes(body, shape, scene.model.planning_frame) for body in (scene.octomap,) if body is not None
+                    for shape, _ in body.shapes if isinstance(shape, Octree) and len(shape.centers)]
+        tell(self._publisher, MarkerArray(markers))
+
+
+def _cubes(body: CollisionObject, octree: Octree, frame: str) -> Marker:
+    centers = octree.centers[:MAX_CUBES]
+    marker = Marker(type=Marker.CUBE_LIST, ns="octomap", action=Marker.ADD, pose=pose_message(body.pose))
+    marker.header.frame_id = frame
+    marker.scale.x = marker.scale.y = marker.scale.z = octree.resolution
+    marker.color.a = 1.0
+    low, high = centers[:, 2].min(), centers[:, 2].max()
+    shades = ((len(SHADES) - 1) * (centers[:, 2] - low) / max(high - low, 1.0e-9)).astype(int)
+    marker.points = [Point(*row) for row in centers.tolist()]
+    marker.colors = [SHADES[shade] for shade in shades]
+    return marker

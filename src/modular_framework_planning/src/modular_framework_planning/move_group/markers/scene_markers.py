@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows planning scene and planned path as markers, for an RViz without MoveIt's plugin."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point
+from moveit_msgs.msg import DisplayTrajectory
+from visualization_msgs.msg import Marker, MarkerArray
+
+from modular_framework_control.ros_telling import tell
+from modular_framework_planning.collision_detection.exact_collision import Contact
+from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.messages.conversions import pose_message
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
+from modular_framework_planning.planning_scene.planning_scene import Color, PlanningScene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz draws transparent markers in no order of depth
+ATTACHED_COLOR = (0.75, 0.3, 0.75, 1.0)
+GHOST_COLOR = (1.0, 0.6, 0.1)
+INTERMEDIATE_GHOSTS = 3
+LINE_POINTS = 60
+PLANE_SIZE_M = 3.0
+CONTACT_COLOR = (1.0, 0.0, 0.0, 0.8)
+CONTACT_SIZE_M = 0.05
+
+
+class MarkerPublisher:
+    """Publishes ~planning_scene_markers, ~display_planned_path, ~display_planned_path_markers, ~display_contacts.
+
+    All are latched.
+    """
+
+    def __init__(self, planning_frame: str) -> None:
+        """Args: the frame of contacts."""
+        self._frame = planning_frame
+        self._contacts = rospy.Publisher(names.DISPLAY_CONTACTS_TOPIC, MarkerArray, queue_size=5, latch=True)
+        self._scene = rospy.Publisher(names.SCENE_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
+        self._path = rospy.Publisher(names.PATH_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
+        self._display = rospy.Publisher(names.DISPLAY_PATH_TOPIC, DisplayTrajectory, queue_size=5, latch=True)
+
+    def show_scene(self, scene: PlanningScene) -> None:
+        """Publishes one marker per shape; attached ones are given in their link's frame, so they follow it."""
+        markers = [Marker(action=Marker.DELETEALL)]
+        for body in scene.objects.values():
+            color = scene.colors.get(body.name, OBJECT_COLOR)
+            for number, (shape, pose) in enumerate(body.shapes):
+                markers.append(_shape_marker(shape, body.pose * pose, scene.model.planning_frame, body.name, number))
+                _paint(markers[-1], color)
+        for held in scene.attached.values():
+            for number, (shape, pose) in enumerate(held.body.shapes):
+                markers.append(_shape_marker(shape, held.body.pose * pose, held.link, held.name, number))
+                markers[-1].frame_locked = True
+                _paint(markers[-1], scene.colors.get(held.name, ATTACHED_COLOR))
+        tell(self._scene, MarkerArray(markers))
+
+    def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
+        """Publishes the planned motion: a line along which the tip goes and ghosts of the robot on its way."""
+        tell(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
+        group = scene.model.group(response.group_name)
+        rows = answer.trajectory.positions
+        markers = [Marker(action=Marker.DELETEALL), *_tip_line(scene, group, rows, answer.start)]
+        for share in np.linspace(0.0, 1.0, INTERMEDIATE_GHOSTS + 2)[1:]:
+            positions = answer.start.copy()
+            positions[group.indices] = rows[int(round(share * (len(rows) - 1)))]
+            markers += robot_markers(scene.model, positions, f"ghost_{share:.2f}",
+                                     (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15))
+        for number, marker in enumerate(markers):
+            marker.id = number
+        tell(self._path, MarkerArray(markers))
+
+    def show_contacts(self, contacts: Sequence[Contact]) -> None:
+        """Publishes a ball where bodies touch, named by them: why the last plan failed; none takes old ones away."""
+        markers = [Marker(action=Marker.DELETEALL)]
+        for number, contact in enumerate(contacts):
+            marker = _marker(Marker.SPHERE, self._frame, f"{contact.first.name}={contact.second.name}", number)
+            marker.pose.position = Point(*(float(value) for value in contact.position))
+            marker.scale.x = marker.scale.y = marker.scale.z = CONTACT_SIZE_M
+            _paint(marker, CONTACT_COLOR)
+            markers.append(marker)
+        tell(self._contacts, MarkerArray(markers))
+
+
+def _paint(marker: Marker, color: tuple[float, float, float, float]) -> None:
+    marker.color.r, marker.color.g, marker.color.b, marker.color.a = color
+
+
+def _marker(kind: int, frame: str, namespace: str, number: int = 0) -> Marker:
+    marker = Marker(type=kind, ns=namespace, id=number, action=Marker.ADD)
+    marker.header.frame_id = frame
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
+def _shape_marker(shape: Shape, pose: Transform, frame: str, namespace: str, number: int) -> Marker:
+    match shape:
+        case Box():
+            marker, scale = _marker(Marker.CUBE, frame, namespace, number), (shape.x, shape.y, shape.z)
+        case Sphere():
+            marker, scale = _marker(Marker.SPHERE, frame, namespace, number), (2.0 * shape.radius,) * 3
+        case Cylinder():
+            marker = _marker(Marker.CYLINDER, frame, namespace, number)
+            scale = (2.0 * shape.radius, 2.0 * shape.radius, shape.height)
+        case Cone():
+            marker, scale = _marker(Marker.TRIANGLE_LIST, frame, namespace, number), (1.0, 1.0, 1.0)
+            marker.points = _cone_points(shape)
+        case Plane():
+            return _plane_marker(shape, pose, frame, namespace, number)
+        case Mesh():
+            marker, scale = _marker(Marker.TRIANGLE_LIST, frame, namespace, number), (1.0, 1.0, 1.0)
+            marker.points = [Point(*row) for row in shape.vertices[shape.triangles].reshape(-1, 3)]
+        case _:
+            raise TypeError(f"a shape of type {type(shape).__name__} has no marker")
+    marker.pose = pose_message(pose)
+    marker.scale.x, marker.scale.y, marker.scale.z = scale
+    return marker
+
+
+def _cone_points(cone: Cone, sides: int = 24) -> list[Point]:
+    """Triangles of a cone's side and base."""
+    angles = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    rim = [Point(cone.radius * x, cone.radius * y, -cone.height / 2)
+           for x, y in zip(np.cos(angles), np.sin(angles), strict=True)]
+    tip, middle = Point(0.0, 0.0, cone.height / 2), Point(0.0, 0.0, -cone.height / 2)
+    return [point for first, second in zip(rim[:-1], rim[1:], strict=True)
+            for point in (first, second, tip, second, first, middle)]
+
+
+def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, number: int) -> Marker:
+    """A thin square around the plane's point nearest to its frame's origin."""
+    import pinocchio as pin
+
+    normal = np.array([shape.a, shape.b, shape.c])
+    length = float(np.linalg.norm(normal))
+    rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal / length).toRotationMatrix()
+    marker = _marker(Marker.CUBE, frame, namespace, number)
+    marker.pose = pose_message(pose * pin.SE3(rotation, -shape.d / length * normal / length))
+    marker.scale.x, marker.scale.y, marker.scale.z = PLANE_SIZE_M, PLANE_SIZE_M, 0.001
+    return marker
+
+
+def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> list[Marker]:
+    """The line along which the tip goes; none for a motion of one point, which RViz would call an error."""
+    if len(rows) < 2:
+        return []
+    line = _marker(Marker.LINE_STRIP, scene.model.planning_frame, "tip")
+    line.scale.x = 0.006
+    _paint(line, (*GHOST_COLOR, 1.0))
+    link = group.tip_link or group.links[-1]
+    for number in np.linspace(0, len(rows) - 1, min(len(rows), LINE_POINTS)).round().astype(int):
+        positions = start.copy()
+        positions[group.indices] = rows[number]
+        line.points.append(Point(*scene.model.link_transforms(positions)[link].translation))
+    return [line]
+
+
+def robot_markers(model: RobotModel, positions: Array, namespace: str, color: Color) -> list[Marker]:
+    """Markers of what is seen of every link, at the given positions (of the whole robot), in one colour.
+
+    Their ids are 0: number them, or give each robot a namespace and number within it, before publishing.
+    """
+    transforms = model.link_transforms(positions)
+    frame = model.planning_frame
+    markers = [_shape_marker(shape, transforms[link] * origin, frame, namespace, 0)
+               for link, shapes in model.document.visual_shapes.items() for shape, origin in shapes]
+    for link, visuals in model.document.visual_meshes.items():
+        for uri, origin, scale in visuals:
+            marker = _marker(Marker.MESH_RESOURCE, frame, namespace)
+            marker.mesh_resource = uri
+            marker.pose = pose_message(transforms[link] * origin)
+            marker.scale.x, marker.scale.y, marker.scale.z = scale
+            markers.append(marker)
+    for marker in markers:
+        _paint(marker, color)
+    return markers

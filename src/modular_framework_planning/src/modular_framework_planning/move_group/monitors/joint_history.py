@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Remembers where the joints were a moment ago, for sensor data that arrive later than they were taken."""
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import deque
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+
+KEPT = 2000
+
+
+class JointHistory:
+    """Joint positions with their times, the last KEPT of them; not for two threads at once."""
+
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=KEPT)
+        self._positions: deque[Array] = deque(maxlen=KEPT)
+
+    def add(self, stamp_s: float, positions: Array) -> None:
+        """Remembers positions [rad or m]; a time before the last one means the clock was set back: all is forgotten."""
+        if self._times and stamp_s < self._times[-1] - 1.0:
+            self._times.clear()
+            self._positions.clear()
+        if self._times and stamp_s <= self._times[-1]:
+            self._positions[-1] = positions  # of several sources the last message has all that is known
+            return
+        self._times.append(stamp_s)
+        self._positions.append(positions)
+
+    def covers(self, stamp_s: float) -> bool:
+        """Whether positions at that time, or later ones, are known."""
+        return bool(self._times) and self._times[-1] >= stamp_s
+
+    def at(self, stamp_s: float) -> Array:
+        """Returns the positions at a time, between two known ones in proportion.
+
+        Raises:
+            PlanningError: the time is later than the last known one, or earlier than the first.
+        """
+        if not self._times or not self._times[0] <= stamp_s <= self._times[-1]:
+            known = f"{self._times[0]:.3f} to {self._times[-1]:.3f} s" if self._times else "none"
+            raise PlanningError(ErrorCode.ROBOT_STATE_STALE, f"joint positions at {stamp_s:.3f} s: known times are "
+                                f"{known}; is joint_states published, and do its stamps and the sensor's come from one "
+                                "clock?")
+        after = bisect_left(self._times, stamp_s)
+        if self._times[after] == stamp_s:
+            return self._positions[after]
+        first, last = self._times[after - 1], self._times[after]
+        share = (stamp_s - first) / (last - first)
+        return (1.0 - share) * self._positions[after - 1] + share * self._positions[after]

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps the scene's octomap up to date with what depth sensors see, and saves and loads it."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import rospy
+from moveit_msgs.srv import LoadMap, LoadMapResponse, SaveMap, SaveMapResponse
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array, Transform, make_transform
+from modular_framework_planning.messages.octomap_conversions import voxels_of
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.markers.octomap_markers import OctomapMarkers
+from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.octomap.encoding import read_file, write_file
+from modular_framework_planning.octomap.octree import Octree
+from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
+from modular_framework_planning.perception.depth_images import SeenPoints
+from modular_framework_planning.perception.self_filter import RegionCache, SightMask, bodies_in_scene, mask_of
+from modular_framework_planning.perception.sensor_settings import read_sensors
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+
+DEFAULT_RESOLUTION = 0.1  # [m]
+ATTEMPTS = 3
+WAIT_S = 1.0  # for transforms and joint positions of the moment a sensor looked
+MaskMaker = Callable[[RegionCache, Sequence[Any], Array], SightMask]
+
+
+class OctomapMonitor:
+    """Puts what sensors see into the scene as object <octomap>. The scene holds the map: what clears it clears all.
+
+    Parameters: ~octomap_resolution (0.1 m), ~octomap_frame (planning frame), ~max_range (of clouds that name none),
+    ~sensors (list, see perception/sensor_settings).
+    Publishes: ~octomap_markers (MarkerArray).
+    Services: ~save_map (SaveMap), ~load_map (LoadMap): .bt files.
+    """
+
+    def __init__(self, monitor: SceneMonitor) -> None:
+        self._monitor = monitor
+        self._regions = RegionCache()
+        self._resolution = DEFAULT_RESOLUTION
+        self._frame = ""
+        self._transforms: Any = None
+        self._known: dict[str, Any] = {}
+
+    def connect(self) -> None:
+        """Reads the parameters, subscribes to the sensors and advertises the services."""
+        self._resolution = empty_map(float(rospy.get_param("~octomap_resolution", DEFAULT_RESOLUTION))).resolution
+        self._frame = str(rospy.get_param("~octomap_frame", ""))
+        max_range = rospy.get_param("~max_range", None)
+        sensors, faults = read_sensors(rospy.get_param("~sensors", []), None if max_range is None else float(max_range))
+        for fault in faults:
+            rospy.logerr("%s: this sensor is left out of the octomap", fault)
+        self._monitor.listeners.append(OctomapMarkers().show)
+        rospy.Service(names.SAVE_MAP_SERVICE, SaveMap, self._save)
+        rospy.Service(names.LOAD_MAP_SERVICE, LoadMap, self._load)
+        if not sensors:
+            return
+        import tf2_ros
+
+        from modular_framework_planning.move_group.monitors.octomap_updaters import updater_of
+
+        self._transforms = tf2_ros.Buffer()
+        self._listener = tf2_ros.TransformListener(self._transforms)
+        self._monitor.listeners.append(self.free_new_objects)
+        _compile_loops()
+        for settings in sensors:
+            updater_of(settings, self).connect()
+
+    def look(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_mask: MaskMaker, shadow: float = 0.0) -> Array:
+        """Puts one look of a sensor into the map.
+
+        Args:
+            frame: of the points.
+            stamp: when they were seen; robot and sensor are taken where they were then.
+            seen: the points.
+            make_mask: makes the mask of what the scene knows, from bodies and the sensor's place.
+            shadow: how far behind a known body a point still belongs to it [m].
+
+        Returns:
+            Which of the points that ended within range lie on the robot or on known objects (n,).
+
+        Raises:
+            PlanningError: where the sensor or the robot was is not known, or the map changes all the time.
+        """
+        positions = self._monitor.positions_at(stamp.to_sec(), WAIT_S)
+        sensor = self._pose_in_planning_frame(frame, stamp, positions)
+        into_map = self._pose_in_planning_frame(self._frame, stamp, positions)
+        ends, beyond = (points @ sensor.rotation.T + sensor.translation for points in (seen.ends, seen.beyond))
+        origin, clipped = _into(into_map, sensor.translation[None])[0], _into(into_map, beyond)
+        for _ in range(ATTEMPTS):
+            scene = self._monitor.snapshot()
+            bodies = bodies_in_scene(scene, positions)
+            self._regions.keep_only(geometry for geometry, _ in bodies)
+            mask = make_mask(self._regions, bodies, sensor.translation)
+            hidden = np.asarray(mask.hides(ends, sensor.translation, shadow))
+            hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
+            if self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map):
+                return hidden
+        raise PlanningError(ErrorCode.FAILURE, f"octomap: it changed during each of {ATTEMPTS} attempts to put a look "
+                            "into it; change it less often, or use larger voxels (octomap_resolution)")
+
+    def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
+        """The scene's map to go on with; an empty one where it has none, or one of other voxels from elsewhere."""
+        voxels = voxels_of(scene)
+        if voxels is None or voxels.resolution != self._resolution or scene.octomap is None or not np.allclose(
+                scene.octomap.pose.homogeneous, pose.homogeneous, atol=1.0e-9):
+            return empty_map(self._resolution)
+        return voxels
+
+    def _replace(self, base: PlanningScene, voxels: VoxelMap, pose: Transform) -> bool:
+        """Puts a map that was made from one scene into the scene of now.
+
+        Returns:
+            False when the map has changed meanwhile. A map that was cleared meanwhile stays cleared: what was seen
+            before that is of no interest. Bodies that are new meanwhile are taken out of the map afterwards.
+        """
+        octree = Octree(voxels)
+        if len(octree.centers):
+            octree.geometry  # noqa: B018 - built here, where nobody waits for it
+        done = []
+
+        def change(scene: PlanningScene) -> PlanningScene:
+            cleared = scene.octomap is None and base.octomap is not None
+            same = scene.octomap is base.octomap
+            if scene.objects is not base.objects or scene.attached is not base.attached:
+                self._known = {}
+            done.append(cleared or same)
+            return scene.with_octomap(octree, pose) if same else scene
+
+        self._monitor.apply(change)
+        return done[0]
+
+    def free_new_objects(self, scene: PlanningScene) -> None:
+        """Takes what is now known as an object out of the map."""
+        bodies = {**scene.objects, **scene.attached}
+        fresh = [name for name, body in bodies.items() if self._known.get(name) is not body]
+        self._known = bodies
+        voxels = voxels_of(scene)
+        if not fresh or voxels is None or scene.octomap is None:
+            return
+        things = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries):]
+        mask = mask_of(self._regions, things, 1.0, voxels.resolution * np.sqrt(0.75))
+        centers = scene.octomap.shapes[0][0].centers  # type: ignore[attr-defined]
+        points = centers @ scene.octomap.pose.rotation.T + scene.octomap.pose.translation
+        inside = mask.hides(points, np.zeros(3))
+        if not inside.any():
+            return
+        keys, resolution = voxels.occupied_keys[inside], voxels.resolution
+
+        def change(now: PlanningScene) -> PlanningScene:
+            newest = voxels_of(now)
+            if newest is None or newest.resolution != resolution or now.octomap is None:
+                return now
+            return now.with_octomap(Octree(newest.freed(keys)), now.octomap.pose)
+
+        self._monitor.apply(change)
+
+    def _pose_in_planning_frame(self, frame: str, stamp: rospy.Time, positions: Array) -> Transform:
+        frame, model = frame.removeprefix("/"), self._monitor.model
+        if not frame:
+            return pin.SE3.Identity()
+        if model.has_link(frame):
+            return model.link_transforms(positions)[frame]
+        import tf2_ros
+
+        try:
+            found = self._transforms.lookup_transform(model.planning_frame, frame, stamp, rospy.Duration(WAIT_S))
+        except tf2_ros.TransformException as error:
+            raise PlanningError(ErrorCode.FRAME_TRANSFORM_FAILURE, f"sensor data in frame '{frame}': waited {WAIT_S} s "
+                                f"for its transform to '{model.planning_frame}' at {stamp.to_sec():.3f} s ({error}); "
+                                "is it published on tf?") from error
+        t, q = found.transform.translation, found.transform.rotation
+        return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{frame}'")
+
+    def _save(self, request: Any) -> SaveMapResponse:
+        voxels = voxels_of(self._monitor.snapshot()) or empty_map(self._resolution)
+        try:
+            write_file(Path(request.filename), voxels)
+        except OSError as error:
+            rospy.logerr("%s: '%s' cannot be written: %s", rospy.resolve_name(names.SAVE_MAP_SERVICE), request.filename,
+                         error)
+            return SaveMapResponse(success=False)
+        return SaveMapResponse(success=True)
+
+    def _load(self, request: Any) -> LoadMapResponse:
+        try:
+            octree = Octree(read_file(Path(request.filename)))
+            pose = self._pose_in_planning_frame(self._frame, rospy.Time(0), self._monitor.positions())
+            self._monitor.apply(lambda scene: scene.with_octomap(octree, pose))
+        except PlanningError as error:
+            rospy.logerr("%s: %s", rospy.resolve_name(names.LOAD_MAP_SERVICE), error.reason)
+            return LoadMapResponse(success=False)
+        return LoadMapResponse(success=True)
+
+
+def _compile_loops() -> None:
+    """Looks once at nothing, so that the first look of a sensor need not wait for the compiler."""
+    here, point = np.zeros(3), np.ones((1, 3))
+    empty_map(DEFAULT_RESOLUTION).with_look(here, point, point, point)
+    SightMask(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, here)
+
+
+def _into(pose: Transform, points: Array) -> Array:
+    """Points (n, 3) of the outer frame in the frame whose pose is given."""
+    return np.asarray((points - pose.translation) @ pose.rotation)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hands depth images and point clouds to the octomap: MoveIt's two octomap updaters."""
+from __future__ import annotations
+
+import threading
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import Any
+
+import numpy as np
+import rospy
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
+from modular_framework_planning.perception.depth_images import (
+    Pinhole,
+    cloud_array,
+    depth_array,
+    points_of_cloud,
+    points_of_depth,
+)
+from modular_framework_planning.perception.self_filter import depth_mask_of, mask_of
+from modular_framework_planning.perception.sensor_settings import DepthImageSettings, PointCloudSettings, SensorSettings
+
+FLOAT_POINT = np.dtype("<f4")
+
+
+class _Updater(ABC):
+    """Takes messages as they come and works on them in a thread of its own; when it is late, the oldest are dropped."""
+
+    def __init__(self, settings: SensorSettings, monitor: OctomapMonitor, waiting: int) -> None:
+        self._settings: Any = settings
+        self._monitor = monitor
+        self._messages: deque[Any] = deque(maxlen=waiting)
+        self._arrived = threading.Event()
+        self._last = rospy.Time()
+        self._filtered: Any = None
+
+    def _connect(self, topic: str, kind: Any, filtered_kind: Any) -> None:
+        if self._settings.filtered_cloud_topic:
+            name = "/".join(part for part in (self._settings.ns, self._settings.filtered_cloud_topic) if part)
+            self._filtered = rospy.Publisher(f"~{name}", filtered_kind, queue_size=2)
+        rospy.Subscriber(topic, kind, self._take, queue_size=2, buff_size=1 << 24)
+        threading.Thread(target=self._run, name=f"octomap from {topic}", daemon=True).start()
+
+    def _take(self, message: Any) -> None:
+        now = rospy.Time.now()
+        rate = self._settings.max_update_rate
+        if now < self._last:  # the clock was set back
+            self._last = rospy.Time()
+        if rate and (now - self._last).to_sec() <= 1.0 / rate:
+            return
+        self._last = now
+        self._messages.append(message)
+        self._arrived.set()
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            if not self._arrived.wait(0.2):
+                continue
+            self._arrived.clear()
+            while self._messages:
+                message = self._messages.popleft()
+                try:
+                    self._look(message)
+                except PlanningError as error:
+                    rospy.logwarn_throttle(5.0, "octomap: a look is left out: %s", error.reason)
+                except rospy.ROSException as error:  # the node is going down
+                    rospy.logdebug("octomap: %s", error)
+
+    @abstractmethod
+    def _look(self, message: Any) -> None:
+        """Brings one message into the map."""
+
+
+class PointCloudUpdater(_Updater):
+    """Subscribes to a PointCloud2; publishes the points that are neither robot nor known object."""
+
+    def __init__(self, settings: PointCloudSettings, monitor: OctomapMonitor) -> None:
+        super().__init__(settings, monitor, 1)
+
+    def connect(self) -> None:
+        """Starts to listen."""
+        self._connect(self._settings.point_cloud_topic, PointCloud2, PointCloud2)
+
+    def _look(self, message: PointCloud2) -> None:
+        s = self._settings
+        seen = points_of_cloud(cloud_array(message), s.max_range, s.point_subsample)
+        hidden = self._monitor.look(
+            message.header.frame_id, message.header.stamp, seen,
+            lambda regions, bodies, _: mask_of(regions, bodies, s.padding_scale, s.padding_offset))
+        if self._filtered is not None:
+            self._filtered.publish(_cloud_message(message.header, seen.ends[~hidden]))
+
+
+class DepthImageUpdater(_Updater):
+    """Subscribes to a depth image and the camera_info beside it; publishes the image without robot and objects."""
+
+    def __init__(self, settings: DepthImageSettings, monitor: OctomapMonitor) -> None:
+        super().__init__(settings, monitor, settings.queue_size)
+        self._camera: Pinhole | None = None
+
+    def connect(self) -> None:
+        """Starts to listen."""
+        beside = rospy.resolve_name(self._settings.image_topic).rsplit("/", 1)[0]
+        rospy.Subscriber(f"{beside}/camera_info", CameraInfo, self._on_info, queue_size=1)
+        self._connect(self._settings.image_topic, Image, Image)
+
+    def _on_info(self, message: CameraInfo) -> None:
+        try:
+            self._camera = Pinhole(message.K[0], message.K[4], message.K[2], message.K[5])
+        except PlanningError as error:
+            rospy.logwarn_throttle(5.0, "octomap: %s", error.reason)
+
+    def _look(self, message: Image) -> None:
+        s = self._settings
+        if self._camera is None:
+            rospy.logwarn_throttle(5.0, "octomap: no usable camera_info beside '%s' yet; its images are left out",
+                                   rospy.resolve_name(s.image_topic))
+            return
+        depth = depth_array(message.data, message.encoding, (message.height, message.width), message.step,
+                            bool(message.is_bigendian))
+        seen = points_of_depth(depth, self._camera, s.near_clipping_plane_distance, s.far_clipping_plane_distance,
+                               (s.skip_vertical_pixels, s.skip_horizontal_pixels))
+        hidden = self._monitor.look(
+            message.header.frame_id, message.header.stamp, seen,
+            lambda regions, bodies, origin: depth_mask_of(regions, bodies, origin, s.padding_scale, s.padding_offset),
+            s.shadow_threshold)
+        if self._filtered is not None:
+            kept = np.zeros(depth.size)
+            kept[seen.pixels[~hidden]] = depth.ravel()[seen.pixels[~hidden]]
+            data = np.clip(np.round(kept * 1000.0), 0, 65535).astype("<u2").tobytes()
+            self._filtered.publish(Image(header=message.header, height=message.height, width=message.width,
+                                         encoding="16UC1", step=2 * message.width, data=data))
+
+
+def _cloud_message(header: Any, points: Any) -> PointCloud2:
+    fields = [PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate("xyz")]
+    data = np.ascontiguousarray(points, dtype=FLOAT_POINT).tobytes()
+    return PointCloud2(header, 1, len(points), fields, False, 12, 12 * len(points), data, True)
+
+
+def updater_of(settings: SensorSettings, monitor: OctomapMonitor) -> PointCloudUpdater | DepthImageUpdater:
+    """Returns the updater of a sensor."""
+    match settings:
+        case PointCloudSettings():
+            return PointCloudUpdater(settings, monitor)
+        case DepthImageSettings():
+            return DepthImageUpdater(settings, monitor)

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps the current planning scene: changes arrive by service and topic, joint positions by joint_states."""
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import rospy
+from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningSceneWorld
+from moveit_msgs.msg import PlanningScene as SceneMessage
+from sensor_msgs.msg import JointState
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.messages.conversions import state_message
+from modular_framework_planning.messages.scene_conversions import apply_attached_object, apply_collision_object
+from modular_framework_planning.messages.scene_difference import difference_message
+from modular_framework_planning.messages.scene_messages import apply_scene, apply_world, scene_message
+from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.monitors.joint_history import JointHistory
+from modular_framework_planning.move_group.monitors.tf_frames import TfFrames
+from modular_framework_planning.move_group.node_settings import SceneMonitorSettings
+from modular_framework_planning.planning_scene.padding import Padding
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+
+class SceneMonitor:
+    """The one place that changes the scene; readers get immutable snapshots.
+
+    A thread of its own tells subscribers and listeners what changed, so that nobody waits for large messages; changes
+    that follow each other closely are told as one.
+
+    Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object, tf.
+    Publishes: ~monitored_planning_scene: to each new subscriber the whole scene, to all the changes, among them the
+    joint positions and frames of tf while they change, as often as `settings` say at most.
+    Parameters: those of `settings`, below ~planning_scene_monitor.
+    """
+
+    def __init__(self, model: RobotModel, padding: Padding | None = None,
+                 settings: SceneMonitorSettings | None = None) -> None:
+        self.model = model
+        self.settings = settings or SceneMonitorSettings()  # may be replaced while the node runs
+        self._frames = TfFrames(model)
+        self._scene = empty_scene(model).with_padding(padding or Padding())
+        self._lock = threading.RLock()
+        self._positions = model.default_positions()
+        self._history = JointHistory()
+        self._stamps: dict[int, rospy.Time] = {}
+        self._arrivals = 0
+        self._arrived = threading.Condition()
+        followers = set(model.document.mimics) | set(model.semantics.passive_joints)
+        self._needed = [number for number, name in enumerate(model.joint_names) if name not in followers]
+        self.listeners: list[Callable[[PlanningScene], None]] = []
+        self._publisher: Any = None
+        self._told = self._scene
+        self._was_silent = False
+        self._telling = threading.Lock()
+        self._news = threading.Event()
+
+    def connect(self) -> None:
+        """Starts to listen and to publish."""
+        self._frames.connect()
+        self._told = self.snapshot()
+        self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _Greeter(self), queue_size=100)
+        rospy.Subscriber(names.JOINT_STATES_TOPIC, JointState, self._on_joint_state, queue_size=5, tcp_nodelay=True)
+        for topic, kind, change in (
+                (names.SCENE_TOPIC, SceneMessage, apply_scene),
+                (names.SCENE_WORLD_TOPIC, PlanningSceneWorld, apply_world),
+                (names.OBJECT_TOPIC, CollisionObject, apply_collision_object),
+                (names.ATTACHED_OBJECT_TOPIC, AttachedCollisionObject, apply_attached_object)):
+            rospy.Subscriber(topic, kind, self._on_change, callback_args=(topic, change), queue_size=100)
+        threading.Thread(target=self._tell, name="planning scene", daemon=True).start()
+
+    def greet(self, publish: Callable[[Any], None]) -> None:
+        """Hands the scene that the others know to a new subscriber; the lock keeps changes from coming in between."""
+        with self._telling:
+            if self.settings.publish_planning_scene:
+                publish(scene_message(self._told, 0))
+
+    def _tell(self) -> None:
+        """Tells changes of the scene as they come, and of joints and frames as often as the settings say."""
+        while not rospy.is_shutdown():
+            settings = self.settings
+            changed = self._news.wait(1.0 / settings.publish_planning_scene_hz)
+            self._news.clear()
+            if not (changed or settings.publish_state_updates or settings.publish_transforms_updates):
+                continue
+            scene = self.snapshot()
+            try:
+                self._publish(scene, settings)
+                for listener in self.listeners if changed else ():
+                    listener(scene)
+            except rospy.ROSException as error:  # the node is going down
+                rospy.logdebug("the change of the planning scene was not told: %s", error)
+            except Exception:  # what one change does to one listener must not keep the next ones from all
+                rospy.logerr("a change of the planning scene was not told:\n%s", traceback.format_exc())
+
+    def _publish(self, scene: PlanningScene, settings: SceneMonitorSettings) -> None:
+        """Tells subscribers the wanted parts of what changed, or everything where they heard nothing for a while."""
+        with self._telling:
+            heard = settings.publish_planning_scene and self._publisher.get_num_connections() > 0
+            if not heard:
+                self._told, self._was_silent = scene, not settings.publish_planning_scene
+                return
+            told = replace(
+                scene if settings.publish_geometry_updates else self._told,
+                positions=(scene if settings.publish_state_updates else self._told).positions,
+                fixed_frames=(scene if settings.publish_transforms_updates else self._told).fixed_frames)
+            message = scene_message(told, 0) if self._was_silent else difference_message(self._told, told)
+            if message is not None:
+                self._publisher.publish(message)
+                self._told, self._was_silent = told, False
+
+    def _on_change(self, message: Any, context: tuple[str, Callable[[PlanningScene, Any], PlanningScene]]) -> None:
+        topic, change = context
+        try:
+            self.apply(lambda scene: change(scene, message))
+        except PlanningError as error:
+            rospy.logerr("%s: message ignored: %s", rospy.resolve_name(topic), error.reason)
+        except (ValueError, TypeError, IndexError) as error:
+            rospy.logerr("%s: message ignored, it is malformed: %s", rospy.resolve_name(topic), error)
+
+    def apply(self, change: Callable[[PlanningScene], PlanningScene]) -> PlanningScene:
+        """Changes the scene, all or nothing; the next snapshot has the change. Raises PlanningError."""
+        frames = self._frames.now()
+        with self._lock:
+            self._scene = change(self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames))
+            scene = self._scene
+        self._news.set()
+        return scene
+
+    def _on_joint_state(self, message: JointState) -> None:
+        if len(message.name) != len(message.position):
+            rospy.logwarn_throttle(5.0, "joint_states: %d names but %d positions; message ignored",
+                                   len(message.name), len(message.position))
+            return
+        changed = {name: float(position) for name, position in zip(message.name, message.position, strict=True)
+                   if name in self.model.index and np.isfinite(position)}
+        with self._lock:
+            self._positions = self.model.merge(self._positions, changed)
+            self._history.add(message.header.stamp.to_sec(), self._positions)
+            self._stamps.update({self.model.index[name]: message.header.stamp for name in changed})
+        with self._arrived:
+            self._arrivals += 1
+            self._arrived.notify_all()
+
+    def positions_at(self, stamp_s: float, timeout_s: float) -> Any:
+        """Returns the joint positions [rad or m] at a time, waiting for them if they are still to come.
+
+        Raises:
+            PlanningError: they were not heard of in time, or the time is too long ago.
+        """
+        with self._arrived:
+            self._arrived.wait_for(lambda: self._history.covers(stamp_s), timeout_s)
+        with self._lock:
+            return self._history.at(stamp_s)
+
+    def missing_joints(self) -> list[str]:
+        """Returns joints never heard of on joint_states (mimic and passive ones are not needed)."""
+        return [self.model.joint_names[number] for number in self._needed if number not in self._stamps]
+
+    def wait_for_state(self, timeout_s: float = 3.0) -> None:
+        """Waits until every joint was heard of; raises PlanningError naming those that were not."""
+        deadline = time.monotonic() + timeout_s
+        while self.missing_joints():
+            remaining = deadline - time.monotonic()
+            if remaining <= 0.0 or rospy.is_shutdown():
+                raise PlanningError(ErrorCode.ROBOT_STATE_STALE, f"topic {rospy.resolve_name('joint_states')}: waited "
+                                    f"{timeout_s:.1f} s for the positions of {', '.join(self.missing_joints())}; is "
+                                    "the joint state controller running?")
+            with self._arrived:
+                self._arrived.wait(min(remaining, 0.1))
+
+    def wait_for_next_state(self, timeout_s: float) -> bool:
+        """Waits for one more joint_states message; false when none came in time."""
+        with self._arrived:
+            seen = self._arrivals
+            return self._arrived.wait_for(lambda: self._arrivals > seen, timeout_s)
+
+    def snapshot(self) -> PlanningScene:
+        """Returns the scene as it is now, with the robot and the frames of tf where they are now."""
+        frames = self._frames.now()
+        with self._lock:
+            return self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames)
+
+    def positions(self) -> Any:
+        """Returns a copy of the current joint positions [rad or m]."""
+        with self._lock:
+            return self._positions.copy()
+
+    def state(self) -> Any:
+        """Returns the current state as a message."""
+        message = state_message(self.snapshot())
+        message.joint_state.header.stamp = rospy.Time.now()
+        return message
+
+
+class _Greeter(rospy.SubscribeListener):
+    """Tells a new subscriber of the monitored scene what it missed."""
+
+    def __init__(self, monitor: SceneMonitor) -> None:
+        super().__init__()
+        self._monitor = monitor
+
+    def peer_subscribe(self, _topic: str, _publish: Any, peer_publish: Callable[[Any], None]) -> None:
+        """Called by rospy with a function that publishes to the new subscriber alone."""
+        self._monitor.greet(peer_publish)

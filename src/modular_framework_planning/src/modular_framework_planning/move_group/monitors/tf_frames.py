@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames outside the robot that only tf knows, such as a camera's or a map's, so that requests may be given in them."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import rospy
+import tf2_ros
+
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.geometry.spatial import Transform, make_transform
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+SAME = 1.0e-9  # [m] and of the rotation's entries; a frame that moves by less has not moved
+
+
+class TfFrames:
+    """Listens to tf; a frame keeps its last known place. Threads may share it."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self._model = model
+        self._buffer: Any = None
+        self._known: dict[str, Transform] = {}
+
+    def connect(self) -> None:
+        """Starts to listen."""
+        buffer = tf2_ros.Buffer()
+        self._listener = tf2_ros.TransformListener(buffer)
+        self._buffer = buffer
+
+    def now(self) -> Mapping[str, Transform]:
+        """Returns where the frames are in the planning frame; one that did not move is the same object as before."""
+        if self._buffer is None:
+            return self._known
+        heard = set(self._buffer._getFrameStrings())  # tf2's Python interface has no other list of frames
+        model, known = self._model, self._known
+        fresh = {}
+        for name in heard - model.frame_ids.keys():
+            place, old = self._place(model.planning_frame, name), known.get(name)
+            if place is not None:
+                fresh[name] = old if old is not None and old.isApprox(place, SAME) else place
+        if any(known.get(name) is not place for name, place in fresh.items()):
+            self._known = known = {**known, **fresh}
+        return known
+
+    def _place(self, base: str, name: str) -> Transform | None:
+        """Returns the last known place of a frame; None where nothing joins it to the robot."""
+        try:
+            found = self._buffer.lookup_transform_core(base, name, rospy.Time(0)).transform
+            t, q = found.translation, found.rotation
+            return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{name}'")
+        except (tf2_ros.TransformException, PlanningError):
+            return None

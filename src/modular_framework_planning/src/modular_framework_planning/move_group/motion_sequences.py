@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plans a MotionSequenceRequest message: used by the service plan_sequence_path and the action sequence_move_group."""
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import rospy
+from moveit_msgs.msg import MotionPlanResponse, MotionSequenceResponse, RobotState
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.messages.conversions import state_message, trajectory_message
+from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.motion_plan_requests import read_request
+from modular_framework_planning.planners.pilz.command_planner import DEFAULT_SAMPLING_TIME_S, CommandPlanner
+from modular_framework_planning.planners.pilz.sequence import (
+    ItemSpec,
+    PlannedItem,
+    SequenceJoiner,
+    SequencePart,
+    checked_radii,
+)
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SolvedSequence:
+    """The answer and the parts it was made of; no part where planning failed."""
+
+    response: MotionSequenceResponse
+    parts: tuple[SequencePart, ...]
+    reason: str
+
+
+def solve_sequence(context: MoveGroupContext, message: Any, change: Callable[[PlanningScene], PlanningScene],
+                   cancelled: Callable[[], bool] = lambda: False) -> SolvedSequence:
+    """Plans all motions or none; failures come back as a code and a reason, never as an exception.
+
+    Args:
+        context: parts of the node.
+        message: moveit_msgs/MotionSequenceRequest.
+        change: changes the scene for this plan only.
+        cancelled: true when the caller gave up.
+    """
+    begun = time.monotonic()
+    response = MotionSequenceResponse()
+    details = {"items": len(message.items), "groups": [item.req.group_name for item in message.items]}
+    try:
+        parts = _plan(context, message.items, change, cancelled)
+    except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+        response.error_code.val = context.reporter.failure("sequence", error, **details)
+        return SolvedSequence(response, (), str(error))
+    response.planning_time = time.monotonic() - begun
+    response.error_code.val = ErrorCode.SUCCESS
+    response.planned_trajectories = [trajectory_message(part.trajectory, context.model.planning_frame)
+                                     for part in parts]
+    if parts:
+        response.sequence_start = state_message(parts[0].scene, parts[0].answers[0].start)
+        _show(context, parts, response)
+    context.reporter.report("sequence", ErrorCode.SUCCESS, "", planning_time_s=response.planning_time, **details)
+    return SolvedSequence(response, parts, "planned")
+
+
+def _plan(context: MoveGroupContext, items: Sequence[Any], change: Callable[[PlanningScene], PlanningScene],
+          cancelled: Callable[[], bool]) -> tuple[SequencePart, ...]:
+    """Plans each motion from the end of the one before, then joins them; raises PlanningError with the item."""
+    radii, warnings = checked_radii([ItemSpec(item.req.group_name, item.blend_radius, _has_start(item.req.start_state))
+                                     for item in items])
+    for text in warnings:
+        rospy.logwarn("sequence: %s", text)
+    if not items:
+        return ()
+    context.monitor.wait_for_state()
+    scene = change(context.monitor.snapshot())
+    planned = []
+    for number, (item, radius) in enumerate(zip(items, radii, strict=True)):
+        try:
+            request = read_request(context, scene, _own_request(context, item.req, number), cancelled)
+            answer = context.plan(request)
+        except PlanningError as error:
+            raise PlanningError(error.code, f"items[{number}]: {error.reason}") from error
+        planned.append(PlannedItem(request, answer, radius))
+        scene = request.scene.with_positions(answer.goal)
+    pipeline = context.pipeline(_pipeline_of(context, items[0].req))
+    period = float(pipeline.settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S))
+    return SequenceJoiner(context.kinematics, pipeline.checker, period, pipeline.settings.motion_step).join(planned)
+
+
+def _has_start(state: RobotState) -> bool:
+    joints = state.joint_state
+    return bool(joints.name or joints.position or joints.velocity or joints.effort)
+
+
+def _own_request(context: MoveGroupContext, request: Any, number: int) -> Any:
+    """Returns a copy that names its pipeline; only the first item may replace what the robot holds."""
+    request = copy.copy(request)
+    request.pipeline_id = _pipeline_of(context, request)
+    if number:
+        request.start_state = copy.copy(request.start_state)
+        request.start_state.is_diff = True
+    return request
+
+
+def _pipeline_of(context: MoveGroupContext, request: Any) -> str:
+    """Returns the pipeline of an item: the one it names, else the one that has PTP, LIN and CIRC, if that is asked."""
+    if not request.pipeline_id and request.planner_id in CommandPlanner.planner_ids:
+        for name, pipeline in context.pipelines.items():
+            if request.planner_id in pipeline.planner_ids:
+                return name
+    return str(request.pipeline_id)
+
+
+def _show(context: MoveGroupContext, parts: Sequence[SequencePart], response: MotionSequenceResponse) -> None:
+    """Shows the longest part."""
+    number = max(range(len(parts)), key=lambda item: parts[item].trajectory.duration_s)
+    part = parts[number]
+    shown = MotionPlanResponse(group_name=part.group.name, trajectory=response.planned_trajectories[number],
+                               trajectory_start=state_message(part.scene, part.answers[0].start))
+    context.markers.show_path(part.scene, shown, replace(part.answers[0], trajectory=part.trajectory))

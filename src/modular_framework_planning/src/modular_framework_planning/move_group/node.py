@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The move_group node: reads the robot, then offers every endpoint; nothing is advertised before it can answer."""
+from __future__ import annotations
+
+import sys
+import time
+
+import rospy
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.move_group.capabilities.cartesian_path_service import CartesianPathService
+from modular_framework_planning.move_group.capabilities.execute_trajectory_action import ExecuteTrajectory
+from modular_framework_planning.move_group.capabilities.kinematics_service import KinematicsService
+from modular_framework_planning.move_group.capabilities.move_action import MoveAction
+from modular_framework_planning.move_group.capabilities.pickup_action import PickupAction
+from modular_framework_planning.move_group.capabilities.place_action import PlaceAction
+from modular_framework_planning.move_group.capabilities.plan_service import PlanService
+from modular_framework_planning.move_group.capabilities.planning_scene_services import (
+    ApplyPlanningSceneService,
+    ClearOctomapService,
+    GetPlanningSceneService,
+)
+from modular_framework_planning.move_group.capabilities.query_planners_service import QueryPlannersService
+from modular_framework_planning.move_group.capabilities.sequence_action import SequenceAction
+from modular_framework_planning.move_group.capabilities.sequence_service import SequenceService
+from modular_framework_planning.move_group.capabilities.state_validation_service import StateValidationService
+from modular_framework_planning.move_group.capabilities.tf_publisher import TfPublisher
+from modular_framework_planning.move_group.capability_selection import Capability, chosen_capabilities
+from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.controllers.execution import load_execution
+from modular_framework_planning.move_group.many_clients import widen_backlog
+from modular_framework_planning.move_group.markers.scene_markers import MarkerPublisher
+from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
+from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.move_group.node_settings import (
+    MotionSettings,
+    PlanExecutionSettings,
+    SceneMonitorSettings,
+)
+from modular_framework_planning.move_group.padding_parameters import load_padding
+from modular_framework_planning.move_group.pipeline_parameters import load_pipelines
+from modular_framework_planning.move_group.planning_report import Reporter
+from modular_framework_planning.move_group.reconfiguration import given_settings, reconfigurations
+from modular_framework_planning.move_group.robot_parameters import load_kinematics_settings, load_robot_model
+from modular_framework_planning.numba_cache import cache_is_empty
+from modular_framework_planning.pick_place.settings import PickPlaceSettings
+from modular_framework_planning.process_setup.compile_loops import compile_all
+from modular_framework_planning.process_setup.many_threads import prepare
+
+# Every endpoint of the node under the name MoveIt's parameters `capabilities` and `disable_capabilities` use.
+CAPABILITIES = (
+    Capability("move_group/MoveGroupPlanService", PlanService),
+    Capability("move_group/MoveGroupCartesianPathService", CartesianPathService),
+    Capability("move_group/MoveGroupKinematicsService", KinematicsService),
+    Capability("move_group/MoveGroupStateValidationService", StateValidationService),
+    Capability("move_group/MoveGroupGetPlanningSceneService", GetPlanningSceneService),
+    Capability("move_group/ApplyPlanningSceneService", ApplyPlanningSceneService),
+    Capability("move_group/ClearOctomapService", ClearOctomapService),
+    Capability("move_group/MoveGroupQueryPlannersService", QueryPlannersService),
+    Capability("move_group/MoveGroupMoveAction", MoveAction),
+    Capability("move_group/MoveGroupExecuteTrajectoryAction", ExecuteTrajectory),
+    Capability("move_group/MoveGroupPickPlaceAction", PickupAction),
+    Capability("move_group/MoveGroupPickPlaceAction", PlaceAction),
+    Capability("pilz_industrial_motion_planner/MoveGroupSequenceAction", SequenceAction, default=False),
+    Capability("pilz_industrial_motion_planner/MoveGroupSequenceService", SequenceService, default=False),
+    Capability("move_group/TfPublisher", TfPublisher, default=False),
+)
+
+
+def build_context() -> MoveGroupContext:
+    """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
+    model = load_robot_model()
+    kinematics = KinematicsPool(model, load_kinematics_settings())
+    monitor = SceneMonitor(model, load_padding(model), given_settings("planning_scene_monitor", SceneMonitorSettings()))
+    execution = load_execution(monitor)
+    pipelines = load_pipelines(model, kinematics)
+    pipelines.sampling_settings = given_settings("ompl", pipelines.sampling_settings)
+    settings = MotionSettings(given_settings("plan_execution", PlanExecutionSettings()),
+                              given_settings("pick_place", PickPlaceSettings()))
+    return MoveGroupContext(model, monitor, kinematics, pipelines, execution, MarkerPublisher(model.planning_frame),
+                            Reporter(tell_requests="--debug" in rospy.myargv()), settings)
+
+
+def advertise(context: MoveGroupContext) -> None:
+    """Starts every endpoint that is not disabled."""
+    context.monitor.listeners.append(context.markers.show_scene)
+    context.monitor.connect()
+    OctomapMonitor(context.monitor).connect()
+    context.markers.show_scene(context.monitor.snapshot())
+    context.execution.connect()
+    for adjustable in reconfigurations(context):
+        adjustable.connect()
+    rospy.on_shutdown(context.execution.close)
+    rospy.on_shutdown(context.pipelines.close)
+    for capability in chosen_capabilities(CAPABILITIES):
+        capability(context).connect()
+
+
+def main() -> int:
+    """Runs the node; returns its exit code."""
+    begun = time.monotonic()
+    prepare()
+    rospy.init_node("move_group")
+    widen_backlog()
+    try:
+        context = build_context()
+    except PlanningError as error:
+        rospy.logfatal("move_group cannot start: %s", error.reason)
+        return 1
+    if cache_is_empty():
+        rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
+    compile_all()
+    scene = context.monitor.snapshot()
+    checker = CollisionChecker(scene)
+    checker.is_free(scene.positions)  # builds what both checks need of the links
+    checker.distance(scene.positions)
+    advertise(context)
+    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
+                  context.model.name, ", ".join(context.model.groups), ", ".join(context.pipelines),
+                  context.default_pipeline, context.execution.describe(), time.monotonic() - begun)
+    rospy.spin()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

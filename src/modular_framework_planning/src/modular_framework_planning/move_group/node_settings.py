@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings of move_group that may change while it runs, under MoveIt's names."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from modular_framework_planning.pick_place.settings import PickPlaceSettings
+
+
+@dataclass(frozen=True, slots=True)
+class SceneMonitorSettings:
+    """What is below ~planning_scene_monitor.
+
+    Attributes:
+        publish_planning_scene: whether anything is told on ~monitored_planning_scene.
+        publish_planning_scene_hz: how often joints and frames are told while they change; objects are told at once.
+        publish_geometry_updates, publish_state_updates, publish_transforms_updates: whether changes of objects, of
+            joints and of frames outside the robot are told.
+    """
+
+    publish_planning_scene: bool = True
+    publish_planning_scene_hz: float = 10.0
+    publish_geometry_updates: bool = True
+    publish_state_updates: bool = True
+    publish_transforms_updates: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PlanExecutionSettings:
+    """What is below ~plan_execution.
+
+    Attributes:
+        max_replan_attempts: how often a goal is planned anew where it asks for that and does not say how often.
+        record_trajectory_state_frequency: of what `executed_trajectory` holds [Hz]; 0: nothing is recorded.
+    """
+
+    max_replan_attempts: int = 5
+    record_trajectory_state_frequency: float = 20.0
+
+    def attempts(self, options: Any) -> int:
+        """Returns how often moveit_msgs/PlanningOptions allow to plan."""
+        if not options.replan:
+            return 1
+        return options.replan_attempts if options.replan_attempts > 0 else max(1, self.max_replan_attempts)
+
+
+@dataclass(slots=True)
+class MotionSettings:
+    """Holds the settings of motions; whoever starts a motion takes them as they are then."""
+
+    plan_execution: PlanExecutionSettings = field(default_factory=PlanExecutionSettings)
+    pick_place: PickPlaceSettings = field(default_factory=PickPlaceSettings)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Builds the planning pipelines from the parameters of the node, in the layouts config packages load them."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+import rospy
+
+from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.planning_request import (
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+    SamplingSettings,
+)
+from modular_framework_planning.planning_pipeline.pipeline import DEFAULT_PLANNER, PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_parts import DEFAULT_ADAPTERS, PipelineSpec
+from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+ROBOT_PLANNING = "robot_description_planning"
+PARENT = "~planning_pipelines"
+
+
+class PipelineSet(Mapping[str, PlanningPipeline]):
+    """The pipelines of the node, by name."""
+
+    def __init__(self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str],
+                 seeded: SeededPlanning) -> None:
+        """Stores the parts.
+
+        Args:
+            loaded: the pipelines.
+            default: name of the one an empty name means.
+            refused: why others, which the parameters name, are not there.
+            seeded: plans requests with a seed.
+        """
+        self._loaded, self.default, self._refused, self._seeded = dict(loaded), default, dict(refused), seeded
+        self._sampling = SamplingSettings()
+
+    @property
+    def sampling_settings(self) -> SamplingSettings:
+        """Settings of paths that are searched, of all pipelines; plans that begin later go by them."""
+        return self._sampling
+
+    @sampling_settings.setter
+    def sampling_settings(self, settings: SamplingSettings) -> None:
+        self._sampling = settings
+        for pipeline in self._loaded.values():
+            pipeline.settings = replace(pipeline.settings, sampling=settings)
+
+    def __getitem__(self, name: str) -> PlanningPipeline:
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._loaded)
+
+    def __len__(self) -> int:
+        return len(self._loaded)
+
+    def plan(self, request: PlanningRequest) -> PlanningAnswer:
+        """Plans with the pipeline the request names; in a process of its own where it or the pipeline has a seed."""
+        pipeline = self.choose(request.pipeline_id)
+        seed = pipeline.settings.seed if request.seed is None else request.seed
+        return pipeline.plan(request) if seed is None else self._seeded.plan(pipeline, request, seed)
+
+    def close(self) -> None:
+        """Ends what runs in other processes."""
+        self._seeded.close()
+
+    def choose(self, name: str) -> PlanningPipeline:
+        """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
+        name = name or self.default
+        if name in self._loaded:
+            return self._loaded[name]
+        reason = f" ({self._refused[name]})" if name in self._refused else ""
+        raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{name}' is not loaded{reason}; available: "
+                            f"{', '.join(self._loaded)}")
+
+
+def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
+    """Returns the parameters of every pipeline and the default's name.
+
+    Noetic's layout is ~planning_pipelines/<name>/... and ~default_planning_pipeline; older config packages load the
+    parameters of their only pipeline into the node's own namespace.
+    """
+    own = rospy.get_param("~", {}) or {}
+    given = own.get("planning_pipelines") or {}
+    pipelines = {name: dict(item) for name, item in given.items() if isinstance(item, dict)}
+    default = str(own.get("default_planning_pipeline") or "")
+    if not pipelines:
+        name = default or str(own.get("planning_plugin") or DEFAULT_PLANNER).split("_interface")[0].split("/")[0]
+        inner = own.get(name)
+        pipelines = {name: {**own, **(inner if isinstance(inner, dict) else {})}}
+    if not default:
+        default = "ompl" if "ompl" in pipelines else next(iter(pipelines))
+    return pipelines, default
+
+
+def pipeline_settings(parameters: Mapping[str, Any]) -> PipelineSettings:
+    """Reads the settings of one pipeline; its own value comes before the node's, and that before the robot's."""
+    planning = rospy.get_param(ROBOT_PLANNING, {}) or {}
+    known = {item.name for item in fields(PipelineSettings)}
+    values: dict[str, Any] = {}
+    for source in (planning, rospy.get_param("~", {}) or {}, parameters):
+        for key, value in source.items():
+            if key in known and isinstance(value, int | float) and not isinstance(value, bool):
+                values[key] = value
+    values["planner_configs"] = {name: item for name, item in (parameters.get("planner_configs") or {}).items()
+                                 if isinstance(item, dict)}
+    values["groups"] = {name: item for name, item in parameters.items()
+                        if isinstance(item, dict) and name != "planner_configs"}
+    return PipelineSettings(**values, parameters=parameters, robot_planning=planning)
+
+
+def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet:
+    """Builds every pipeline; one that cannot be built is left out, with its reason in the log.
+
+    Raises:
+        ModelError: the default pipeline is not among the parameters, or cannot be built.
+    """
+    parameters, default = pipeline_parameters()
+    loaded: dict[str, PlanningPipeline] = {}
+    refused: dict[str, str] = {}
+    specs: list[PipelineSpec] = []
+    for name, item in parameters.items():
+        try:
+            spec = _spec(name, item)
+            loaded[name] = _build(spec, model, kinematics)
+            specs.append(spec)
+        except PlanningError as error:
+            refused[name] = error.reason
+    if default not in loaded:
+        reason = refused.get(default, f"there is none of that name below {rospy.resolve_name(PARENT)}")
+        raise ModelError(f"{rospy.resolve_name('~default_planning_pipeline')}: pipeline '{default}' cannot be used: "
+                         f"{reason}; usable: {', '.join(loaded) or 'none'}")
+    for name, reason in refused.items():
+        rospy.logwarn("planning pipeline '%s' is left out: %s", name, reason)
+    seeded = SeededPlanning(model, specs)
+    if any(pipeline.settings.seed is not None for pipeline in loaded.values()):
+        threading.Thread(target=_start, args=(seeded,), daemon=True).start()
+    return PipelineSet(loaded, default, refused, seeded)
+
+
+def _start(seeded: SeededPlanning) -> None:
+    """Starts the worker early; a request that cannot wait for it gets the reason itself."""
+    try:
+        seeded.start()
+    except PlanningError as error:
+        rospy.logerr("%s", error.reason)
+
+
+def _spec(name: str, parameters: Mapping[str, Any]) -> PipelineSpec:
+    given = parameters.get("request_adapters")
+    adapters = DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given)
+    return PipelineSpec(name, str(parameters.get("planning_plugin") or DEFAULT_PLANNER), adapters,
+                        pipeline_settings(parameters))
+
+
+def _build(spec: PipelineSpec, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
+    pipeline = spec.build(model, kinematics)
+    for configuration in pipeline.configurations.names():
+        for fault in pipeline.parameter_faults(configuration):
+            rospy.logwarn("planning pipeline '%s', planner_configs/%s: %s", spec.name, configuration, fault)
+    return pipeline

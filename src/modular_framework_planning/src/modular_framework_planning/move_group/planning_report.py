@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tells why: every planning, kinematics and execution result goes to the log once and to ~planning_report as JSON."""
+from __future__ import annotations
+
+import itertools
+import json
+from typing import Any
+
+import rospy
+from moveit_msgs.msg import MotionPlanRequest
+from std_msgs.msg import String
+
+from modular_framework_control.ros_telling import tell
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.move_group import capability_names as names
+
+
+class Reporter:
+    """Publishes ~planning_report (std_msgs/String, JSON) and, if asked to, ~motion_plan_request (latched)."""
+
+    def __init__(self, tell_requests: bool = False) -> None:
+        """Args: whether requests for plans are told, as MoveIt does with the argument --debug."""
+        self._ids = itertools.count(1)
+        self._publisher = rospy.Publisher(names.REPORT_TOPIC, String, queue_size=100)
+        self._requests = rospy.Publisher(names.REQUEST_TOPIC, MotionPlanRequest, queue_size=10,
+                                         latch=True) if tell_requests else None
+
+    def request(self, message: MotionPlanRequest) -> None:
+        """Tells a request as it came."""
+        if self._requests is not None:
+            tell(self._requests, message)
+
+    def report(self, kind: str, code: int, reason: str, **details: Any) -> None:
+        """Publishes one result; a failure is logged as well.
+
+        Args:
+            kind: plan, ik, fk, validity, scene or execute.
+            code: number of moveit_msgs/MoveItErrorCodes.
+            reason: why it failed; empty on success.
+            details: further keys; values must fit into JSON.
+        """
+        entry = {"id": next(self._ids), "time": rospy.get_time(), "kind": kind, "error_code": int(code),
+                 "reason": reason, **details}
+        if code != ErrorCode.SUCCESS:
+            name = ErrorCode(code).name if code in set(ErrorCode) else str(code)
+            rospy.logwarn("%s failed (%s): %s", kind, name, reason)
+        tell(self._publisher, String(json.dumps(entry)))
+
+    def failure(self, kind: str, error: Exception, **details: Any) -> int:
+        """Reports an exception and returns the code to answer with."""
+        if isinstance(error, PlanningError):
+            self.report(kind, error.code, error.reason, **details)
+            return int(error.code)
+        rospy.logerr("%s: unexpected %s", kind, type(error).__name__, exc_info=error)
+        self.report(kind, ErrorCode.FAILURE, f"unexpected {type(error).__name__}: {error}", **details)
+        return int(ErrorCode.FAILURE)

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Searches the joint space of a group with OMPL's geometric planners."""
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import ompl.base as ob
+import ompl.util as ou
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planners.ompl.constrained_search import ConstrainedSearch, constraints_are_tight
+from modular_framework_planning.planners.ompl.planner_settings import (
+    ANYTIME,
+    DEFAULT_RANGE,
+    PLANNERS,
+    THREADED,
+    make_planner,
+    parameter_faults,
+    stages,
+)
+from modular_framework_planning.planners.ompl.projection import projection_evaluator
+from modular_framework_planning.planning_interface.path_repair import repaired
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
+from modular_framework_planning.trajectory_processing.path_shortening import path_length
+
+CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # of the search for a way round one edge
+ou.setLogLevel(ou.LogLevel.LOG_ERROR)
+
+
+class OmplPlanner:
+    """Samples the joint space of the group.
+
+    Parameters below a planner's configuration or the group: those of the planner (see planner_settings.py),
+    `projection_evaluator`, `longest_valid_segment_fraction` (edges are checked at least that finely, as a share of
+    the extent of the joint space) and `maximum_waypoint_distance` [rad]; `seeded_iterations` of the pipeline.
+    """
+
+    planner_ids = tuple(PLANNERS)
+    improving_ids = ANYTIME
+    description = "OMPL"
+
+    @staticmethod
+    def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:
+        """Says which settings of a planner are unknown or unreadable."""
+        return parameter_faults(planner_id, settings)
+
+    def plan(self, problem: PlanningProblem) -> PlannedPath:
+        """Returns the shortest of the paths that `attempts` searches find; the straight way where that is valid.
+
+        Raises:
+            PlanningError: no path was found, a setting is wrong, or the planner cannot do what is asked.
+        """
+        start, goals = problem.start_values, problem.goal_states()
+        step = edge_step(problem)
+        for goal in goals:
+            if problem.edge_is_valid(start, goal, problem.settings.finest_step):
+                return PlannedPath(np.vstack([start, goal]))
+        if problem.constraints is not None and constraints_are_tight(problem):
+            return ConstrainedSearch(problem, step).run()
+        if problem.repeatable and problem.planner_id in THREADED:
+            raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' works in threads and "
+                                "cannot repeat a plan; choose another planner or do not set a seed")
+        paths, states = [], 0
+        for _ in range(max(1, problem.request.attempts)):
+            for reach, limit in stages(problem.planner_id, problem.planner_parameters):
+                search = _Search(problem, goals, step, reach, limit)
+                path = search.run()
+                states += search.states
+                if path is not None:
+                    paths.append(path)
+                if path is not None or problem.interrupted():
+                    break
+            if problem.interrupted():
+                break
+        if not paths:
+            raise no_path(problem, problem.planner_id, states)
+        return PlannedPath(min(paths, key=path_length))
+
+    @staticmethod
+    def repaired(problem: PlanningProblem, vertices: Array) -> Array:
+        """Returns the path with every edge valid at the steps of the last check; raises EdgeError."""
+        return repaired(problem, vertices, connection)
+
+
+def connection(problem: PlanningProblem, first: Array, second: Array) -> Array | None:
+    """Returns a way between two free states, its edges looked at as finely as the last check looks; None for none.
+
+    The search ends after a number of iterations or states, so that a seed repeats it, or with the allowed time.
+    """
+    near = replace(problem.with_start(problem.motion.whole(first)), planner_id="RRTConnect", planner_parameters={},
+                   deadline_s=problem.end_s)
+    fine = problem.settings.finest_step
+    if problem.constraints is not None and constraints_are_tight(problem):
+        try:
+            return ConstrainedSearch(near, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
+        except PlanningError:
+            return None
+    return _Search(near, second[None], fine, DEFAULT_RANGE, CONNECTION_ITERATIONS).run()
+
+
+def edge_step(problem: PlanningProblem) -> float:
+    """Returns the distance of checks along an edge [rad or m] that the problem and the group's parameters ask for."""
+    step = problem.step
+    low, high = problem.bounds
+    extent = float(np.linalg.norm(np.minimum(high - low, 4.0 * np.pi)))
+    for key, unit in (("longest_valid_segment_fraction", extent), ("maximum_waypoint_distance", 1.0)):
+        value = problem.planner_parameters.get(key)
+        try:
+            size = float(str(value)) * unit if value is not None else 0.0
+        except ValueError as error:
+            raise PlanningError(ErrorCode.PLANNING_FAILED, f"{key} of group '{problem.group.name}' is '{value}'; it "
+                                "must be a number above 0") from error
+        step = min(step, size) if size > 0.0 else step
+    return max(step, problem.settings.finest_step)
+
+
+class _EdgeValidator(ob.MotionValidator):
+    """Hands whole edges to the search; `release` breaks the tie to the collision world afterwards."""
+
+    def __init__(self, information: Any, search: _Search) -> None:
+        super().__init__(information)
+        self._search: _Search | None = search
+
+    def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802 - OMPL calls it by this name
+        """Whether the straight motion is free."""
+        return self._search is not None and self._search.edge_is_valid(first, second)
+
+    def release(self) -> None:
+        """Lets go of the collision world."""
+        self._search = None
+
+
+class _Search:
+    """One run of one planner."""
+
+    def __init__(self, problem: PlanningProblem, goals: Array, step: float, default_range: float = DEFAULT_RANGE,
+                 limit: int | None = None) -> None:
+        """Args: what to plan; where to; distance of checks on edges; range and most iterations where not set."""
+        self._problem, self._goals, self._step = problem, goals, step
+        self._range, self._limit = default_range, limit
+        self._count = len(problem.group.joints)
+        self._condition: Any = None
+        self._iterations = 0
+        self.states = 0
+
+    def run(self) -> Array | None:
+        """Returns vertices of shape (n, joints) from the start to one of the goals, or None.
+
+        Raises:
+            PlanningError: a setting is wrong.
+        """
+        problem = self._problem
+        information = ob.SpaceInformation(self._space())
+        validator = _EdgeValidator(information, self)
+        information.setStateValidityChecker(self._state_is_valid)
+        information.setMotionValidator(validator)
+        information.setup()
+        definition = ob.ProblemDefinition(information)
+        definition.addStartState(self._state(information, problem.start_values))
+        goal = ob.GoalStates(information)
+        for values in self._goals:
+            goal.addState(self._state(information, values))
+        definition.setGoal(goal)
+        planner = make_planner(problem.planner_id, problem.planner_parameters, information, self._range)
+        text = str(problem.planner_parameters.get("projection_evaluator") or "")
+        projection = None
+        if text and hasattr(planner, "setProjectionEvaluator"):
+            projection = projection_evaluator(text, problem, information.getStateSpace())
+            planner.setProjectionEvaluator(projection)
+        try:
+            planner.setProblemDefinition(definition)
+            planner.setup()
+            self._condition = self._termination()
+            planner.solve(self._condition)
+            return self._vertices(definition)
+        finally:
+            self._condition = None
+            validator.release()
+            if projection is not None and hasattr(projection, "release"):
+                projection.release()
+            information.setStateValidityChecker(lambda state: False)
+
+    def _space(self) -> Any:
+        """Returns the joint space, no wider than two turns around the start and the goals."""
+        start, goals = self._problem.start_values, self._goals
+        low, high = self._problem.bounds
+        low = np.maximum(low, np.minimum(start, goals.min(axis=0)) - 2.0 * np.pi)
+        high = np.minimum(high, np.maximum(start, goals.max(axis=0)) + 2.0 * np.pi)
+        space, bounds = ob.RealVectorStateSpace(self._count), ob.RealVectorBounds(self._count)
+        for number in range(self._count):
+            bounds.setLow(number, float(low[number]))
+            bounds.setHigh(number, float(high[number]))
+        space.setBounds(bounds)
+        return space
+
+    def _termination(self) -> Any:
+        """Returns when to stop: the clock, or a number of iterations where the plan must be repeatable."""
+        problem = self._problem
+        if problem.planner_id in THREADED:
+            return ob.timedPlannerTerminationCondition(max(1e-3, problem.deadline_s - time.monotonic()))
+        limit = self._limit
+        if limit is None and problem.repeatable and problem.planner_id in ANYTIME:
+            limit = problem.settings.seeded_iterations
+        if limit is None:
+            return ob.PlannerTerminationCondition(problem.interrupted)
+
+        def stop() -> bool:
+            self._iterations += 1
+            if problem.interrupted():
+                return True
+            return self._iterations > limit
+
+        return ob.PlannerTerminationCondition(stop)
+
+    def _state_is_valid(self, state: Any) -> bool:
+        self.states += 1
+        if self._problem.cancelled() and self._condition is not None:
+            self._condition.terminate()
+            return False
+        return self._problem.state_is_valid(np.array(state[0:self._count]))
+
+    def edge_is_valid(self, first: Any, second: Any) -> bool:
+        """Whether the straight motion between two OMPL states is free and keeps the constraints."""
+        self.states += 1
+        return self._problem.edge_is_valid(np.array(first[0:self._count]), np.array(second[0:self._count]), self._step)
+
+    def _state(self, information: Any, values: Array) -> Any:
+        state = information.allocState()
+        for number, value in enumerate(values):
+            state[number] = float(value)
+        return state
+
+    def _vertices(self, definition: Any) -> Array | None:
+        if not definition.hasExactSolution():
+            return None
+        if self._problem.repeatable and self._problem.interrupted():
+            return None  # what was found until the clock ran out is not what the next run finds
+        return np.array([list(state[0:self._count]) for state in definition.getSolutionPath().getStates()])

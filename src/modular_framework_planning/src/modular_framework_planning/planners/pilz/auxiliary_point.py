@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the point of a circle from path_constraints, where Pilz's planner has it: it is an input and no constraint."""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.planning_interface.planning_request import AuxiliaryPoint
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+
+CENTRE, INTERIM = "center", "interim"
+
+
+def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_constraints") -> AuxiliaryPoint:
+    """Reads the point.
+
+    Args:
+        scene: gives frames their poses.
+        constraints: moveit_msgs/Constraints named "center" or "interim", with one position constraint whose region
+            has one pose; shapes and orientation do not matter and may be left out.
+        where: what the message belongs to, for error texts.
+
+    Raises:
+        PlanningError: the name is another, there is not exactly one point, it is not finite, or its frame or link
+            does not exist.
+    """
+    poses = [pose for item in constraints.position_constraints
+             for pose in (*item.constraint_region.primitive_poses, *item.constraint_region.mesh_poses)]
+    if constraints.name not in (CENTRE, INTERIM) or len(constraints.position_constraints) != 1 or len(poses) != 1:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{where}: name '{constraints.name}' with "
+                            f"{len(constraints.position_constraints)} position constraints and {len(poses)} poses; "
+                            f"CIRC needs the name '{CENTRE}' or '{INTERIM}' and one position constraint whose region "
+                            "has one pose, the point")
+    item = constraints.position_constraints[0]
+    if item.link_name and not scene.model.has_link(item.link_name):
+        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"{where}: link", item.link_name, scene.model.frame_ids)
+    point = np.array([poses[0].position.x, poses[0].position.y, poses[0].position.z], dtype=float)
+    if not np.isfinite(point).all():
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{where}: the point {point.tolist()} is not finite")
+    return AuxiliaryPoint(constraints.name, scene.frame_transform(item.header.frame_id).act(point))

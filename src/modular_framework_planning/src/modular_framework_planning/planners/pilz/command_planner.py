@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The planner of the pipeline pilz_industrial_motion_planner: one request, one motion of a known shape.
+
+It goes around nothing: the motion is what was asked for, or it is refused with the reason.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.kinematics.pose_follower import PoseFollower
+from modular_framework_planning.planners.pilz.auxiliary_point import CENTRE, INTERIM
+from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits, read_cartesian_limits
+from modular_framework_planning.planners.pilz.commands import Pace, along_path, point_to_point
+from modular_framework_planning.planners.pilz.joint_motion import JointRates
+from modular_framework_planning.planners.pilz.pose_path import (
+    LinePath,
+    PosePath,
+    arc_around_centre,
+    arc_through_interim,
+)
+from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PoseGoal
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+DEFAULT_SAMPLING_TIME_S = 0.1
+STANDING_STILL = 0.01  # [rad/s or m/s]; what a measured joint at rest may show
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Target:
+    """Where a link has to be at the end, and with which joint values if they were given."""
+
+    link: str
+    pose: Transform
+    values: Array | None
+
+
+class CommandPlanner:
+    """Plans PTP, LIN and CIRC."""
+
+    planner_ids = ("PTP", "LIN", "CIRC")
+    replaces_bad_values = False
+    auxiliary_constraints = (CENTRE, INTERIM)
+    collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators look at no collisions themselves
+
+    def __init__(self, cartesian_limits: Mapping[str, Any] | None, sampling_time_s: float = DEFAULT_SAMPLING_TIME_S
+                 ) -> None:
+        """Stores the limits.
+
+        Args:
+            cartesian_limits: max_trans_vel, max_trans_acc, max_trans_dec, max_rot_vel; may be absent for PTP alone.
+            sampling_time_s: between two points of a motion.
+
+        Raises:
+            ModelError: the sampling time is not above 0, or a limit is not usable.
+        """
+        if not (math.isfinite(sampling_time_s) and sampling_time_s > 0.0):
+            raise ModelError(f"sampling_time is {sampling_time_s}; a time above 0 s is needed")
+        self.sampling_time_s = sampling_time_s
+        self._limits = read_cartesian_limits(cartesian_limits) if cartesian_limits else None
+
+    @classmethod
+    def configure(cls, _model: RobotModel, settings: PipelineSettings) -> CommandPlanner:
+        """Makes the planner from parameters: robot_description_planning/cartesian_limits, sampling_time."""
+        return cls(settings.robot_planning.get("cartesian_limits"),
+                   float(settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S)))
+
+    def plan(self, problem: PlanningProblem) -> Trajectory:
+        """Plans one motion; raises PlanningError with the reason."""
+        if problem.cancelled():
+            raise PlanningError(ErrorCode.PREEMPTED, f"{problem.planner_id} was cancelled before it began")
+        _require_standing(problem)
+        if len(problem.request.goals) != 1:
+            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {len(problem.request.goals)} "
+                                f"alternatives; {problem.planner_id} takes exactly one")
+        if not isinstance(problem.request.goals[0], JointGoal | PoseGoal):
+            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {problem.planner_id} takes "
+                                "joint constraints alone, or one position and one orientation constraint of one link")
+        pace = self._pace(problem)
+        match problem.planner_id:
+            case "PTP" | "":
+                rates = JointRates.of(problem.model, problem.group)
+                return point_to_point(problem.start_values, problem.goal_states()[0], rates, pace)
+            case "LIN" | "CIRC":
+                return self._along_path(problem, pace)
+        raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' is not one of "
+                            f"{', '.join(self.planner_ids)}")
+
+    def _pace(self, problem: PlanningProblem) -> Pace:
+        """Reads the scaling factors back from the scaled limits, where 0 has become the default."""
+        indices = problem.group.indices
+        return Pace(float((problem.max_velocity / problem.model.max_velocity[indices]).min()),
+                    float((problem.max_acceleration / problem.model.max_acceleration[indices]).min()),
+                    self.sampling_time_s)
+
+    def _along_path(self, problem: PlanningProblem, pace: Pace) -> Trajectory:
+        limits = self._require_limits(problem.planner_id)
+        solver = problem.kinematics.solver(problem.group.name)
+        target = _target(problem)
+        follower = PoseFollower(solver, target.link, problem.start)
+        path = _path(problem, follower.pose(problem.start_values), target.pose)
+        return along_path(path, follower, problem.start_values, limits, pace, target.values)
+
+    def _require_limits(self, planner_id: str) -> CartesianLimits:
+        if self._limits is None:
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{planner_id}: robot_description_planning/"
+                                "cartesian_limits is not set; load a cartesian_limits.yaml with max_trans_vel, "
+                                "max_trans_acc, max_trans_dec and max_rot_vel")
+        return self._limits
+
+
+def _require_standing(problem: PlanningProblem) -> None:
+    for name, velocity in problem.request.start_velocities.items():
+        if name in problem.group.joints and not abs(velocity) <= STANDING_STILL:
+            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"start state: joint '{name}' moves at {velocity}; "
+                                f"{problem.planner_id} starts from rest (at most {STANDING_STILL})")
+
+
+def _target(problem: PlanningProblem) -> _Target:
+    goal = problem.request.goals[0]
+    values = np.asarray(problem.goal_states()[0])
+    if isinstance(goal, PoseGoal):
+        return _Target(goal.link, goal.target, None)
+    link = problem.group.tip_link
+    follower = PoseFollower(problem.kinematics.solver(problem.group.name), link, problem.start)
+    return _Target(link, follower.pose(values), values if isinstance(goal, JointGoal) else None)
+
+
+def _path(problem: PlanningProblem, start: Transform, end: Transform) -> PosePath:
+    if problem.planner_id == "LIN":
+        return LinePath.between(start, end)
+    auxiliary = problem.request.auxiliary_point
+    if auxiliary is None:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"CIRC: path_constraints: neither '{CENTRE}' nor "
+                            f"'{INTERIM}'; one is needed as the name, with a position constraint that is the point")
+    return (arc_around_centre if auxiliary.name == CENTRE else arc_through_interim)(start, end, auxiliary.position)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns a link's motion over time into a trajectory of joints, each sample checked against the joints' limits."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.kinematics.pose_follower import LinkMotion, PoseFollower
+from modular_framework_planning.planners.pilz.velocity_profile import sample_times
+from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+CHECK_PERIOD_S = 0.01  # between two looks at the joints' limits
+MOST_CHECKS = 4000
+DIFFERENCE_S = 1.0e-5  # step of the numeric derivatives of a pose
+LIMIT_TOLERANCE = 1.0e-3  # share of a limit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointState:
+    """Joints of a group at one moment, shape (joints,) each [rad or m, per s, per s^2]."""
+
+    positions: Array
+    velocities: Array
+    accelerations: Array
+
+
+Posture = Callable[[float], JointState]  # over the time of a motion
+
+
+def at_rest(positions: Array) -> JointState:
+    """Returns joints that stand still."""
+    return JointState(positions, np.zeros_like(positions), np.zeros_like(positions))
+
+
+def state_at(trajectory: Trajectory, time_s: float) -> JointState:
+    """Returns the joints of a trajectory at a moment; at rest before and after it."""
+    if not 0.0 <= time_s <= trajectory.duration_s:
+        return at_rest(trajectory.positions[0 if time_s < 0.0 else -1])
+    return JointState(*(rows[0] for rows in trajectory.at(np.array([time_s]))[:3]))
+
+
+class PoseMotion(Protocol):
+    """A link's pose over time; at rest outside of it."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the motion."""
+
+    @property
+    def knots(self) -> Array:
+        """Times at which the jerk may change, in order [s]."""
+
+    def pose(self, time_s: float) -> Transform:
+        """Returns the link's pose in the planning frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointRates:
+    """What a group's joints can do, in their order [1/s, 1/s^2]."""
+
+    joints: tuple[str, ...]
+    velocity: Array
+    acceleration: Array
+    deceleration: Array
+
+    @classmethod
+    def of(cls, model: RobotModel, group: JointGroup) -> JointRates:
+        """Reads the limits of a group."""
+        return cls(group.joints, model.max_velocity[group.indices], model.max_acceleration[group.indices],
+                   model.max_deceleration[group.indices])
+
+    def require(self, time_s: float, velocities: Array, accelerations: Array) -> None:
+        """Checks one sample.
+
+        Raises:
+            PlanningError: names the joint that is furthest above its limit.
+        """
+        braking = velocities * accelerations < 0.0
+        allowed = np.where(braking, self.deceleration, self.acceleration)
+        for what, unit, values, limits in (("velocity", "1/s", velocities, self.velocity),
+                                           ("acceleration", "1/s^2", accelerations, allowed)):
+            excess = np.abs(values) / limits
+            worst = int(excess.argmax())
+            if excess[worst] > 1.0 + LIMIT_TOLERANCE:
+                raise PlanningError(
+                    ErrorCode.INVALID_MOTION_PLAN,
+                    f"joint '{self.joints[worst]}' would need {what} {abs(values[worst]):.3f} {unit} at "
+                    f"{time_s:.3f} s; allowed is {limits[worst]:.3f}: lower max_{what}_scaling_factor, or keep away "
+                    "from singular postures")
+
+
+def link_motion(motion: PoseMotion, time_s: float) -> LinkMotion:
+    """Returns velocity and acceleration of a link by central differences."""
+    step = DIFFERENCE_S
+    before, now, after = (motion.pose(time_s + shift) for shift in (-step, 0.0, step))
+    turn_before = now.rotation @ pin.log3(before.rotation.T @ now.rotation)
+    turn_after = now.rotation @ pin.log3(now.rotation.T @ after.rotation)
+    way_before, way_after = now.translation - before.translation, after.translation - now.translation
+    velocity = np.concatenate([way_before + way_after, turn_before + turn_after]) / (2.0 * step)
+    return LinkMotion(velocity, np.concatenate([way_after - way_before, turn_after - turn_before]) / step**2)
+
+
+def follow(motion: PoseMotion, follower: PoseFollower, period_s: float, start: JointState,
+           end: JointState | None = None, posture: Posture | None = None) -> Trajectory:
+    """Follows a link's motion with the joints.
+
+    Args:
+        motion: of the follower's link.
+        follower: inverse kinematics by continuation.
+        period_s: between two points of the trajectory.
+        start: of the joints at the beginning.
+        end: velocities and accelerations of the joints at the end; at rest by default.
+        posture: what a redundant arm keeps nearest to.
+
+    Raises:
+        PlanningError: a pose cannot be reached without a jump, or a joint's limit would be broken.
+    """
+    rates = JointRates.of(follower.model, follower.group)
+    points = sample_times(motion.duration_s, motion.knots, period_s)
+    longest = max(CHECK_PERIOD_S, motion.duration_s / MOST_CHECKS)
+    state, rows = start, [start]
+    for low, high in zip(points[:-1], points[1:], strict=True):
+        count = int(np.ceil((high - low) / longest))
+        for time_s in low + (high - low) * np.arange(1, count + 1) / count:
+            state = _advance(motion, follower, state, float(time_s), (high - low) / count, posture)
+            rates.require(time_s, state.velocities, state.accelerations)
+        rows.append(state)
+    rows[-1] = JointState(state.positions, end.velocities, end.accelerations) if end else at_rest(state.positions)
+    return Trajectory(follower.group.joints, points, *(np.array([getattr(row, name) for row in rows])
+                                                       for name in ("positions", "velocities", "accelerations")))
+
+
+def _advance(motion: PoseMotion, follower: PoseFollower, state: JointState, time_s: float, gap_s: float,
+             posture: Posture | None) -> JointState:
+    guess = state.positions + gap_s * (state.velocities + 0.5 * gap_s * state.accelerations)
+    wanted = posture(time_s) if posture else None
+    try:
+        values = follower.step(guess, motion.pose(time_s), wanted.positions if wanted else None)
+    except PlanningError as error:
+        raise PlanningError(error.code, f"{error.reason} (after {time_s:.3f} of {motion.duration_s:.3f} s)") from error
+    velocities, accelerations = follower.rates(values, link_motion(motion, time_s),
+                                               (wanted.velocities, wanted.accelerations) if wanted else None)
+    return JointState(values, velocities, accelerations)

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns the goals of a request into free joint vectors, or says why there is none.
+
+How long it looks is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
+from modular_framework_planning.kinematics.solution_choice import first_free
+from modular_framework_planning.planning_interface.planning_request import (
+    ConstraintGoal,
+    JointGoal,
+    PlanningRequest,
+    PoseGoal,
+)
+from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
+from modular_framework_planning.robot_model.robot_model import JointGroup
+
+MAX_GOAL_STATES = 8
+MOST_SAMPLES = 64  # states looked at within the tolerances of one goal
+MOST_POSES = 16  # poses looked at within the tolerances of one goal
+
+
+class GoalResolver:
+    """Resolves the goals of one request."""
+
+    def __init__(self, request: PlanningRequest, group: JointGroup, kinematics: KinematicsPool,
+                 checker: CollisionChecker, motion: MotionChecker, rng: np.random.Generator,
+                 path_constraints: KinematicConstraints | None = None,
+                 interrupted: Callable[[], bool] = lambda: False) -> None:
+        """Args: the request; its group; solvers; collision checks; random numbers; what goal states must satisfy; when
+        to stop looking at further goals."""
+        self._interrupted = interrupted
+        self._request, self._group, self._kinematics = request, group, kinematics
+        self._checker, self._motion, self._rng = checker, motion, rng
+        self._path_constraints = path_constraints
+        self._model = request.scene.model
+        self._start = request.scene.positions[group.indices]
+
+    def resolve(self) -> Array:
+        """Returns free goal vectors of the group, nearest to the start first, shape (n, joints).
+
+        Raises:
+            PlanningError: no goal was given, or none can be reached; the first goal's reason is told.
+        """
+        if not self._request.goals:
+            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, "the request has no goal; give joint constraints "
+                                "or a position and an orientation constraint")
+        vectors: list[Array] = []
+        failures: list[PlanningError] = []
+        for number, goal in enumerate(self._request.goals):
+            if number and self._interrupted():
+                if vectors:
+                    break
+                raise PlanningError(ErrorCode.TIMED_OUT, f"goal_constraints: {number} of {len(self._request.goals)} "
+                                    f"alternatives were looked at in the allowed {self._request.allowed_time_s:.2f} s, "
+                                    f"none can be reached ({failures[0].reason}); allow more time or give fewer goals")
+            try:
+                vectors += self._vectors(goal)
+            except PlanningError as error:
+                failures.append(error)
+        if not vectors:
+            raise failures[0]
+        vectors.sort(key=lambda values: float(np.linalg.norm(values - self._start)))
+        return np.array(vectors[:MAX_GOAL_STATES])
+
+    def _vectors(self, goal: JointGoal | PoseGoal | ConstraintGoal) -> list[Array]:
+        match goal:
+            case JointGoal():
+                return [self._joint(goal)]
+            case PoseGoal():
+                return self._pose(goal)
+            case ConstraintGoal():
+                return self._region(goal.constraints)
+        raise TypeError(f"{type(goal).__name__} is not a goal")
+
+    def _is_good(self, values: Array) -> bool:
+        """Whether a state satisfies the path constraints and is free."""
+        constraints = self._path_constraints
+        return (constraints is None or constraints.satisfied(self._motion.whole(values))) and (
+            self._motion.state_is_free(values))
+
+    def _why_not(self, values: Array, what: str) -> PlanningError:
+        """Says what is wrong with the best candidate of a goal."""
+        whole, constraints = self._motion.whole(values), self._path_constraints
+        if constraints is not None and not constraints.satisfied(whole):
+            return PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, f"{what} violates the path constraints: "
+                                 f"{constraints.describe(whole)}; move the goal or widen the tolerances")
+        contacts = self._checker.contacts(whole, include_fixed=False)
+        return PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}",
+                             contacts)
+
+    def _joint(self, goal: JointGoal) -> Array:
+        """Returns the exact target; where that is not free, the first free state found within the tolerances."""
+        target, low, high = self._joint_ranges(goal)
+        if self._is_good(target):
+            return target
+        if (high > low).any():
+            for number in range(MOST_SAMPLES):
+                share = (number + 1) / MOST_SAMPLES
+                values = target + share * (self._rng.uniform(low, high) - target)
+                if self._is_good(values):
+                    return values
+        raise self._why_not(target, "goal")
+
+    def _joint_ranges(self, goal: JointGoal) -> tuple[Array, Array, Array]:
+        """Returns target, lowest and highest allowed values of the group's joints; a turn without ends is nearest."""
+        goal = goal.of_independent_joints(self._model.document.mimics)
+        values = np.array(self._start)
+        low, high = values.copy(), values.copy()
+        for name, wanted in goal.positions.items():
+            if name not in self._group.joints:
+                raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal: joint '{name}' is not in group "
+                                    f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}")
+            number, place = self._model.index[name], self._group.joints.index(name)
+            if self._model.is_continuous(number):
+                wanted += 2.0 * np.pi * np.round((values[place] - wanted) / (2.0 * np.pi))
+            least = max(self._model.lower[number], wanted - goal.below.get(name, 0.0))
+            most = min(self._model.upper[number], wanted + goal.above.get(name, 0.0))
+            if least > most + BEYOND_BOUND:
+                raise PlanningError(ErrorCode.GOAL_STATE_INVALID, f"goal: joint '{name}' at {wanted:.6f} is outside "
+                                    f"[{self._model.lower[number]:.6f}, {self._model.upper[number]:.6f}]; give a "
+                                    f"position at most {BEYOND_BOUND} beyond a bound")
+            bounds = self._model.lower[number], self._model.upper[number]
+            low[place], high[place] = np.clip((min(least, most), max(least, most)), *bounds)
+            values[place] = np.clip(wanted, low[place], high[place])
+        return values, low, high
+
+    def _pose(self, goal: PoseGoal) -> list[Array]:
+        """Returns free solutions at the target; where there are none, at other poses that are allowed."""
+        seed, allowed = self._request.scene.positions, goal.allowed
+        try:
+            solver = self._kinematics.solver(self._group.name)
+            found = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng)
+        except PlanningError:
+            if allowed is None:
+                raise
+            return self._region(allowed)  # no chain to that link: least squares instead of inverse kinematics
+        candidates = [positions[self._group.indices] for positions in found]
+        free = first_free(candidates, self._is_good, MAX_GOAL_STATES)
+        if allowed is not None and allowed.is_loose:
+            nearest = allowed.project(seed, self._group.indices)
+            if nearest is not None and self._is_good(nearest[self._group.indices]):
+                free.append(nearest[self._group.indices])
+            if not free:
+                others = self._at_other_poses(goal, allowed, solver)
+                free, candidates = first_free(others, self._is_good, MAX_GOAL_STATES), candidates + others
+        if free:
+            return free
+        if not candidates:
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
+        raise self._why_not(candidates[0], f"goal: all {len(candidates)} inverse kinematics solutions for "
+                            f"'{goal.link}' collide; the nearest is" if self._path_constraints is None else
+                            f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; "
+                            "the nearest")
+
+    def _at_other_poses(self, goal: PoseGoal, allowed: KinematicConstraints, solver: InverseKinematics) -> list[Array]:
+        """Returns solutions at random poses within the tolerances."""
+        seed, indices = self._request.scene.positions, self._group.indices
+        to_link = allowed.pose_target(seed).inverse() * goal.target
+        found: list[Array] = []
+        for _ in range(MOST_POSES):
+            target = allowed.pose_target(seed, self._rng) * to_link
+            solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng)
+            found += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
+        return found
+
+    def _region(self, constraints: KinematicConstraints) -> list[Array]:
+        """Returns free states that satisfy: the nearest to the start, then random ones."""
+        seed, indices = self._request.scene.positions, self._group.indices
+        free: list[Array] = []
+        rejected: list[Array] = []
+        for number in range(MOST_SAMPLES):
+            found = constraints.project(seed, indices) if number == 0 else (
+                constraints.sample(self._rng, seed, indices, 1))
+            if found is not None:
+                (free if self._is_good(found[indices]) else rejected).append(found[indices])
+            if len(free) >= MAX_GOAL_STATES:
+                break
+        if free:
+            return free
+        if rejected:
+            raise self._why_not(rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; "
+                                "the nearest is")
+        raise PlanningError(ErrorCode.GOAL_CONSTRAINTS_VIOLATED, "goal region was empty: no state of group "
+                            f"'{self._group.name}' within its joint bounds satisfies all constraints; from the start, "
+                            f"{constraints.describe(seed)}")

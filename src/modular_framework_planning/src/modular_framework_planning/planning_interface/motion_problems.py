@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads motion-planning problems kept as YAML (a PlanningScene and a MotionPlanRequest each) without a ROS master."""
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+import yaml
+
+from modular_framework_planning.errors import GeometryError, ModelError
+from modular_framework_planning.geometry.shapes import Box, Cylinder, Shape, Sphere
+from modular_framework_planning.geometry.spatial import Transform, make_transform
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningRequest
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+SHAPES: dict[str, type[Any]] = {"box": Box, "cylinder": Cylinder, "sphere": Sphere}
+
+
+@dataclass(frozen=True, slots=True)
+class MotionProblem:
+    """One problem: where it comes from and what is asked."""
+
+    name: str
+    request: PlanningRequest
+
+
+def _load(path: Path) -> Mapping[str, Any]:
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        return yaml.load(path.read_text(), loader)  # noqa: S506 - both are safe loaders
+    except (OSError, yaml.YAMLError) as error:
+        raise ModelError(f"{path}: cannot be read as YAML: {error}") from error
+
+
+def _pose(entry: Mapping[str, Sequence[float]] | None, where: str) -> Transform:
+    if not entry:
+        return pin.SE3.Identity()
+    return make_transform(entry["position"], entry["orientation"], where)
+
+
+def _shape(entry: Mapping[str, Any], where: str) -> Shape:
+    kind = str(entry["type"])
+    if kind not in SHAPES:
+        raise GeometryError(f"{where}: primitive '{kind}'; allowed are {', '.join(SHAPES)}")
+    return SHAPES[kind](*entry["dimensions"])
+
+
+def read_scene(model: RobotModel, path: Path) -> PlanningScene:
+    """Returns the scene of a YAML file; the robot's own allowed collisions come from its SRDF."""
+    scene = empty_scene(model)
+    for entry in _load(path)["world"]["collision_objects"]:
+        where = f"{path.name} '{entry['id']}'"
+        poses = entry.get("primitive_poses") or [None] * len(entry["primitives"])
+        shapes = tuple((_shape(item, where), _pose(pose, where))
+                       for item, pose in zip(entry["primitives"], poses, strict=True))
+        frame = scene.frame_transform(str((entry.get("header") or {}).get("frame_id", "")))
+        scene = scene.with_object(CollisionObject(entry["id"], frame * _pose(entry.get("pose"), where), shapes))
+    return scene
+
+
+def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowed_time_s: float) -> MotionProblem:
+    """Returns one problem; joints of its start state the robot does not have are left out."""
+    request = _load(request_path)
+    state = request["start_state"]["joint_state"]
+    values = {name: float(value) for name, value in zip(state["name"], state["position"], strict=True)
+              if name in model.index}
+    scene = read_scene(model, scene_path)
+    scene = scene.with_positions(model.merge(scene.positions, values))
+    goals = tuple(JointGoal({item["joint_name"]: float(item["position"]) for item in goal["joint_constraints"]})
+                  for goal in request["goal_constraints"])
+    name = f"{scene_path.parent.name}/{request_path.stem.removeprefix('request')}"
+    return MotionProblem(name, PlanningRequest(scene, request["group_name"], goals, request.get("planner_id", ""), 1,
+                                               allowed_time_s))
+
+
+def read_problems(model: RobotModel, folder: Path, allowed_time_s: float) -> Iterator[MotionProblem]:
+    """Yields every problem below a folder (<family>/sceneNNNN.yaml with requestNNNN.yaml), in the order of names."""
+    for scene_path in sorted(folder.glob("*/scene*.yaml")):
+        yield read_problem(model, scene_path, scene_path.with_name(scene_path.name.replace("scene", "request")),
+                           allowed_time_s)

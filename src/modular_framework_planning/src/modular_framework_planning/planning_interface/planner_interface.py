@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a planner is given and what it gives back: the one interface between the pipelines and every planner."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.goals import GoalResolver
+from modular_framework_planning.planning_interface.planning_request import PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+    from modular_framework_planning.planning_pipeline.last_check import LastCheck
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanningProblem:
+    """One request made ready for a planner; belongs to one thread.
+
+    Attributes:
+        request: what was asked; its scene holds the start positions.
+        group: the joints to move; joint vectors below have their order.
+        start: positions of the whole robot [rad or m].
+        checker, motion: answer whether states and edges are free of collisions.
+        max_velocity, max_acceleration: limits of the group's joints, scaling applied, shape (joints,).
+        rng: the only source of random numbers a planner uses, so that a seed repeats its plan.
+        begun_s, end_s: time.monotonic() at which the request came, and at which its allowed time ends.
+        deadline_s: time.monotonic() at which the planner gives up: what is left then is for the check of the motion.
+        planner_id: the planner chosen (without "group[...]" around it); planner_parameters: its entry in
+            planner_configs.
+        constraints: path constraints every state must satisfy, or None.
+        step: distance of collision checks along an edge of the search [rad or m].
+        last_check: the check every timed motion must pass (see last_check.py).
+        repeatable: the search is bounded by iterations and not by the clock.
+    """
+
+    request: PlanningRequest
+    model: RobotModel
+    group: JointGroup
+    start: Array
+    checker: CollisionChecker
+    motion: MotionChecker
+    kinematics: KinematicsPool
+    settings: PipelineSettings
+    max_velocity: Array
+    max_acceleration: Array
+    rng: np.random.Generator
+    begun_s: float
+    deadline_s: float
+    end_s: float
+    last_check: LastCheck
+    planner_id: str = ""
+    planner_parameters: Mapping[str, Any] = field(default_factory=dict)
+    constraints: KinematicConstraints | None = None
+    step: float = 0.05
+    repeatable: bool = False
+    _goals: list[Array] = field(default_factory=list)
+
+    @property
+    def scene(self) -> PlanningScene:
+        """The world, with the robot at the start."""
+        return self.request.scene
+
+    @property
+    def start_values(self) -> Array:
+        """The start as a joint vector of the group."""
+        return self.start[self.group.indices]
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the group's joints, each of shape (joints,)."""
+        return self.model.lower[self.group.indices], self.model.upper[self.group.indices]
+
+    def goal_states(self) -> Array:
+        """Returns free joint vectors that reach a goal, nearest to the start first, shape (n, joints).
+
+        Raises:
+            PlanningError: there is none; says why.
+        """
+        if not self._goals:
+            self._goals.append(GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
+                                            self.rng, self.constraints, self._goals_must_end).resolve())
+        return self._goals[0]
+
+    def _goals_must_end(self) -> bool:
+        """Whether no further goal may be looked at: half the time is for the search.
+
+        Where the plan must be repeatable, all goals are looked at, or none is used.
+        """
+        if self.repeatable and not self.interrupted():
+            return False
+        return self.cancelled() or time.monotonic() > 0.5 * (self.begun_s + self.deadline_s)
+
+    def state_is_valid(self, values: Array) -> bool:
+        """Whether a joint vector is free of collisions and satisfies the path constraints."""
+        return self.motion.state_is_free(values) and (
+            self.constraints is None or self.constraints.satisfied(self.motion.whole(values)))
+
+    def edge_is_valid(self, first: Array, second: Array, step: float | None = None) -> bool:
+        """Whether the straight motion is free and satisfies the path constraints (its start is not looked at).
+
+        Constraints are looked at no more finely than the last check does.
+        """
+        step = step or self.step
+        if not self.motion.edge_is_free(first, second, step):
+            return False
+        if self.constraints is None:
+            return True
+        step = max(step, self.settings.motion_step)
+        count = max(1, int(np.ceil(float(np.abs(second - first).max()) / step)))
+        return all(self.constraints.satisfied(self.motion.whole(first + number / count * (second - first)))
+                   for number in range(1, count + 1))
+
+    def cancelled(self) -> bool:
+        """Whether somebody asked to stop."""
+        return self.request.cancelled()
+
+    def interrupted(self) -> bool:
+        """Whether the planner must stop: cancelled, or the time is over."""
+        return self.cancelled() or time.monotonic() > self.deadline_s
+
+    def with_start(self, start: Array) -> PlanningProblem:
+        """Returns the problem from another start (positions of the whole robot)."""
+        request = replace(self.request, scene=self.scene.with_positions(start))
+        return replace(self, request=request, start=start, _goals=[],
+                       motion=MotionChecker(self.checker, self.group.indices, start))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedPath:
+    """A path, timed or not yet.
+
+    Attributes:
+        vertices: joint vectors from start to goal, shape (n, joints).
+        trajectory: the timed motion, once there is one.
+        lead_in: number of vertices before the first that has to be free: the way out of a colliding start.
+        unconstrained: number of vertices before the first that has to satisfy the path constraints.
+        planner_id: what the answer calls the planner; empty for the problem's own planner_id.
+        found_s: time.monotonic() when the planner was done.
+        is_short: no shortening is wanted (a planner that follows a given line).
+    """
+
+    vertices: Array
+    trajectory: Trajectory | None = None
+    lead_in: int = 0
+    unconstrained: int = 0
+    planner_id: str = ""
+    found_s: float = 0.0
+    is_short: bool = False
+
+
+@runtime_checkable
+class Planner(Protocol):
+    """A planner: one class with one method.
+
+    A class may also have, each optional:
+        planner_ids: names it takes as planner_id; any name when it is absent or empty.
+        improving_ids: those of them that improve their path until their time is over.
+        replaces_bad_values: whether an unknown planner_id and scaling out of range give a warning and defaults, as in
+            OMPL's planning contexts, or are refused; true when it is absent.
+        configure(model, settings): class method that makes it; without one it is made without arguments.
+        auxiliary_constraints: names of path constraints that are input of the planner (such as the interim point of
+            a circle), which then need not be kept by the motion.
+        collision_code: the error code for a start or goal in collision, where it is not the one of that name.
+        repaired(problem, vertices): the path with every edge valid at the steps of the last check, or EdgeError. The
+            pipeline mends nothing by itself: a motion that fails the check counts as the planner's failure.
+    """
+
+    def plan(self, problem: PlanningProblem) -> PlannedPath | Trajectory:
+        """Plans, or raises PlanningError with code and reason. A Trajectory is timed and stays as it is."""
+        ...
+
+
+PlanNext = Callable[[PlanningProblem], PlannedPath]
+
+
+def no_path(problem: PlanningProblem, what: str, states: int | None = None) -> PlanningError:
+    """Says why a search ended without a path: cancelled, time over, or nothing left to try.
+
+    Args:
+        problem: what was searched.
+        what: name of the planner.
+        states: how many states were looked at, where that is known.
+    """
+    spent = time.monotonic() - problem.begun_s
+    looked = "" if states is None else f" after {states} states"
+    if problem.cancelled():
+        return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s{looked}")
+    timed_out = time.monotonic() > problem.deadline_s
+    return PlanningError(
+        ErrorCode.TIMED_OUT if timed_out else ErrorCode.PLANNING_FAILED,
+        f"{what} found no path in {spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s, the last "
+        f"{problem.end_s - problem.deadline_s:.2f} s of them for the check of a motion)"
+        f"{': time ran out' if timed_out else ': nothing was left to try'}{looked}; start and goal are free, so the "
+        "way between them is blocked or narrow: allow more time or choose another goal")

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps the limits of jerk: the fastest of several smooth timings that passes the last check."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.add_time_optimal_parameterization import time_path
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.trajectory_processing.jerk_limits import (
+    along_straight_lines,
+    averaged_curve,
+    jerk_overrun,
+    slowed_to_limits,
+)
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+
+class AddRuckigTrajectorySmoothing(RequestAdapter):
+    """Limits of jerk are `max_jerk` of joint_limits.yaml (has_jerk_limits), 1000 rad/s^3 where there is none.
+
+    Candidates: Ruckig's motion along the path's straight lines, with a stop at each vertex (paths of a planner that
+    does not time its motion); the timed motion averaged over a window; the timed motion run evenly slower.
+    """
+
+    def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
+        """Plans, then smooths; a motion that keeps the limits of jerk stays as it is."""
+        path = plan_next(problem)
+        timed = path if path.trajectory is not None else time_path(problem, path)
+        assert timed.trajectory is not None
+        jerk = problem.model.max_jerk[problem.group.indices]
+        limits = problem.max_velocity, problem.max_acceleration, jerk
+        if jerk_overrun(timed.trajectory, *limits) <= 1.0:
+            return timed
+        candidates = [replace(timed, trajectory=item) for item in self._candidates(problem, timed)]
+        for candidate in sorted(candidates, key=_duration):
+            if not problem.last_check.fault(problem, candidate):
+                return candidate
+        return replace(timed, trajectory=slowed_to_limits(timed.trajectory, *limits))
+
+    @staticmethod
+    def _candidates(problem: PlanningProblem, path: PlannedPath) -> Iterator[Trajectory]:
+        assert path.trajectory is not None
+        limits = (problem.max_velocity, problem.max_acceleration, problem.model.max_jerk[problem.group.indices])
+        yield slowed_to_limits(path.trajectory, *limits)
+        yield averaged_curve(path.trajectory, *limits)
+        if not path.is_short:
+            yield along_straight_lines(path.trajectory.joint_names, path.vertices, *limits)
+
+
+def _duration(path: PlannedPath) -> float:
+    assert path.trajectory is not None
+    return path.trajectory.duration_s

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gives a path its fastest timing within the limits, with rounded corners where they are free."""
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.trajectory_processing.blended_path import choose_blends
+from modular_framework_planning.trajectory_processing.time_parameterization import (
+    LONGEST_PERIOD_S,
+    SHORTEST_PERIOD_S,
+    parameterize,
+)
+
+
+class AddTimeOptimalParameterization(RequestAdapter):
+    """Times what is not timed yet.
+
+    Parameters of the pipeline: `path_tolerance` (most distance of a rounded corner from the corner [rad or m], the
+    pipeline's blend_deviation by default), `resample_dt` (longest time between two points [s], 0.02 by default).
+    """
+
+    def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
+        """Plans, then times the path; the path without rounded corners where the rounded one fails the last check."""
+        path = plan_next(problem)
+        return path if path.trajectory is not None else time_path(problem, path)
+
+
+def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
+    """Returns the path with a trajectory; raises PlanningError where a limit or a parameter is not usable."""
+    vertices = path.vertices
+    if len(vertices) == 2 and np.abs(vertices[1] - vertices[0]).max() < 1e-9:
+        vertices = vertices[1:]
+    period = _number(problem.settings.parameters, "resample_dt", LONGEST_PERIOD_S, SHORTEST_PERIOD_S)
+    tolerance = _number(problem.settings.parameters, "path_tolerance", problem.settings.blend_deviation, 0.0)
+
+    def timed(blends: Array) -> PlannedPath:
+        return replace(path, trajectory=parameterize(problem.group.joints, vertices, blends, problem.max_velocity,
+                                                     problem.max_acceleration, period))
+
+    blends = choose_blends(vertices, tolerance, lambda curve: _is_valid(problem, curve))
+    if blends.any():
+        rounded = timed(blends)
+        if not problem.last_check.fault(problem, rounded):
+            return rounded
+    return timed(np.zeros_like(blends))
+
+
+def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
+    """Whether a rounded corner is free and keeps the path constraints."""
+    if problem.constraints is not None and not all(
+            problem.constraints.satisfied(problem.motion.whole(values)) for values in curve):
+        return False
+    return problem.motion.colliding_state(curve, problem.settings.finest_step) is None
+
+
+def _number(parameters: Any, name: str, default: float, lowest: float) -> float:
+    value = parameters.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not lowest <= value < np.inf:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"parameter {name} of the pipeline is {value!r}; allowed is "
+                            f"a number of at least {lowest}")
+    return float(value)

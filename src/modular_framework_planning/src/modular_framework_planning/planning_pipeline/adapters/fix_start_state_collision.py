@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Leads a start state that collides a little out to a free state nearby."""
+from __future__ import annotations
+
+import numpy as np
+
+from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.planning_pipeline.adapters.way_in import with_way_in
+
+
+class FixStartStateCollision(RequestAdapter):
+    """Parameters `jiggle_fraction`, `max_sampling_attempts` and `start_state_collision_depth` [m]."""
+
+    def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
+        """Plans from a free state near a colliding start and puts the way there in front."""
+        if problem.motion.state_is_free(problem.start_values):
+            return plan_next(problem)
+        free = self._free_state(problem)
+        path = plan_next(problem.with_start(problem.motion.whole(free)))
+        return with_way_in(problem, path, collides=True)
+
+    def _free_state(self, problem: PlanningProblem) -> Array:
+        settings, start = problem.settings, problem.start_values
+        contacts = problem.checker.contacts(problem.start, include_fixed=False)
+        low, high = problem.bounds
+        reach = settings.jiggle_fraction * np.minimum(high - low, 2.0 * np.pi)
+        shallow = all(item.depth <= settings.start_state_collision_depth for item in contacts)
+        for number in range(settings.max_sampling_attempts if shallow else 0):
+            share = (number + 1) / settings.max_sampling_attempts
+            moved = np.clip(start + share * problem.rng.uniform(-reach, reach), low, high)
+            if problem.motion.state_is_free(moved):
+                return moved
+        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, "start state in collision: "
+                            f"{describe_contacts(contacts)}; " + (
+                                f"no free state within {settings.jiggle_fraction:.0%} of the joints' ranges"
+                                if shallow else "too deep to move out of; allow the pair or move the object"),
+                            contacts)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Leads a start state that violates the path constraints to the nearest one that satisfies them."""
+from __future__ import annotations
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.planning_pipeline.adapters.way_in import with_way_in
+
+
+class FixStartStatePathConstraints(RequestAdapter):
+    """Puts a straight, free motion from the start to the constrained part in front of the path."""
+
+    def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
+        """Plans from a state that satisfies the constraints."""
+        constraints = problem.constraints
+        if constraints is None or constraints.satisfied(problem.start):
+            return plan_next(problem)
+        indices = problem.group.indices
+        nearest = constraints.project(problem.start, indices)
+        if nearest is None or not problem.motion.edge_is_free(problem.start[indices], nearest[indices],
+                                                              problem.settings.motion_step):
+            raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
+                                f"{constraints.describe(problem.start)}; no free straight motion leads to a state that "
+                                "satisfies the path constraints: start from one that does")
+        path = plan_next(problem.with_start(nearest))
+        return with_way_in(problem, path)

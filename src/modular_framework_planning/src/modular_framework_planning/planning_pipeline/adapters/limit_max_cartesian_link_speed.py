@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps a link's speed in space below the request's max_cartesian_speed."""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.add_time_optimal_parameterization import time_path
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.trajectory_processing.link_speed import with_limited_link_speed
+
+
+class LimitMaxCartesianLinkSpeed(RequestAdapter):
+    """Does nothing where the request has no max_cartesian_speed; limits the group's tip where it names no link."""
+
+    def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
+        """Plans, then slows down where the link is too fast.
+
+        Raises:
+            PlanningError: the speed is not a number from 0 on, or there is no such link.
+        """
+        highest = problem.request.max_cartesian_speed
+        if highest == 0.0:
+            return plan_next(problem)
+        if not (math.isfinite(highest) and highest > 0.0):
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_cartesian_speed is {highest} m/s; allowed is a "
+                                "speed above 0, or 0 for none")
+        link = self._link(problem)
+        path = plan_next(problem)
+        timed = path if path.trajectory is not None else time_path(problem, path)
+        assert timed.trajectory is not None
+        return replace(timed, trajectory=with_limited_link_speed(
+            problem.model, timed.trajectory, problem.motion.whole, link, highest, problem.max_velocity,
+            problem.max_acceleration))
+
+    @staticmethod
+    def _link(problem: PlanningProblem) -> str:
+        link = problem.request.cartesian_speed_limited_link or problem.group.tip_link
+        if not link:
+            raise PlanningError(ErrorCode.INVALID_LINK_NAME, f"max_cartesian_speed: group '{problem.group.name}' has "
+                                "no tip; name the link in cartesian_speed_limited_link")
+        if not problem.model.has_link(link):
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, problem.model.frame_ids)
+        return link

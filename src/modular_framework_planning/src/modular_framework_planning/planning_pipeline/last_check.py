@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The check every returned motion has passed, whatever planner and adapters made it."""
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.path_repair import describe_state
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+
+SAMPLES_AT_ONCE = 200  # of a motion, between two looks at the clock
+GRACE_S = 0.2  # after the allowed time, in which a check that has begun may end
+
+
+class LastCheck:
+    """Looks at a timed motion, at its curve and at the straight ways between its points.
+
+    A motion it has seen and passed is not looked at twice.
+    """
+
+    def __init__(self) -> None:
+        self._passed: set[tuple[CollisionChecker, bytes]] = set()
+
+    def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
+        """Returns what is wrong with the timed motion of a path; empty where nothing is.
+
+        Args:
+            problem: what was planned; its checker and constraints are asked.
+            path: with a trajectory.
+
+        Raises:
+            PlanningError: the check takes longer than the request allows.
+        """
+        assert path.trajectory is not None
+        motion = path.trajectory
+        key = problem.checker, b"".join(rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities,
+                                                                    motion.accelerations))
+        if key in self._passed:
+            return ""
+        text = _not_in_order(path)
+        if not text:
+            curve = path.trajectory.curve(problem.settings.motion_step)
+            chords = path.trajectory.chords(_place(path.trajectory.positions, path, path.lead_in))
+            text = next(filter(None, (_collision(problem, line) for line in (
+                curve[_place(curve, path, path.lead_in):], *chords))), "")
+            text = text or _violation(problem, curve[_place(curve, path, path.unconstrained):])
+        if not text:
+            self._passed.add(key)
+        return text
+
+
+def _place(samples: Array, path: PlannedPath, vertex: int) -> int:
+    """Returns the number of the sample at a vertex of the path."""
+    return int(np.argmin(np.linalg.norm(samples - path.vertices[vertex], axis=1))) if vertex else 0
+
+
+def _not_in_order(path: PlannedPath) -> str:
+    assert path.trajectory is not None
+    times = path.trajectory.times
+    if not np.isfinite(times).all() or not np.isfinite(path.trajectory.positions).all():
+        return "a sample of the motion is not finite"
+    bad = np.flatnonzero(np.diff(times) <= 0.0)
+    return f"the time of sample {int(bad[0]) + 1} is not after the one before" if len(bad) else ""
+
+
+def _collision(problem: PlanningProblem, samples: Array) -> str:
+    step = problem.settings.finest_step
+    for begin in range(0, max(1, len(samples) - 1), SAMPLES_AT_ONCE):
+        _require_time(problem)
+        hit = problem.motion.colliding_state(samples[begin:begin + SAMPLES_AT_ONCE + 1], step)
+        if hit is not None:
+            contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)
+            return f"{describe_contacts(contacts)}, at {describe_state(problem, hit)} (checked at {step} rad steps)"
+    return ""
+
+
+def _require_time(problem: PlanningProblem) -> None:
+    over = time.monotonic() - problem.end_s
+    if problem.cancelled() or over > GRACE_S:
+        raise PlanningError(
+            ErrorCode.PREEMPTED if problem.cancelled() else ErrorCode.TIMED_OUT,
+            "planning was cancelled during the check of the motion found" if problem.cancelled() else
+            f"a motion was found, but its check was not done {over:.2f} s after the allowed "
+            f"{problem.request.allowed_time_s:.2f} s; an unchecked motion is not returned: allow more time")
+
+
+def _violation(problem: PlanningProblem, samples: Array) -> str:
+    if problem.constraints is None:
+        return ""
+    for number, values in enumerate(samples):
+        whole = problem.motion.whole(values)
+        if not problem.constraints.satisfied(whole):
+            return (f"sample {number} of {len(samples)} violates a path constraint: "
+                    f"{problem.constraints.describe(whole)}")
+    return ""

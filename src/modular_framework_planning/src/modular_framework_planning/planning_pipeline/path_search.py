@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The innermost step of a pipeline: the planner's path from a valid start, repaired and shortened."""
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
+from modular_framework_planning.trajectory_processing.path_shortening import shorten
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+MAX_SHORTENING_S = 1.0
+SHORTENING_SHARE = 0.3  # of the time left where a planner used all of its own
+BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
+
+
+class PathSearch:
+    """Checks the start, runs the planner once, lets it repair its path, shortens that."""
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner = planner
+        self._found: PlannedPath | None = None
+        self.repairs = hasattr(planner, "repaired")
+
+    def __call__(self, problem: PlanningProblem) -> PlannedPath:
+        """Returns the path; that of the first call, repaired once more, where it is called again."""
+        _require_start(problem)
+        if self._found is None:
+            found = self._planner.plan(problem)
+            now = time.monotonic()
+            self._found = (PlannedPath(found.positions, found, found_s=now, is_short=True)
+                           if isinstance(found, Trajectory) else replace(found, found_s=now))
+        path = self._found
+        if path.is_short or path.trajectory is not None:
+            return path
+        vertices = self._planner.repaired(problem, path.vertices) if self.repairs else path.vertices  # type: ignore
+        if problem.settings.sampling.simplify_solutions:
+            vertices = _shortened(problem, vertices)
+        self._found = replace(path, vertices=vertices)
+        return self._found
+
+
+def _require_start(problem: PlanningProblem) -> None:
+    """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
+    faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
+    if faults:
+        raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {'; '.join(faults)}; move the robot within "
+                            "its bounds or use the adapter FixStartStateBounds")
+    if not problem.motion.state_is_free(problem.start_values):
+        contacts = problem.checker.contacts(problem.start, include_fixed=False)
+        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state in collision: "
+                            f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
+                            "FixStartStateCollision", contacts)
+    if problem.constraints is not None and not problem.constraints.satisfied(problem.start):
+        raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
+                            f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "
+                            "path constraints or use the adapter FixStartStatePathConstraints")
+
+
+def _shortened(problem: PlanningProblem, path: Array) -> Array:
+    """Shortens a path; what it accepts was looked at as finely as the last check looks."""
+    now = time.monotonic()
+    limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
+    if problem.repeatable:
+        limit = math.inf
+    fine = problem.settings.finest_step
+
+    def edge(first: Array, second: Array) -> bool:
+        return problem.edge_is_valid(first, second, fine)
+
+    return shorten(path, edge, limit, problem.rng)

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds planners and request adapters by the names config packages give them: MoveIt's, or `module/Class`."""
+from __future__ import annotations
+
+import importlib
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.planning_interface.planner_interface import Planner
+from modular_framework_planning.planning_interface.planning_request import PipelineSettings
+from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+    from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+
+PACKAGE = "modular_framework_planning"
+PLANNERS = {
+    "ompl_interface/OMPLPlanner": f"{PACKAGE}.planners.ompl.planner/OmplPlanner",
+    "pilz_industrial_motion_planner/CommandPlanner": f"{PACKAGE}.planners.pilz.command_planner/CommandPlanner",
+    "stomp_moveit/StompPlannerManager": f"{PACKAGE}.planners.stomp.planner/StompPlanner",
+    "stomp_moveit/StompPlanner": f"{PACKAGE}.planners.stomp.planner/StompPlanner",
+}
+ADAPTERS = ("AddIterativeSplineParameterization", "AddRuckigTrajectorySmoothing", "AddTimeOptimalParameterization",
+            "AddTimeParameterization", "FixStartStateBounds", "FixStartStateCollision",
+            "FixStartStatePathConstraints", "FixWorkspaceBounds", "LimitMaxCartesianLinkSpeed")
+# Names of MoveIt's adapters that have nothing left to do here, and why.
+NOT_NEEDED = {"Empty": "does nothing", "ResolveConstraintFrames": "frames are resolved when a request is read"}
+MOVEIT_ADAPTERS = "default_planner_request_adapters"
+DEFAULT_ADAPTERS = " ".join(f"{MOVEIT_ADAPTERS}/{name}" for name in (
+    "LimitMaxCartesianLinkSpeed", "AddTimeOptimalParameterization", "FixWorkspaceBounds", "FixStartStateBounds",
+    "FixStartStateCollision", "FixStartStatePathConstraints"))
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineSpec:
+    """How a pipeline is built; can be sent to another process.
+
+    Attributes:
+        name: what `pipeline_id` calls it.
+        planner, adapters: parameters planning_plugin and request_adapters.
+    """
+
+    name: str
+    planner: str
+    adapters: str
+    settings: PipelineSettings
+
+    def build(self, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
+        """Builds the pipeline; raises PlanningError for an unknown part or a parameter a part refuses."""
+        from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+
+        return PlanningPipeline(model, kinematics, self.settings, make_planner(self.planner, model, self.settings),
+                                make_adapters(self.adapters), self.name)
+
+
+def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> Planner:
+    """Makes the planner of a pipeline.
+
+    Args:
+        plugin: parameter `planning_plugin`: a name of PLANNERS ("::" may stand for "/"), or `module/Class`.
+        model, settings: handed to the class method `configure` of planners that have one.
+
+    Raises:
+        ModelError: there is no such class, or it has no method `plan`; lists the planners there are.
+        PlanningError: the planner refuses its parameters.
+    """
+    name = plugin.replace("::", "/")
+    known = f"known are {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
+    kind = _class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", known)
+    planner = kind.configure(model, settings) if hasattr(kind, "configure") else kind()
+    if not callable(getattr(planner, "plan", None)):
+        raise ModelError(f"planning_plugin '{plugin}': class {kind.__name__} has no method plan; {known}")
+    return planner
+
+
+def make_adapters(names: str) -> tuple[RequestAdapter, ...]:
+    """Makes the adapters of a pipeline, outermost first.
+
+    Args:
+        names: parameter `request_adapters`, separated by spaces; each MoveIt's name or `module/Class`.
+
+    Raises:
+        ModelError: one is not known; lists those that are.
+    """
+    known = f"known are {', '.join(f'{MOVEIT_ADAPTERS}/{name}' for name in sorted({*ADAPTERS, *NOT_NEEDED}))} and " \
+            "module/Class of a class with a method adapt_and_plan"
+    result = []
+    for name in names.split():
+        short = name.removeprefix(f"{MOVEIT_ADAPTERS}/")
+        if short in NOT_NEEDED:
+            continue
+        path = f"{PACKAGE}.planning_pipeline.adapters.{_snake_case(short)}/{short}" if short in ADAPTERS else name
+        adapter = _class(path, f"request_adapters: '{name}'", known)()
+        if not callable(getattr(adapter, "adapt_and_plan", None)):
+            raise ModelError(f"request_adapters: '{name}' has no method adapt_and_plan; {known}")
+        result.append(adapter)
+    return tuple(result)
+
+
+def _snake_case(name: str) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+def _class(path: str, where: str, known: str) -> Any:
+    """Imports `module/Class`; raises ModelError with the reason and what is known."""
+    module, _, name = path.partition("/")
+    if not re.fullmatch(r"[A-Za-z_][\w.]*", module) or not name.isidentifier():
+        raise ModelError(f"{where} is not known; {known}")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise ModelError(f"{where} is not known ({error}); {known}") from error
+    except PlanningError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a user's module may fail in any way; the cause must be told
+        raise ModelError(f"{where}: its module fails with {type(error).__name__}: {error}; mend the module") from error

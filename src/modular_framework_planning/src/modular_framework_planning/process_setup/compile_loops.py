@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Compiles every compiled loop of the product into numba's cache, so that no request and no launch waits for it.
+
+Each loop is called the way the product calls it, with a robot and a scene small enough to cost nothing: what is in the
+cache already is only loaded. To be run once after the build:
+python3 -m modular_framework_planning.process_setup.compile_loops
+"""
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from pinocchio import SE3 as Transform
+
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
+from modular_framework_planning.kinematics import compiled_kinematics
+from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
+from modular_framework_planning.octomap.octree import Octree
+from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
+from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, mask_of
+from modular_framework_planning.planners.stomp import costs
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing import time_parameterization
+
+LINKS = 4
+MOTION_STEP = 0.05  # [rad]
+
+
+def compile_all() -> float:
+    """Compiles every loop, or loads it from the cache; returns how long that took [s]."""
+    begun = time.monotonic()
+    compiled_kinematics.warm_up()
+    time_parameterization.warm_up()
+    scene = _scene(_robot(), _voxels())
+    _check_motions(scene)
+    mask_of(RegionCache(), bodies_in_scene(scene, scene.positions), 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
+    return time.monotonic() - begun
+
+
+def _robot() -> RobotModel:
+    """A chain of boxes."""
+    links = "".join(f'<link name="l{n}"><collision><geometry><box size="0.1 0.1 0.2"/></geometry></collision></link>'
+                    for n in range(LINKS))
+    joints = "".join(f'<joint name="j{n}" type="revolute"><parent link="l{n}"/><child link="l{n + 1}"/>'
+                     '<origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1" effort="1"/>'
+                     "</joint>" for n in range(LINKS - 1))
+    pairs = "".join(f'<disable_collisions link1="l{n}" link2="l{n + 1}" reason="Adjacent"/>' for n in range(LINKS - 1))
+    return RobotModel(f'<robot name="chain">{links}{joints}</robot>', f'<robot name="chain">{pairs}</robot>')
+
+
+def _voxels() -> VoxelMap:
+    """What a sensor saw, written and read again in both encodings."""
+    point = np.array([[1.5, 0.0, 0.0]])
+    seen = empty_map(0.1).with_look(np.zeros(3), point, point + 0.5, point + 1.0)
+    return read_stream(write_binary(read_stream(write_full(seen), seen.resolution, False)), seen.resolution, True)
+
+
+def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
+    """One obstacle of each kind beside the robot, one around its last link, and something held."""
+    corners = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+    def body(name: str, shape: Shape, *place: float) -> CollisionObject:
+        return CollisionObject(name, Transform(np.eye(3), np.array(place)), ((shape, Transform.Identity()),))
+
+    scene = empty_scene(model).with_octomap(Octree(voxels), Transform.Identity())
+    for item in (body("box", Box(0.1, 0.1, 0.1), 0.7, 0.0, 0.3), body("ball", Sphere(0.05), -0.7, 0.0, 0.3),
+                 body("mesh", Mesh(corners, faces), 0.0, 0.6, 0.0),
+                 body("around", Mesh(8.0 * (corners - 0.05), faces), 0.0, 0.0, 10.0)):
+        scene = scene.with_object(item)
+    return scene.with_attached(AttachedObject(body("held", Mesh(corners, faces), 0.0, 0.0, 0.2), f"l{LINKS - 1}",
+                                              frozenset((f"l{LINKS - 1}",))))
+
+
+def _check_motions(scene: PlanningScene) -> None:
+    checker = CollisionChecker(scene)
+    checker.is_free(scene.positions)
+    checker.path_is_free(np.array([scene.positions, scene.positions + 0.1]), MOTION_STEP)
+    checker.contacts(scene.positions)
+    costs.warm_up(checker.world)
+
+
+def main() -> None:
+    """Compiles and says how long it took."""
+    print(f"compiled loops are ready after {compile_all():.1f} s")
+
+
+if __name__ == "__main__":
+    main()

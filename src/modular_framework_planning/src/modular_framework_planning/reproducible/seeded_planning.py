@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plans that a seed repeats bit for bit: each runs in a process of its own that starts from the same state."""
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_parts import PipelineSpec
+from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
+from modular_framework_planning.reproducible.seeded_worker import LENGTH, Failure, WorkerSetup, receive, send
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+WORKER = "modular_framework_planning.reproducible.seeded_worker"
+POLL_S = 0.02
+START_TIMEOUT_S = 300.0
+GRACE_S = 30.0  # after the allowed time, before a child that does not answer is given up
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
+
+
+def _never() -> bool:
+    return False
+
+
+class SeededPlanning:
+    """Hands requests to the worker process, which starts with the first of them; threads may share it."""
+
+    def __init__(self, model: RobotModel, specs: Sequence[PipelineSpec]) -> None:
+        """Args: the robot; how the pipelines are built."""
+        self._model, self._specs = model, tuple(specs)
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._address = ""
+
+    def plan(self, pipeline: PlanningPipeline, request: PlanningRequest, seed: int) -> PlanningAnswer:
+        """Plans in a fresh process.
+
+        Args:
+            pipeline: one of those the specs describe; its settings and those of its planners of now are used.
+            request: what to plan.
+            seed: 0 or more; the same request, scene and seed give the same trajectory.
+
+        Raises:
+            PlanningError: as the pipeline; or the process does not start or dies.
+        """
+        if seed < 0:
+            raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; allowed is 0 or more")
+        connection = self._connect()
+        try:
+            send(connection, to_bytes((pipeline.name, pipeline.settings, pipeline.configurations.snapshot(), seed,
+                                       replace(request, cancelled=_never))))
+            self._wait(connection, request)
+            found = from_bytes(receive(connection), self._model)
+        except (EOFError, OSError) as error:
+            raise PlanningError(ErrorCode.CRASH, f"the process of a seeded plan ended without an answer ({error}); "
+                                "its output is in the log of this node") from error
+        finally:
+            connection.close()
+        if isinstance(found, Failure):
+            raise PlanningError(ErrorCode(found.code), found.reason, found.contacts)
+        return found
+
+    def start(self) -> None:
+        """Starts the worker process and waits until it is ready; raises PlanningError when it does not start."""
+        with self._lock:
+            if self._process is not None and self._process.poll() is None:
+                return
+            self._stop()
+            self._folder = tempfile.TemporaryDirectory(prefix="seeded_planning_")
+            self._address = str(Path(self._folder.name) / "socket")
+            setup = WorkerSetup(self._model.source, self._specs, tuple(sys.path), self._address)
+            data = pickle.dumps((tuple(sys.path), pickle.dumps(setup)))
+            self._process = subprocess.Popen([sys.executable, "-m", WORKER], stdin=subprocess.PIPE,
+                                             stdout=subprocess.PIPE,
+                                             env={**os.environ, **ONE_THREAD,
+                                                  "PYTHONPATH": os.pathsep.join(item for item in sys.path if item)})
+            assert self._process.stdin is not None and self._process.stdout is not None
+            self._process.stdin.write(LENGTH.pack(len(data)) + data)
+            self._process.stdin.flush()
+            ready, _, _ = select.select([self._process.stdout], [], [], START_TIMEOUT_S)
+            if not ready or self._process.stdout.readline() != b"ready\n":
+                self._stop()
+                raise PlanningError(ErrorCode.CRASH, "the process for seeded plans did not get ready within "
+                                    f"{START_TIMEOUT_S:.0f} s; its output is in the log of this node")
+
+    def close(self) -> None:
+        """Ends the worker process; may be called twice."""
+        with self._lock:
+            self._stop()
+
+    def _stop(self) -> None:
+        if self._process is not None:
+            assert self._process.stdin is not None and self._process.stdout is not None
+            self._process.stdin.close()
+            self._process.stdout.close()
+            try:
+                self._process.wait(2.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+            self._process = None
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def _connect(self) -> socket.socket:
+        self.start()
+        connection = socket.socket(socket.AF_UNIX)
+        try:
+            connection.connect(self._address)
+        except OSError as error:
+            connection.close()
+            raise PlanningError(ErrorCode.CRASH, f"the process for seeded plans cannot be reached: {error}") from error
+        return connection
+
+    def _wait(self, connection: socket.socket, request: PlanningRequest) -> None:
+        """Returns when an answer begins to arrive; raises PlanningError when the caller gives up before."""
+        end = time.monotonic() + request.allowed_time_s + GRACE_S
+        begun = time.monotonic()
+        while not select.select([connection], [], [], POLL_S)[0]:
+            if request.cancelled():
+                raise PlanningError(ErrorCode.PREEMPTED,
+                                    f"planning was cancelled after {time.monotonic() - begun:.2f} s")
+            if time.monotonic() > end:
+                raise PlanningError(ErrorCode.TIMED_OUT, "the process of a seeded plan gave no answer within "
+                                    f"{request.allowed_time_s + GRACE_S:.0f} s")

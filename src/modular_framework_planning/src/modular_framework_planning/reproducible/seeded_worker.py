@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The process behind seeded plans: it keeps the robot ready and forks a fresh child for every request.
+
+OMPL has one random generator a process, and its seed counts only before the first use. This process never plans
+itself, so every child starts from the same state. It has one thread, and lives as long as its standard input is open.
+"""
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import select
+import signal
+import socket
+import struct
+import sys
+import traceback
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pinocchio import SE3 as Transform
+
+from modular_framework_planning.collision_detection.exact_collision import Contact
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_parts import PipelineSpec
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
+from modular_framework_planning.process_setup.compile_loops import compile_all
+from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+LENGTH = struct.Struct("<Q")
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerSetup:
+    """What the process needs to plan as its parent does.
+
+    Attributes:
+        robot: arguments of RobotModel.
+        pipelines: how to build each pipeline.
+        search_path: sys.path of the parent, for planners of users.
+        address: path of the socket to listen on.
+    """
+
+    robot: tuple[Any, ...]
+    pipelines: tuple[PipelineSpec, ...]
+    search_path: tuple[str, ...]
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A plan that failed."""
+
+    code: int
+    reason: str
+    contacts: tuple[Contact, ...] = ()
+
+
+def send(connection: socket.socket, data: bytes) -> None:
+    """Writes one message."""
+    connection.sendall(LENGTH.pack(len(data)) + data)
+
+
+def receive(connection: socket.socket) -> bytes:
+    """Reads one message; raises EOFError when the other side is gone."""
+    (size,) = LENGTH.unpack(_exactly(connection, LENGTH.size))
+    return _exactly(connection, size)
+
+
+def _exactly(connection: socket.socket, size: int) -> bytes:
+    parts = bytearray()
+    while len(parts) < size:
+        part = connection.recv(min(1 << 20, size - len(parts)))
+        if not part:
+            raise EOFError("the other process closed the connection")
+        parts += part
+    return bytes(parts)
+
+
+def serve(setup: WorkerSetup, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
+    """Forks a child for every connection until standard input ends."""
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(setup.address)
+    listener.listen(64)
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
+    while True:
+        ready, _, _ = select.select([listener, sys.stdin], [], [])
+        if sys.stdin in ready:
+            return
+        connection, _ = listener.accept()
+        if os.fork() == 0:
+            listener.close()
+            _child(connection, model, pipelines)
+        connection.close()
+
+
+def _child(connection: socket.socket, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
+    """Plans one request and ends the process."""
+    try:
+        name, settings, configurations, seed, request = from_bytes(receive(connection), model)
+
+        def cancelled() -> bool:
+            return bool(select.select([connection], [], [], 0.0)[0])  # the parent says nothing more: this is its end
+
+        pipeline = pipelines[name]
+        pipeline.settings = settings
+        pipeline.configurations.restore(configurations)
+        send(connection, to_bytes(_answer(pipeline, replace(request, cancelled=cancelled), seed)))
+    except (EOFError, OSError):
+        os._exit(1)  # the parent gave up
+    os._exit(0)
+
+
+def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> Any:
+    import ompl.util as ou
+
+    try:
+        ou.RNG.setSeed(1 + seed % (2**31 - 1))  # OMPL ignores the seed 0
+        return pipeline.plan(replace(request, seed=seed), repeatable=True)
+    except PlanningError as error:
+        return Failure(int(error.code), error.reason, error.contacts)
+    except Exception as error:  # noqa: BLE001 - the parent must be told whatever happened
+        traceback.print_exc()
+        return Failure(int(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")
+
+
+def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
+    """Loads compiled loops and, with a short straight motion of every group, meshes once for all children."""
+    compile_all()
+    far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
+    scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
+    straight = PlanningPipeline(model, kinematics, PipelineSettings(), _Straight())
+    for group in model.groups.values():
+        if not group.joints:
+            continue
+        middle = 0.5 * (model.lower + model.upper)[group.indices]
+        goal = JointGoal(dict(zip(group.joints, (scene.positions[group.indices] + 0.01 * np.sign(
+            middle - scene.positions[group.indices])).tolist(), strict=True)))
+        with contextlib.suppress(PlanningError):
+            straight.plan(PlanningRequest(scene, group.name, (goal,)))
+
+
+class _Straight:
+    """Plans without OMPL, whose random generator must stay unused here."""
+
+    def plan(self, problem: PlanningProblem) -> PlannedPath:
+        """Returns the straight way."""
+        problem.edge_is_valid(problem.start_values, problem.goal_states()[0])
+        return PlannedPath(np.vstack([problem.start_values, problem.goal_states()[0]]))
+
+
+def main() -> None:
+    """Reads the setup from standard input, builds the robot and serves."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    (size,) = LENGTH.unpack(sys.stdin.buffer.read(LENGTH.size))
+    data = sys.stdin.buffer.read(size)
+    search_path, rest = pickle.loads(data)  # noqa: S301 - from the parent process
+    sys.path[:] = search_path
+    setup: WorkerSetup = pickle.loads(rest)  # noqa: S301 - from the parent process
+    model = RobotModel(*setup.robot)
+    kinematics = KinematicsPool(model)
+    pipelines = {spec.name: spec.build(model, kinematics) for spec in setup.pipelines}
+    _warm_up(model, kinematics)
+    serve(setup, model, pipelines)
+
+
+if __name__ == "__main__":
+    from modular_framework_planning.reproducible.seeded_worker import (
+        main as run,  # what it sends must not be of module __main__
+    )
+
+    run()

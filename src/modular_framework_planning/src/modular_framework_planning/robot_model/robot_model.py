@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joins URDF, SRDF and joint limits into one immutable model of the robot: joints, groups, frames, geometry."""
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from modular_framework_planning.errors import ErrorCode, ModelError, UnknownNameError
+from modular_framework_planning.geometry.shapes import Shape
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.robot_model.joint_limits import (
+    DEFAULT_ACCELERATION,
+    DEFAULT_VELOCITY,
+    JointLimits,
+    tighten,
+)
+from modular_framework_planning.robot_model.srdf import GroupSpec, SemanticDescription, parse_srdf
+from modular_framework_planning.robot_model.urdf_document import (
+    CONTINUOUS_BOUND,
+    MeshResolver,
+    load_urdf,
+    package_resolver,
+)
+
+NO_VELOCITY_LIMIT = 1.0e6
+
+
+@dataclass(frozen=True, slots=True)
+class LinkGeometry:
+    """One collision element of a link: its shape and the pose in the frame of the moving joint."""
+
+    link: str
+    joint_id: int
+    frame_id: int
+    placement: Transform
+    shape: Shape
+
+    @property
+    def geometry(self) -> Any:
+        """The Coal geometry of the shape."""
+        return self.shape.geometry
+
+
+@dataclass(frozen=True, slots=True)
+class JointGroup:
+    """A planning group.
+
+    Attributes:
+        joints: joints the planner may move, in the order of the kinematic tree.
+        indices: their places in a position vector of the whole robot.
+        links: links whose parent joint belongs to the group.
+        base_link, tip_link: ends of the chain; empty where the group is not a chain.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    indices: NDArray[np.int64]
+    links: tuple[str, ...]
+    base_link: str
+    tip_link: str
+
+    @property
+    def is_chain(self) -> bool:
+        """Whether inverse kinematics can be asked of this group."""
+        return bool(self.tip_link and self.joints)
+
+
+class RobotModel:
+    """The robot; nothing in it changes after construction, so threads may share it.
+
+    Position vectors hold one value per movable joint (mimic joints included) in the order of `joint_names`.
+    """
+
+    def __init__(self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None,
+                 resolve: MeshResolver = package_resolver) -> None:
+        self.source = (urdf, srdf, dict(limits or {}), resolve)  # makes the same robot in another process
+        self.document = load_urdf(urdf, resolve)
+        self.semantics: SemanticDescription = parse_srdf(srdf)
+        self.name = self.document.robot_name
+        self.pin_model = pin.buildModelFromXML(self.document.xml)
+        self.joint_names: tuple[str, ...] = tuple(self.pin_model.names)[1:]
+        self.index = {name: number for number, name in enumerate(self.joint_names)}
+        if self.pin_model.nq != len(self.joint_names):
+            raise ModelError(f"URDF: {self.pin_model.nq} position variables for {len(self.joint_names)} joints; "
+                             "only joints with one degree of freedom are supported")
+        self.follower_joints = frozenset(self.document.mimics) | self.semantics.passive_joints
+        self.planning_frame = self._planning_frame()
+        self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
+        self.limits = self._joint_limits(limits or {})
+        self.lower, self.upper, self.max_velocity, self.max_acceleration, self.max_jerk = (
+            np.array([getattr(self.limits[name], key) for name in self.joint_names])
+            for key in ("lower", "upper", "velocity", "acceleration", "jerk"))
+        self.max_deceleration = np.array([self.limits[name].braking for name in self.joint_names])
+        self.mimics = [(self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
+                       for name, mimic in self.document.mimics.items()]
+        self.link_geometries = self._load_geometry()
+        self._tree = {child: (parent, joint) for joint, child in self.document.joint_children.items()
+                      for parent in (self.document.joint_parents[joint],)}
+        self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
+
+    def _planning_frame(self) -> str:
+        """The root link, as in MoveIt: where a fixed virtual joint's parent frame is, tf says, as of every frame."""
+        for joint in self.semantics.virtual_joints:
+            if joint.child_link == self.document.root_link and joint.kind != "fixed":
+                raise ModelError(f"SRDF virtual_joint '{joint.name}': type '{joint.kind}'; only 'fixed' is "
+                                 "supported, a moving base needs its own joints in the URDF")
+        return self.document.root_link
+
+    def _joint_limits(self, entries: Mapping[str, Any]) -> dict[str, JointLimits]:
+        result = {}
+        for number, name in enumerate(self.joint_names):
+            velocity = float(self.pin_model.upperVelocityLimit[number])
+            known = 0.0 < velocity < NO_VELOCITY_LIMIT
+            limits = JointLimits(float(self.pin_model.lowerPositionLimit[number]),
+                                 float(self.pin_model.upperPositionLimit[number]),
+                                 velocity if known else DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
+            result[name] = tighten(name, limits, entries.get(name) or {})
+        return result
+
+    def _load_geometry(self) -> tuple[LinkGeometry, ...]:
+        result = []
+        for link, shapes in self.document.collisions.items():
+            frame = self.pin_model.frames[self.frame_ids[link]]
+            result += [LinkGeometry(link, frame.parentJoint, self.frame_ids[link], frame.placement * pose, shape)
+                       for shape, pose in shapes]
+        return tuple(result)
+
+    def chain_joints(self, base_link: str, tip_link: str) -> list[str]:
+        """Returns the joints from base to tip, fixed ones included.
+
+        Raises:
+            ModelError: the tip does not hang below the base.
+        """
+        joints: list[str] = []
+        link = tip_link
+        while link != base_link:
+            if link not in self._tree:
+                raise ModelError(f"SRDF chain {base_link} -> {tip_link}: '{tip_link}' does not hang below "
+                                 f"'{base_link}' in the URDF")
+            link, joint = self._tree[link]
+            joints.append(joint)
+        return joints[::-1]
+
+    def _group_joints(self, spec: GroupSpec, seen: tuple[str, ...] = ()) -> set[str]:
+        if spec.name in seen:
+            raise ModelError(f"SRDF group '{spec.name}': contains itself through {' -> '.join(seen)}")
+        parent_joint = {child: joint for joint, child in self.document.joint_children.items()}
+        joints = set(spec.joints) | {parent_joint[link] for link in spec.links if link in parent_joint}
+        unknown = [name for name in spec.joints if name not in self.document.joint_kinds
+                   and name not in {joint.name for joint in self.semantics.virtual_joints}]
+        unknown += [link for link in spec.links if link not in self.document.links]
+        if unknown:
+            raise ModelError(f"SRDF group '{spec.name}': {', '.join(unknown)} is not in the URDF")
+        for base, tip in spec.chains:
+            joints |= set(self.chain_joints(base, tip))
+        for name in spec.subgroups:
+            if name not in self.semantics.groups:
+                raise ModelError(f"SRDF group '{spec.name}': subgroup '{name}' is not defined")
+            joints |= self._group_joints(self.semantics.groups[name], (*seen, spec.name))
+        return joints
+
+    def _build_group(self, spec: GroupSpec) -> JointGroup:
+        members = self._group_joints(spec)
+        joints = tuple(name for name in self.joint_names if name in members and name not in self.follower_joints)
+        links = tuple(self.document.joint_children[name] for name in members if name in self.document.joint_children)
+        base, tip = self._chain_ends(spec, joints)
+        ordered = tuple(link for link in self.document.links if link in links)
+        return JointGroup(spec.name, joints, np.array([self.index[name] for name in joints], dtype=np.int64), ordered,
+                          base, tip)
+
+    def _chain_ends(self, spec: GroupSpec, joints: tuple[str, ...]) -> tuple[str, str]:
+        if len(spec.chains) == 1 and not (spec.joints or spec.links or spec.subgroups):
+            return spec.chains[0]
+        for name in spec.subgroups:
+            inner = self.semantics.groups[name]
+            if len(inner.chains) == 1 and set(joints) <= set(self.chain_joints(*inner.chains[0])):
+                return inner.chains[0]
+        if not joints:
+            return "", ""
+        base = self.document.joint_parents[joints[0]]
+        tip = self.document.joint_children[joints[-1]]
+        try:
+            movable = [name for name in self.chain_joints(base, tip) if name in self.index]
+        except ModelError:
+            return "", ""
+        return (base, self._furthest_fixed(tip, spec)) if movable == list(joints) else ("", "")
+
+    def _furthest_fixed(self, tip: str, spec: GroupSpec) -> str:
+        """Follows the fixed joints a group lists beyond its last moving joint."""
+        members = self._group_joints(spec)
+        for joint, child in self.document.joint_children.items():
+            if joint in members and joint not in self.index and self.document.joint_parents[joint] == tip:
+                return self._furthest_fixed(child, spec)
+        return tip
+
+    def group(self, name: str) -> JointGroup:
+        """Returns a planning group; raises UnknownNameError with the known ones."""
+        if name not in self.groups:
+            raise UnknownNameError(ErrorCode.INVALID_GROUP_NAME, "planning group", name, self.groups)
+        return self.groups[name]
+
+    def joint_index(self, name: str) -> int:
+        """Returns the place of a joint in a position vector; raises UnknownNameError."""
+        if name not in self.index:
+            raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, "joint", name, self.joint_names)
+        return self.index[name]
+
+    def has_link(self, name: str) -> bool:
+        """Whether the URDF has a link of that name."""
+        return name in self.frame_ids
+
+    def default_positions(self) -> Array:
+        """Returns zeros, or the nearest allowed value where zero is out of bounds."""
+        return self.with_mimics(np.clip(np.zeros(len(self.joint_names)), self.lower, self.upper))
+
+    def with_mimics(self, positions: Array, leaders: Collection[int] | None = None) -> Array:
+        """Returns a copy in which mimic joints follow their leaders.
+
+        Args:
+            positions: of the whole robot [rad or m].
+            leaders: only followers of these joints are changed; all by default. A gripper whose passive joints are
+                measured keeps what was measured while the arm moves.
+        """
+        result = np.array(positions, dtype=float)
+        for follower, leader, multiplier, offset in self.mimics:
+            if leaders is None or leader in leaders:
+                result[follower] = multiplier * result[leader] + offset
+        return result
+
+    def merge(self, base: Array, values: Mapping[str, float]) -> Array:
+        """Returns `base` with the named joints replaced; mimic joints that are not named follow.
+
+        Raises:
+            UnknownNameError: a joint does not exist.
+        """
+        result = np.array(base, dtype=float)
+        for name, value in values.items():
+            result[self.joint_index(name)] = value
+        named = {self.index[name] for name in values}
+        for follower, leader, multiplier, offset in self.mimics:
+            if leader in named and follower not in named:
+                result[follower] = multiplier * result[leader] + offset
+        return result
+
+    def is_continuous(self, number: int) -> bool:
+        """Whether the joint at that place of a position vector turns without end."""
+        return bool(self.upper[number] >= CONTINUOUS_BOUND)
+
+    def bound_violations(self, positions: Array, indices: Iterable[int], tolerance: float = 1e-9) -> list[str]:
+        """Returns one sentence per joint that is out of its bounds."""
+        return [f"joint {self.joint_names[i]} at {positions[i]:.4f} is outside [{self.lower[i]:.4f}, "
+                f"{self.upper[i]:.4f}]" for i in indices
+                if not self.lower[i] - tolerance <= positions[i] <= self.upper[i] + tolerance]
+
+    def link_transforms(self, positions: Array) -> dict[str, Transform]:
+        """Computes the pose of every link in the planning frame."""
+        data = self.pin_model.createData()
+        pin.framesForwardKinematics(self.pin_model, data, positions)
+        return {link: data.oMf[frame].copy() for link, frame in self.frame_ids.items()}

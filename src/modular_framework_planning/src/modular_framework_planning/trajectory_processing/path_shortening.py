@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes a planner's path short and straight: leaves out vertices, cuts corners, while the motion stays free."""
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Callable
+
+import numpy as np
+
+from modular_framework_planning.geometry.spatial import Array
+
+EdgeTest = Callable[[Array, Array], bool]
+
+
+def path_length(path: Array) -> float:
+    """Returns the length of a polyline of shape (n, joints)."""
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def drop_vertices(path: Array, edge_is_free: EdgeTest, deadline: float) -> Array:
+    """Leaves out every vertex whose neighbours can be joined directly, longest jumps first."""
+    kept = [0]
+    while kept[-1] < len(path) - 1:
+        here = kept[-1]
+        following = here + 1
+        for candidate in range(len(path) - 1, here + 1, -1):
+            if time.monotonic() > deadline:
+                break
+            if edge_is_free(path[here], path[candidate]):
+                following = candidate
+                break
+        kept.append(following)
+    return path[kept]
+
+
+def _point_at(path: Array, lengths: Array, position: float) -> tuple[int, Array]:
+    number = min(max(bisect_right(lengths, position) - 1, 0), len(path) - 2)
+    span = float(lengths[number + 1] - lengths[number])
+    share = 0.0 if span <= 0.0 else (position - lengths[number]) / span
+    return number, path[number] + share * (path[number + 1] - path[number])
+
+
+def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator,
+                attempts: int = 60, patience: int = 20) -> Array:
+    """Joins random pairs of points of the path directly where that is shorter and free.
+
+    Args:
+        path: polyline of shape (n, joints).
+        edge_is_free: whether the straight motion between two points is free.
+        deadline: monotonic time [s] at which to stop.
+        rng: source of the random choices.
+        attempts: most tries; patience: tries without success in a row after which it stops.
+    """
+    failures = 0
+    for _ in range(attempts):
+        if len(path) < 3 or failures >= patience or time.monotonic() > deadline:
+            break
+        lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+        low, high = np.sort(rng.uniform(0.0, lengths[-1], 2))
+        first, start = _point_at(path, lengths, low)
+        last, end = _point_at(path, lengths, high)
+        gain = (high - low) - float(np.linalg.norm(end - start))
+        if first == last or gain < 0.01 * lengths[-1] or not edge_is_free(start, end):
+            failures += 1
+            continue
+        path = np.vstack([path[:first + 1], start, end, path[last + 1:]])
+        failures = 0
+    return without_repeats(path)
+
+
+def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
+    """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends."""
+    kept = [path[0]]
+    for number in range(1, len(path) - 1):
+        before, after = path[number] - kept[-1], path[number + 1] - path[number]
+        size = float(np.linalg.norm(before) * np.linalg.norm(after))
+        if size > tolerance and float(before @ after) < size * (1.0 - 1e-12):
+            kept.append(path[number])
+    if len(path) > 1 and float(np.linalg.norm(path[-1] - kept[-1])) > tolerance:
+        kept.append(path[-1])
+    return np.array(kept)
+
+
+def shorten(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator) -> Array:
+    """Returns a path with the same ends, not longer than the given one."""
+    path = without_repeats(path)
+    if len(path) < 3:
+        return path
+    path = drop_vertices(path, edge_is_free, deadline)
+    path = cut_corners(path, edge_is_free, deadline, rng)
+    return drop_vertices(path, edge_is_free, deadline)

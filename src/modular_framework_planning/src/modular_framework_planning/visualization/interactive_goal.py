@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Drag a goal in RViz, see whether the robot can be there, plan and execute: MoveIt's panel by stock displays."""
+from __future__ import annotations
+
+import textwrap
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import RobotState
+from std_msgs.msg import Empty
+from visualization_msgs.msg import Marker, MarkerArray
+
+from modular_framework_control.ros_telling import tell
+from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.messages.conversions import joint_values, pose_message
+from modular_framework_planning.move_group.markers.scene_markers import robot_markers
+from modular_framework_planning.move_group.robot_parameters import load_robot_model
+from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+from modular_framework_planning.visualization.goal_marker import Choice, GoalMarker
+from modular_framework_planning.visualization.move_group_client import MotionOptions, MoveGroupClient
+
+VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
+START_COLOR = (0.2, 0.4, 0.9, 0.4)
+RANDOM_ATTEMPTS = 200
+WORDS_ABOVE_TIP_M = 0.45  # clear of the hand
+WORDS_WIDTH, WORDS_LINES = 60, 5
+DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
+JOB_END_S = 0.2  # a job says that it is done before it makes way for the next one
+DEFAULT_PLANNER = "move_group's default"
+
+
+class InteractiveGoal:
+    """A marker at the tip to drag the goal with, ghosts of start and goal, and a menu.
+
+    Publishes: ~goal_ghost, ~start_ghost (visualization_msgs/MarkerArray, latched).
+    Interactive marker: ~marker.
+    Subscribes: /rviz/moveit/{plan, execute, stop, update_start_state, update_goal_state} (std_msgs/Empty) and
+        /rviz/moveit/{update_custom_start_state, update_custom_goal_state} (moveit_msgs/RobotState), as MoveIt's panel.
+    Parameters: ~group (the first that is a chain), ~marker_scale (0.25) [m], ~planning_time (5) [s],
+        ~velocity_scaling, ~acceleration_scaling (0: move_group's default), ~connection_timeout (60) [s].
+    """
+
+    def __init__(self, model: RobotModel, client: MoveGroupClient) -> None:
+        self._model, self._client = model, client
+        self._groups = [group.name for group in model.groups.values() if group.is_chain]
+        wanted = str(rospy.get_param("~group", "") or next(iter(self._groups), ""))
+        if wanted not in self._groups:
+            raise ModelError(f"{rospy.resolve_name('~group')} is '{wanted}'; groups with a tip to drag: "
+                             f"{', '.join(self._groups) or 'none'}")
+        self._group: JointGroup = model.group(wanted)
+        self._options = MotionOptions(*(float(rospy.get_param(f"~{name}", default)) for name, default in (
+            ("planning_time", 5.0), ("velocity_scaling", 0.0), ("acceleration_scaling", 0.0))))
+        self._marker = GoalMarker(rospy.resolve_name("~marker"), self._on_drag)
+        self._ghosts = {name: rospy.Publisher(f"~{name}_ghost", MarkerArray, queue_size=1, latch=True)
+                        for name in ("goal", "start")}
+        self._goal: Array = model.default_positions()
+        self._start: RobotState | None = None
+        self._trajectory: Any = None
+        self._status = ""
+        self._goal_color = VALID
+        self._dragged: Pose | None = None
+        self._solving = False
+        self._drag_came = threading.Condition()
+        self._job = threading.Lock()
+
+    def connect(self) -> None:
+        """Waits for move_group, then shows the marker; raises PlanningError."""
+        self._client.connect(float(rospy.get_param("~connection_timeout", 60.0)))
+        self._goal = self._positions_of(self._client.state())
+        self._fill_menu()
+        self._show_goal()
+        self._marker.show(self._model.planning_frame, self._tip_pose(), float(rospy.get_param("~marker_scale", 0.25)))
+        for topic, command in (("plan", self.plan), ("execute", self.execute), ("stop", self.stop),
+                               ("update_start_state", self.set_start_to_current),
+                               ("update_goal_state", self.set_goal_to_current)):
+            rospy.Subscriber(f"/rviz/moveit/{topic}", Empty, lambda _, run=command: run(), queue_size=5)
+        for topic, take in (("update_custom_start_state", self._take_start), ("update_custom_goal_state",
+                                                                              self._take_goal)):
+            rospy.Subscriber(f"/rviz/moveit/{topic}", RobotState, self._on_state, callback_args=take, queue_size=5)
+        threading.Thread(target=self._follow_drags, daemon=True).start()
+
+    # ---------------------------------------------------------------- what the menu does
+    def _fill_menu(self) -> None:
+        """Offers commands, the planners of the group and the groups."""
+        planners = [f"{pipeline}: {planner}" if pipeline else planner
+                    for pipeline, planner in self._client.planners(self._group.name)]
+        commands = {"Plan": self.plan, "Execute": self.execute, "Plan and execute": self.plan_and_execute,
+                    "Stop": self.stop, "Random valid goal": self.set_random_goal,
+                    "Goal: current state": self.set_goal_to_current, "Start: current state": self.set_start_to_current,
+                    "Start: follow the robot": self.follow_robot}
+        choices = [Choice("Planner", [DEFAULT_PLANNER, *planners], self._choose_planner)]
+        if len(self._groups) > 1:
+            order = [self._group.name, *(name for name in self._groups if name != self._group.name)]
+            choices.append(Choice("Group", order, self._choose_group))
+        self._marker.fill_menu(list(commands.items()), choices)
+
+    def plan(self) -> None:
+        """Plans from the start to the goal."""
+        self._begin("planning", self._plan)
+
+    def execute(self) -> None:
+        """Executes what was planned last."""
+        self._begin("executing", self._execute)
+
+    def plan_and_execute(self) -> None:
+        """Plans from where the robot is, and moves it there."""
+        self._begin("planning", lambda: self._plan() and self._execute())
+
+    def stop(self) -> None:
+        """Stops planning and motion."""
+        self._client.stop()
+
+    def set_random_goal(self) -> None:
+        """Takes a random valid goal."""
+        self._begin("looking for a valid goal", self._random_goal)
+
+    def set_goal_to_current(self) -> None:
+        """Puts the goal where the robot is."""
+        self._guarded(lambda: self._take_goal(self._client.state()))
+
+    def set_start_to_current(self) -> None:
+        """Keeps the current state as the start, even when the robot moves on."""
+        self._guarded(lambda: self._take_start(self._client.state()))
+
+    def follow_robot(self) -> None:
+        """Lets motions start where the robot is."""
+        self._start = None
+        tell(self._ghosts["start"], MarkerArray([Marker(action=Marker.DELETEALL)]))
+
+    def _choose_planner(self, entry: str) -> None:
+        pipeline, _, planner = entry.rpartition(": ")
+        self._options = replace(self._options, pipeline_id=pipeline,
+                                planner_id="" if entry == DEFAULT_PLANNER else planner)
+        self._tell(f"planner: {entry}")
+
+    def _choose_group(self, name: str) -> None:
+        self._group, self._trajectory = self._model.group(name), None
+        self._options = replace(self._options, pipeline_id="", planner_id="")
+        self._guarded(self._fill_menu)
+        self._marker.move(self._tip_pose())
+        self._tell(f"group: {name}")
+
+    # ---------------------------------------------------------------- jobs, one at a time
+    def _begin(self, what: str, job: Callable[[], Any]) -> None:
+        if not self._job.acquire(timeout=JOB_END_S):
+            self._tell(f"not {what}: busy; stop first")
+            return
+
+        def work() -> None:
+            try:
+                self._tell(f"{what} ...")
+                self._guarded(job)
+            finally:
+                self._job.release()
+
+        threading.Thread(target=work, daemon=True).start()
+
+    def _guarded(self, job: Callable[[], Any]) -> None:
+        try:
+            job()
+        except PlanningError as error:
+            self._tell(error.reason)
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            self._tell(f"move_group does not answer: {error}")
+
+    def _plan(self) -> bool:
+        with self._drag_came:
+            self._drag_came.wait_for(lambda: self._dragged is None and not self._solving, DRAG_TIMEOUT_S)
+        goal = {name: float(self._goal[self._model.index[name]]) for name in self._group.joints}
+        self._trajectory = None
+        self._trajectory = self._client.plan(self._group.name, self._start or RobotState(is_diff=True), goal,
+                                             self._options)
+        points = self._trajectory.joint_trajectory.points
+        self._tell(f"planned: {points[-1].time_from_start.to_sec() if points else 0.0:.1f} s")
+        return True
+
+    def _execute(self) -> None:
+        if self._trajectory is None:
+            self._tell("nothing is planned yet; choose Plan first")
+            return
+        trajectory, self._trajectory = self._trajectory, None
+        self._client.execute(trajectory)
+        self._tell("executed")
+
+    def _random_goal(self) -> None:
+        indices = self._group.indices
+        low = np.maximum(self._model.lower[indices], -np.pi)
+        high = np.minimum(self._model.upper[indices], np.pi)
+        rng = np.random.default_rng()
+        for _ in range(RANDOM_ATTEMPTS):
+            positions = self._goal.copy()
+            positions[indices] = rng.uniform(low, high)
+            positions = self._model.with_mimics(positions, frozenset(int(number) for number in indices))
+            if not self._client.problem_of(self._group.name, self._state_of(positions)):
+                self._set_goal(positions, VALID, "random goal")
+                self._marker.move(self._tip_pose())
+                return
+        self._tell(f"none of {RANDOM_ATTEMPTS} random states is valid; is the robot in contact?")
+
+    # ---------------------------------------------------------------- the goal
+    def _on_drag(self, pose: Pose) -> None:
+        with self._drag_came:
+            self._dragged = pose
+            self._drag_came.notify_all()
+
+    def _follow_drags(self) -> None:
+        """Solves for the newest dragged pose; those that came meanwhile are left out."""
+        while not rospy.is_shutdown():
+            with self._drag_came:
+                if self._dragged is None:
+                    self._drag_came.wait(0.5)
+                pose, self._dragged = self._dragged, None
+                self._solving = pose is not None
+            if pose is not None:
+                self._guarded(lambda wanted=pose: self._solve(wanted))
+                with self._drag_came:
+                    self._solving = False
+                    self._drag_came.notify_all()
+
+    def _solve(self, pose: Pose) -> None:
+        target = PoseStamped(pose=pose)
+        target.header.frame_id = self._model.planning_frame
+        seed = self._state_of(self._goal)
+        for avoid in (True, False):
+            found = self._client.solve_ik(self._group.name, self._group.tip_link, target, seed, avoid)
+            if found is not None:
+                positions = self._model.merge(self._goal, {name: value for name, value in found.items()
+                                                           if name in self._model.index})
+                problem = "" if avoid else self._client.problem_of(self._group.name, self._state_of(positions))
+                self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
+                return
+        self._set_goal(self._goal, UNREACHABLE, "no inverse kinematics solution there")
+
+    def _on_state(self, message: RobotState, take: Callable[[RobotState], None]) -> None:
+        self._guarded(lambda: take(message))
+
+    def _take_goal(self, state: RobotState) -> None:
+        positions = self._positions_of(state)
+        problem = self._client.problem_of(self._group.name, self._state_of(positions))
+        self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
+        self._marker.move(self._tip_pose())
+
+    def _take_start(self, state: RobotState) -> None:
+        positions = self._positions_of(state)
+        self._start, self._trajectory = state, None
+        tell(self._ghosts["start"], _numbered([
+            Marker(action=Marker.DELETEALL), *robot_markers(self._model, positions, "start", START_COLOR)]))
+
+    def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
+        self._goal, self._goal_color, self._trajectory = positions, color, None
+        self._tell(status)
+
+    def _tell(self, status: str) -> None:
+        """Shows and logs what happened last."""
+        if status != self._status:
+            rospy.loginfo("interactive goal: %s", status)
+        self._status = status
+        self._show_goal()
+
+    def _show_goal(self) -> None:
+        markers = [Marker(action=Marker.DELETEALL),
+                   *robot_markers(self._model, self._goal, "goal", self._goal_color)]
+        text = Marker(type=Marker.TEXT_VIEW_FACING, ns="status",
+                      text="\n".join(textwrap.wrap(self._status, WORDS_WIDTH)[:WORDS_LINES]), pose=self._tip_pose())
+        text.header.frame_id = self._model.planning_frame
+        text.pose.position.z += WORDS_ABOVE_TIP_M
+        text.scale.z = 0.04
+        text.color.r = text.color.g = text.color.b = text.color.a = 1.0
+        tell(self._ghosts["goal"], _numbered([*markers, text] if text.text else markers))
+
+    # ---------------------------------------------------------------- states
+    def _tip_pose(self) -> Pose:
+        return pose_message(self._model.link_transforms(self._goal)[self._group.tip_link])
+
+    def _positions_of(self, state: RobotState) -> Array:
+        values: Mapping[str, float] = joint_values(self._model, state.joint_state.name, state.joint_state.position,
+                                                   "robot state")
+        return self._model.merge(self._goal, values)
+
+    def _state_of(self, positions: Array) -> RobotState:
+        """A difference to the current state, so that held objects stay held."""
+        state = RobotState(is_diff=True)
+        state.joint_state.name = list(self._model.joint_names)
+        state.joint_state.position = [float(value) for value in positions]
+        return state
+
+
+def _numbered(markers: list[Marker]) -> MarkerArray:
+    for number, marker in enumerate(markers):
+        marker.id = number
+    return MarkerArray(markers)
+
+
+def main() -> int:
+    """Runs the node; returns its exit code."""
+    rospy.init_node("interactive_goal")
+    try:
+        InteractiveGoal(load_robot_model(), MoveGroupClient()).connect()
+    except PlanningError as error:
+        rospy.logfatal("interactive_goal cannot start: %s", error.reason)
+        return 1
+    rospy.spin()
+    return 0
