@@ -171,18 +171,19 @@ def test_last_check_looks_at_every_motion_once() -> None:
     assert len(looked) > seen, "another world is another question"
 
 
-def test_last_check_sees_a_contact_half_a_milliradian_long() -> None:
+def test_last_check_sees_a_contact_a_twentieth_of_a_milliradian_long() -> None:
     def colliding_state(line: np.ndarray, step: float) -> np.ndarray | None:
         for start, end in zip(line[:-1], line[1:], strict=True):
             count = int(np.ceil(np.abs(end - start).max() / step))
             for share in np.linspace(0.0, 1.0, count + 1):
                 values = start + share * (end - start)
-                if 0.5 < values[0] < 0.5005:
+                if 0.5 < values[0] < 0.50005:
                     return values
         return None
 
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
     problem = checked_problem(colliding_state)
-    assert "0.00025 rad steps" in LastCheck().fault(problem, PlannedPath(motion.positions, motion))
+    fault = LastCheck().fault(problem, PlannedPath(motion.positions, motion))
+    assert f"{problem.settings.finest_step} rad steps" in fault
     problem.motion.colliding_state = lambda line, step: None
     assert LastCheck().fault(problem, PlannedPath(motion.positions, motion)) == ""
