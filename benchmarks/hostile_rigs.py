@@ -22,12 +22,12 @@ from modular_framework_control.hardware_interface import COMMAND_INTERFACES
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.real_time import run_in_real_time
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.trajectory_goal import GoalRejectedError, TrajectoryGoal, TrajectoryTicket
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
+from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot

@@ -32,7 +32,7 @@ class MyState(FrameworkState):
         self._side, self._timeout_s = side, float(timeout)
 
     def execute(self, userdata: Any) -> str:
-        """Does the work; a request to stop ends ``wait_until`` and the calls of ``ros_calls``."""
+        """Does the work; a request to stop ends ``wait_until`` and the calls of ``modular_framework_ros.calls``."""
         self.feedback = f"looking to the {self._side}"
         if not self.wait_until(self._is_done, self._timeout_s):
             return self.fail(f"nothing was seen on the {self._side} within {self._timeout_s} s")

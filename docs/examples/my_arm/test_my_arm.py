@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from modular_framework_control.joint_limits import JointLimits
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.robot_hw_conformance import RobotHWConformance
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 sys.path.insert(0, str(Path(__file__).parent / "src"))
 from my_arm.my_arm import MyArm  # noqa: E402

@@ -20,10 +20,10 @@ from modular_framework_control.combined_robot_hw import CombinedRobotHW
 from modular_framework_control.handles import SpeedScalingHandle
 from modular_framework_control.hardware_interface import ControllerInfo, SpeedScalingInterface
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.robot_hw import SwitchState
 from modular_framework_control.ros_controller_manager import RosControllerManager
-from modular_framework_control.ros_node_handle import RosNodeHandle
+from modular_framework_ros.node_handle import NodeHandle
+from modular_framework_ros.ros_node_handle import RosNodeHandle
 
 PERIOD_S = 0.01
 WAIT_S = 30.0

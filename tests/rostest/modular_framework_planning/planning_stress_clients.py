@@ -26,7 +26,7 @@ from moveit_msgs.msg import (
 from planning_stress_world import IndependentChecker, World, gone, touched_bodies
 from planning_wire import ARM, LAUNCH, OK, START, FakeArm, box, joint_goal, plan, request
 
-from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_ros.action_client import SteadyActionClient
 
 CHANGE_PERIOD_S = 0.1
 ANSWER_TIMEOUT_S = 40.0

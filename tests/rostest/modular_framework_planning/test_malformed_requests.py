@@ -46,7 +46,7 @@ from shape_msgs.msg import Mesh, MeshTriangle
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_ros.action_client import SteadyActionClient
 
 MILLION, MANY = 1_000_000, 100_000
 SERVICES = {"plan_kinematic_path": GetMotionPlan, "compute_cartesian_path": GetCartesianPath,

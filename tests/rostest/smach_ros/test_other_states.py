@@ -14,7 +14,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 import smach
-from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_ros.action_client import SteadyActionClient
 
 pytestmark = pytest.mark.usefixtures("ros_session")
 

@@ -12,8 +12,8 @@ from modular_framework_control.controller import Controller
 from modular_framework_control.controller_manager import ControllerManager
 from modular_framework_control.controller_types import ControllerTypes
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 
 class Loop:

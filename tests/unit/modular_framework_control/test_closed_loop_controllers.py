@@ -19,11 +19,11 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
 from modular_framework_control.pid import Pid, PidGains, read_pid
 from modular_framework_control.plugins import CONTROLLER_BASE, Plugin, PluginIndex
 from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
 from modular_framework_control.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectoryTicket
+from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 
 URDF = """<robot name="r"><joint name="a" type="revolute"><limit lower="-1" upper="1" velocity="9" effort="90"/></joint>
 <joint name="b" type="revolute"><limit lower="-2" upper="2" velocity="9" effort="90"/></joint></robot>"""

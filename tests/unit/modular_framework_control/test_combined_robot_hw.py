@@ -18,8 +18,8 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle, NodeHandle
 from modular_framework_control.robot_hw import RobotHW, SwitchState
+from modular_framework_ros.node_handle import MappingNodeHandle, NodeHandle
 
 MOCK = "modular_framework_control/MockRobotHW"
 PARAMETERS: dict[str, Any] = {

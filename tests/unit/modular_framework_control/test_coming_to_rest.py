@@ -11,8 +11,8 @@ import pytest
 
 from modular_framework_control import ros_robot_hw
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.ros_robot_hw import RobotHwNode, moves
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 RATE = 125.0
 ACCELERATION = 20.0

@@ -19,8 +19,8 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import NodeHandle, read_names
 from modular_framework_control.robot_hw import RobotHW, SwitchState
+from modular_framework_ros.node_handle import NodeHandle, read_names
 
 BEST_EFFORT, STRICT = 1, 2
 JOINTS = {"left": "a", "right": "b", "both": ["a", "b"], "left_too": "a"}

@@ -11,8 +11,8 @@ from modular_framework_control.controller_manager import ControllerManager, Cont
 from modular_framework_control.controller_statistics import UpdateStatistics
 from modular_framework_control.controller_types import ControllerTypes
 from modular_framework_control.hardware_interface import JointStateInterface
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 
 class Clock:

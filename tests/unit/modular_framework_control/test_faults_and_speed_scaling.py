@@ -18,10 +18,10 @@ from modular_framework_control.hardware_interface import (
     SpeedScalingInterface,
 )
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
 from modular_framework_control.trajectory_clock import RISE_PER_S, TrajectoryClock
 from modular_framework_control.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectoryTicket
+from modular_framework_ros.node_handle import NodeHandle
 
 FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
             "effort": "EffortJointInterface", "pos_vel": "PosVelJointInterface",

@@ -18,8 +18,8 @@ from modular_framework_control.hardware_interface import (
     SpeedScalingInterface,
 )
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import NodeHandle, read_names
 from modular_framework_control.robot_hw import RobotHW, speed_scaling_handles
+from modular_framework_ros.node_handle import NodeHandle, read_names
 
 LAB = "lab/Fragile"
 PARAMETERS: dict[str, Any] = {

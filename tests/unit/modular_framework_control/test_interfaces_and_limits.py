@@ -29,8 +29,8 @@ from modular_framework_control.joint_limits import (
     limits_from_urdf,
     limits_with_parameters,
 )
-from modular_framework_control.node_handle import MappingNodeHandle, ParameterError, join_names, read_number
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError, join_names, read_number
 
 
 def test_a_command_handle_shows_the_shared_state() -> None:

@@ -32,7 +32,7 @@ from modular_framework_control.joint_limits import (
     soft_limits_with_parameters,
 )
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
+from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 
 LIMITS = JointLimits(-1.0, 1.0, 2.0, 5.0)
 SOFT = SoftJointLimits(-0.8, 0.8, 10.0, 4.0)

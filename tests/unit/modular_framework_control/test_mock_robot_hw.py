@@ -6,7 +6,7 @@ import pytest
 
 from modular_framework_control.hardware_interface import PositionJointInterface
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>

@@ -13,7 +13,6 @@ import pytest
 from modular_framework_control.combined_robot_hw import CombinedRobotHW
 from modular_framework_control.joint_limits import JointLimits
 from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.robot_hw_conformance import RobotHWConformance
 from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
@@ -22,6 +21,7 @@ from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
+from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot

@@ -21,8 +21,8 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.mobile_base_controller import BaseVelocity
-from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle
 
 TRACK, WHEEL_BASE, RADIUS, OFFSET = 1.2, 1.9, 0.28, 0.1
 GEOMETRY = FourWheelGeometry(TRACK, WHEEL_BASE, RADIUS, OFFSET)

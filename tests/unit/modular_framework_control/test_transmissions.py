@@ -18,7 +18,6 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.joint_limit_parameters import limits_from_urdf
-from modular_framework_control.node_handle import MappingNodeHandle, NodeHandle, ParameterError
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.robot_transmissions import RobotTransmissions
 from modular_framework_control.transmission_parser import read_transmissions
@@ -30,6 +29,7 @@ from modular_framework_control.transmissions import (
     TransmissionError,
 )
 from modular_framework_control.urdf_xml import parse_description
+from modular_framework_ros.node_handle import MappingNodeHandle, NodeHandle, ParameterError
 
 REDUCTIONS = st.floats(0.01, 1000.0).flatmap(lambda n: st.sampled_from([n, -n]))
 NUMBERS = st.floats(-1000.0, 1000.0)

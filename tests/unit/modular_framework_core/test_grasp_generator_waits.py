@@ -12,7 +12,7 @@ from modular_framework_core.grasp_generation import ros_top_down_node as node
 from modular_framework_core.grasp_generation import surface_points
 from modular_framework_core.grasp_generation.patience import Patience
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
-from modular_framework_core.ros_calls import CallError
+from modular_framework_ros.calls import CallError
 
 LIMIT_S = 20.0
 EMPTY = node.NoObjectError("no object of the planning scene is in the crop box")

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_control.node_handle import MappingNodeHandle, ParameterError
 from modular_framework_drivers.ezgripper.grip import Drive, Goal, Grip, GripRules, Motion, Standing
 from modular_framework_drivers.ezgripper.gripper_servos import joint_from_ticks, ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
+from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 
 PERIOD_S = 0.02
 

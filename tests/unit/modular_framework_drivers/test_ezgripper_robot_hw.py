@@ -20,7 +20,6 @@ from modular_framework_control.controller_manager import ControllerManager
 from modular_framework_control.goal_ticket import GoalStatus
 from modular_framework_control.gripper_action_controller import GripperTicket
 from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
 from modular_framework_control.trajectory_goal import TrajectoryGoal, TrajectoryTicket
@@ -29,6 +28,7 @@ from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 PERIOD_S = 0.008
 CONTROLLER = {"type": "position_controllers/GripperActionController", "joint": JOINT, "goal_tolerance": 0.03,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_drivers.ur import rtde_link, ur_arm_robot_hw
 from modular_framework_drivers.ur.arm_messages import READY, TAKEN, ArmState
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
 from modular_framework_drivers.ur.rtde_process import command_line
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 PERIOD_S = 0.008
 RUNNING, NORMAL, PLAYING, PAUSED = 7, 1, 2, 4

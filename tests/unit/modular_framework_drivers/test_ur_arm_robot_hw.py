@@ -21,9 +21,9 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     SpeedScalingInterface,
 )
-from modular_framework_control.node_handle import MappingNodeHandle
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
+from modular_framework_ros.node_handle import MappingNodeHandle
 
 PERIOD_S = 0.008
 PATIENCE_S = 20.0

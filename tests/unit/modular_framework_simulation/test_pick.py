@@ -13,7 +13,7 @@ from simulated_samples import solid
 from xacro_rospkg import expand
 
 from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose

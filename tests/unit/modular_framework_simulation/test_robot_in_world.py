@@ -19,7 +19,7 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.node_handle import MappingNodeHandle
+from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.loop.pacing import Pacer
 from modular_framework_simulation.loop.request_queue import RequestQueue

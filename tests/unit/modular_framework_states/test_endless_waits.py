@@ -12,7 +12,7 @@ import rospy
 from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
-from modular_framework_core.ros_calls import call_service, wait_for_result
+from modular_framework_ros.calls import call_service, wait_for_result
 from modular_framework_states.states.call_action import CallAction
 from modular_framework_states.states.call_service import CallService
 from modular_framework_states.states.cartesian_move import CartesianMove

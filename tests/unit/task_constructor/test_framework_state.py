@@ -9,8 +9,8 @@ import pytest
 
 import smach
 from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.ros_calls import CallError, call_service
-from modular_framework_core.stop_requests import stop_requested
+from modular_framework_ros.calls import CallError, call_service
+from modular_framework_ros.stop_requests import stop_requested
 
 
 def test_the_first_outcome_is_positive_and_the_last_negative() -> None:

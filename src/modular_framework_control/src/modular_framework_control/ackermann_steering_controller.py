@@ -14,8 +14,8 @@ from modular_framework_control.mobile_base_controller import (
     read_name,
     read_positive,
 )
-from modular_framework_control.node_handle import NodeHandle, ParameterError
 from modular_framework_control.wheel_geometry import WheelGeometry
+from modular_framework_ros.node_handle import NodeHandle, ParameterError
 
 
 class AckermannSteeringController(MobileBaseController):

@@ -7,9 +7,9 @@ from typing import Any
 
 from modular_framework_control.hardware_interface import EffortJointInterface, VelocityJointInterface
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
-from modular_framework_control.node_handle import NodeHandle, read_number
 from modular_framework_control.pid import read_pid
 from modular_framework_control.trajectory import POSITION, VELOCITY, Array
+from modular_framework_ros.node_handle import NodeHandle, read_number
 
 
 class _ClosedLoopTrajectoryController(JointTrajectoryController):

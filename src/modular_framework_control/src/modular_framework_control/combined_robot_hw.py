@@ -14,9 +14,9 @@ from modular_framework_control.hardware_interface import (
     HardwareInterfaceError,
     InterfaceResources,
 )
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
 from modular_framework_control.plugins import ROBOT_HW_BASE, PluginError, PluginIndex
 from modular_framework_control.robot_hw import HardwareFault, RobotHW, SwitchState
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 
 LOGGER = logging.getLogger("rosout.combined_robot_hw")
 

@@ -13,9 +13,9 @@ from types import MappingProxyType
 from typing import Any, ClassVar
 
 from modular_framework_control.hardware_interface import HardwareInterface
-from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.pid import Pid
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle
 
 
 class ControllerError(Exception):

@@ -26,8 +26,8 @@ from modular_framework_control.controller_switch import (
 from modular_framework_control.controller_types import BASE_CLASS, ControllerTypes
 from modular_framework_control.fault_watch import FaultWatch
 from modular_framework_control.hardware_interface import ControllerInfo, InterfaceResources
-from modular_framework_control.node_handle import NodeHandle, join_names
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, join_names
 
 Detach = Callable[[], None]
 Attach = Callable[[str, Controller], Detach]

@@ -16,8 +16,8 @@ from modular_framework_control.mobile_base_controller import (
     TwistLimits,
     read_positive,
 )
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_names
 from modular_framework_control.wheel_geometry import WheelGeometry
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_names
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import Any
 
 from modular_framework_control.gripper_action_controller import GripperActionController
 from modular_framework_control.hardware_interface import EffortJointInterface
-from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.pid import read_pid
+from modular_framework_ros.node_handle import NodeHandle
 
 
 class EffortGripperActionController(GripperActionController):

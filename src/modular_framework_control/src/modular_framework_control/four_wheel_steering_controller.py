@@ -16,15 +16,15 @@ from modular_framework_control.mobile_base_controller import (
     MobileBaseController,
     TwistLimits,
 )
-from modular_framework_control.node_handle import (
+from modular_framework_control.speed_limiter import clamped
+from modular_framework_control.wheel_geometry import WheelGeometry
+from modular_framework_ros.node_handle import (
     NodeHandle,
     ParameterError,
     join_names,
     read_names,
     read_number,
 )
-from modular_framework_control.speed_limiter import clamped
-from modular_framework_control.wheel_geometry import WheelGeometry
 
 SLOWEST = 1e-3
 """A base that is to drive no faster than this [m/s] stands: with a turn alone the wheels would have to swing about."""

@@ -16,8 +16,8 @@ from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
 from modular_framework_control.handles import unmeasured
 from modular_framework_control.hardware_interface import HardwareInterface, JointHandle, PositionJointInterface
 from modular_framework_control.mailbox import Mailbox
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.joint_limits import limits_of
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names
 from modular_framework_control.pid import PidGains, read_pid
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names
 
 CYCLES_A_REPORT = 10
 

@@ -14,8 +14,8 @@ import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
-from modular_framework_control.node_handle import NodeHandle, ParameterError, read_bool, read_number
 from modular_framework_control.urdf_xml import line_of, parse_description
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, read_bool, read_number
 
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf

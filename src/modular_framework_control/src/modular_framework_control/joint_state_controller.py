@@ -10,8 +10,8 @@ from typing import Any
 
 from modular_framework_control.controller import Controller
 from modular_framework_control.hardware_interface import JointStateHandle, JointStateInterface
-from modular_framework_control.node_handle import NodeHandle, join_names, read_names, read_number
 from modular_framework_control.rates import first_due, next_due, period_of
+from modular_framework_ros.node_handle import NodeHandle, join_names, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.joint_state_controller")
 STATE_KEYS = ("position", "velocity", "effort")

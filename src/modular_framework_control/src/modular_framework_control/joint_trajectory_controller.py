@@ -21,7 +21,6 @@ from modular_framework_control.handles import unmeasured
 from modular_framework_control.hardware_interface import HardwareInterface, PositionJointInterface
 from modular_framework_control.joint_limits import limits_of
 from modular_framework_control.mailbox import Mailbox
-from modular_framework_control.node_handle import NodeHandle, read_bool, read_names, read_number
 from modular_framework_control.rates import next_due, period_of
 from modular_framework_control.robot_hw import speed_scaling_handles
 from modular_framework_control.trajectory import (
@@ -45,6 +44,7 @@ from modular_framework_control.trajectory_order import GoalRules, TrajectoryOrde
 from modular_framework_control.trajectory_plan import TrajectoryPlan
 from modular_framework_control.trajectory_stop import StopMotion
 from modular_framework_control.trajectory_tolerances import foreign_tolerances, read_tolerances, violations
+from modular_framework_ros.node_handle import NodeHandle, read_bool, read_names, read_number
 
 
 class JointTrajectoryController(Controller):

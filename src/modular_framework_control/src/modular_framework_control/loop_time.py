@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 
 NOTICED_STEP_S = 1e-3
-TOLD_STEP_S = 0.1
+WARN_THRESHOLD_S = 0.1
 QUICK_S = 5e-4
 """A reading of both clocks that took longer says too little about how far they are apart [s]."""
 
@@ -59,7 +59,7 @@ class LoopTime:
         ahead_s = system_s - time_s
         if abs(ahead_s - self.ahead_s) > NOTICED_STEP_S and self._steady() - steady_s < QUICK_S:
             step_s, self.ahead_s = ahead_s - self.ahead_s, ahead_s
-            if abs(step_s) > TOLD_STEP_S:
+            if abs(step_s) > WARN_THRESHOLD_S:
                 LOGGER.warning("the clock of the system was set by %+.3f s: motions go on as if it had not been, the "
                                "stamps of messages follow it", step_s)
         return time_s

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from modular_framework_control.controller import Controller, ControllerError
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 from modular_framework_control.planar_odometry import PlanarOdometry
 from modular_framework_control.rates import first_due, next_due, period_of
 from modular_framework_control.speed_limiter import SpeedLimiter, read_speed_limiter
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 
 Diagonal = tuple[float, float, float, float, float, float]
 

@@ -15,8 +15,8 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
 )
 from modular_framework_control.joint_limits import JointLimitGuard, JointLimits
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.mock_robot_hw")
 

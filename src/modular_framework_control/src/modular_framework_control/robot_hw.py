@@ -20,7 +20,7 @@ from modular_framework_control.hardware_interface import (
     SpeedScalingHandle,
     SpeedScalingInterface,
 )
-from modular_framework_control.node_handle import NodeHandle
+from modular_framework_ros.node_handle import NodeHandle
 
 InterfaceT = TypeVar("InterfaceT", bound=HardwareInterface[Any])
 

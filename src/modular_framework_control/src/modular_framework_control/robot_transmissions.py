@@ -29,10 +29,10 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
 from modular_framework_control.robot_hw import InterfaceT, RobotHW
 from modular_framework_control.transmission_parser import TransmissionInfo, read_transmissions
 from modular_framework_control.transmissions import TransmissionError, Values
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 
 CommandedInterface = PositionJointInterface | VelocityJointInterface | EffortJointInterface
 

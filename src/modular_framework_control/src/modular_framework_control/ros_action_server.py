@@ -2,81 +2,18 @@
 """The action server of a controller: goals become tickets, and what becomes of a ticket is told to the client."""
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
 import rospy
-from actionlib import ActionServer
 from actionlib.server_goal_handle import ServerGoalHandle
 
 from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
 from modular_framework_control.ros_outbox import Outbox
-from modular_framework_control.ros_telling import going_down
+from modular_framework_ros.action_server import SteadyActionServer
 
 Submit = Callable[[Any, GoalTicket[Any]], None]
 MakeResult = Callable[[GoalTicket[Any]], Any]
-
-# actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
-EARLIEST_END_S = 0.05
-LAST_WORD_S = 0.15
-"""For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
-
-
-class SteadyActionServer(ActionServer):
-    """An action server whose status topic survives a reset of the simulated clock, and whose clients hear of every end.
-
-    A goal that ends at once is told so EARLIEST_END_S after it came.
-    """
-
-    def initialize(self) -> None:
-        self._came_s: dict[str, float] = {}
-        self._told_s = -LAST_WORD_S
-        self._ends_to_tell: set[threading.Timer] = set()
-        super().initialize()
-        timer: rospy.Timer | None = getattr(self, "status_timer", None)
-        if timer is not None:
-            timer.shutdown()
-            period = rospy.Duration(1.0 / self.status_frequency)
-            self.status_timer = rospy.Timer(period, self.publish_status_async, reset=True)
-
-    def internal_goal_callback(self, goal: Any) -> None:
-        self._came_s[goal.goal_id.id] = time.monotonic()
-        super().internal_goal_callback(goal)
-
-    def publish_result(self, status: Any, result: Any) -> None:
-        early_s = self._came_s.pop(status.goal_id.id, 0.0) + EARLIEST_END_S - time.monotonic()
-        if early_s <= 0.0:
-            self._tell_end(status, result)
-            return
-        later = threading.Timer(early_s, self._tell_end, (status, result))  # whoever calls has other work to do
-        later.daemon = True
-        self._ends_to_tell.add(later)
-        later.start()
-
-    def _tell_end(self, status: Any, result: Any) -> None:
-        try:
-            super().publish_result(status, result)
-        except rospy.ROSException:
-            if not going_down():
-                raise
-        self._told_s = time.monotonic()
-        self._ends_to_tell.discard(threading.current_thread())  # type: ignore[arg-type]
-
-    def stop(self) -> None:
-        """Stop serving, once every end has been told."""
-        for later in list(self._ends_to_tell):
-            later.join()
-        time.sleep(max(0.0, self._told_s + LAST_WORD_S - time.monotonic()))
-        super().stop()
-
-    def publish_status(self) -> None:
-        try:
-            super().publish_status()
-        except rospy.ROSException:
-            if not going_down():
-                raise
 
 
 class GoalRefusedError(Exception):

@@ -15,8 +15,8 @@ from modular_framework_control.joint_command_controllers import (
     JointControlSnapshot,
 )
 from modular_framework_control.loop_time import LoopTime
-from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_outbox import Outbox
+from modular_framework_ros.node_handle import join_names
 
 
 class JointCommandEdge:

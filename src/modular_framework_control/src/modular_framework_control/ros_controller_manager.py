@@ -32,12 +32,12 @@ from modular_framework_control.controller import Controller, ControllerError
 from modular_framework_control.controller_manager import ControllerManager
 from modular_framework_control.controller_types import ControllerTypes
 from modular_framework_control.loop_time import LoopTime
-from modular_framework_control.node_handle import join_names
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.ros_controllers import attach_ros
 from modular_framework_control.ros_loop_log import LoopLog
-from modular_framework_control.ros_node_handle import RosNodeHandle
 from modular_framework_control.ros_outbox import Outbox
+from modular_framework_ros.node_handle import join_names
+from modular_framework_ros.ros_node_handle import RosNodeHandle
 
 STATISTICS_PERIOD_S = 1.0
 

@@ -19,7 +19,7 @@ from controller_manager_msgs.srv import (
     UnloadController,
 )
 
-from modular_framework_control.node_handle import join_names
+from modular_framework_ros.node_handle import join_names
 
 
 class ControllerManagerClientError(Exception):

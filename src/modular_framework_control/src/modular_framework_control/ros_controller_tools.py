@@ -17,12 +17,12 @@ from controller_manager_msgs.srv import SwitchControllerRequest
 from std_msgs.msg import Bool
 
 from modular_framework_control import ros_controller_manager_interface as interface
-from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_controller_manager_client import (
     ControllerManagerClient,
     ControllerManagerClientError,
 )
-from modular_framework_control.ros_shutdown import hold_shutdown
+from modular_framework_ros.node_handle import join_names
+from modular_framework_ros.shutdown import hold_shutdown
 
 INHIBIT_PERIOD_S = 1.0
 

@@ -35,12 +35,10 @@ from modular_framework_control.joint_state_controller import JointStateControlle
 from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
 from modular_framework_control.loop_time import LoopTime
 from modular_framework_control.mobile_base_controller import MobileBaseController
-from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_action_server import ControllerActionServer, GoalRefusedError
 from modular_framework_control.ros_command_edges import JointCommandEdge
 from modular_framework_control.ros_mobile_base import DiffDriveTopics, FourWheelSteeringTopics, MobileBaseTopics
 from modular_framework_control.ros_outbox import Outbox
-from modular_framework_control.ros_reconfiguration import Adjustable, Reconfiguration
 from modular_framework_control.ros_sensor_edges import SensorEdge
 from modular_framework_control.sensor_controllers import SensorController
 from modular_framework_control.trajectory_goal import (
@@ -50,6 +48,8 @@ from modular_framework_control.trajectory_goal import (
     TrajectorySnapshot,
     TrajectoryTicket,
 )
+from modular_framework_ros.node_handle import join_names
+from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
 PID_GAINS = (
     Adjustable("p", -1e5, 1e5, "command per error"),

@@ -11,8 +11,8 @@ import rospy
 from std_msgs.msg import Bool
 
 from modular_framework_control.combined_robot_hw import CombinedRobotHW
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 
 
 class HardwareNotReadyError(Exception):

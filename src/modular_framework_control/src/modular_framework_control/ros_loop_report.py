@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_srvs.srv import Empty, EmptyResponse
 
 from modular_framework_control.cycle_pacer import LoopFigures, LoopStatistics
-from modular_framework_control.ros_telling import tell
+from modular_framework_ros.publishing import publish
 
 REPORT_PERIOD_S = 1.0
 OVERRUN_WARNING_PERIOD_S = 10.0
@@ -85,4 +85,4 @@ class LoopReport:
         status.values = [KeyValue(key, f"{value:.10g}") for key, value in values.items()] + [KeyValue("fault", fault)]
         message = DiagnosticArray(status=[status])
         message.header.stamp = rospy.Time.now()
-        tell(self._publisher, message)
+        publish(self._publisher, message)

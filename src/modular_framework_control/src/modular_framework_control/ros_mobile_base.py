@@ -26,9 +26,9 @@ from modular_framework_control.mobile_base_controller import (
     MobileBaseController,
     OdometrySnapshot,
 )
-from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_outbox import Outbox
-from modular_framework_control.ros_reconfiguration import Adjustable, Reconfiguration
+from modular_framework_ros.node_handle import join_names
+from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
 QUEUE_SIZE = 100
 DIFF_DRIVE_SETTINGS = (

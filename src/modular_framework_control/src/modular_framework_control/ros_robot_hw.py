@@ -14,7 +14,6 @@ from modular_framework_control.combined_robot_hw import robot_hw_of_type
 from modular_framework_control.cycle_pacer import CyclePacer, LoopStatistics
 from modular_framework_control.hardware_interface import EffortJointInterface, VelocityJointInterface
 from modular_framework_control.loop_time import LoopTime
-from modular_framework_control.node_handle import ParameterError, read_bool, read_number
 from modular_framework_control.plugins import PluginError
 from modular_framework_control.real_time import (
     keep_processors_awake,
@@ -26,8 +25,9 @@ from modular_framework_control.robot_hw import RobotHW
 from modular_framework_control.ros_controller_manager import RosControllerManager
 from modular_framework_control.ros_hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
 from modular_framework_control.ros_loop_report import LoopReport
-from modular_framework_control.ros_node_handle import RosNodeHandle
-from modular_framework_control.ros_shutdown import hold_shutdown
+from modular_framework_ros.node_handle import ParameterError, read_bool, read_number
+from modular_framework_ros.ros_node_handle import RosNodeHandle
+from modular_framework_ros.shutdown import hold_shutdown
 
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 MOCK_TYPE = "modular_framework_control/MockRobotHW"

@@ -13,7 +13,6 @@ from std_msgs.msg import Float64
 
 from modular_framework_control.handles import ForceTorqueSensorHandle, ImuSensorHandle, SpeedScalingHandle
 from modular_framework_control.loop_time import LoopTime
-from modular_framework_control.node_handle import join_names
 from modular_framework_control.ros_outbox import Outbox
 from modular_framework_control.sensor_controllers import (
     ForceTorqueSensorController,
@@ -21,6 +20,7 @@ from modular_framework_control.sensor_controllers import (
     SensorController,
     SpeedScalingStateController,
 )
+from modular_framework_ros.node_handle import join_names
 
 
 class SensorEdge:

@@ -13,8 +13,8 @@ from modular_framework_control.hardware_interface import (
     ImuSensorInterface,
     SpeedScalingInterface,
 )
-from modular_framework_control.node_handle import NodeHandle, read_number
 from modular_framework_control.rates import first_due, next_due, period_of
+from modular_framework_ros.node_handle import NodeHandle, read_number
 
 
 class SensorController(Controller):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 
 UNLIMITED = (-math.inf, math.inf)
 JERK_FACTOR = 2.0

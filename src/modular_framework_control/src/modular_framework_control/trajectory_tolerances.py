@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modular_framework_control.node_handle import NodeHandle, read_number
 from modular_framework_control.trajectory import Array, InvalidTrajectoryError
+from modular_framework_ros.node_handle import NodeHandle, read_number
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from modular_framework_control.node_handle import ParameterError
+from modular_framework_ros.node_handle import ParameterError
 
 Values = Sequence[float]
 Pair = tuple[float, float]

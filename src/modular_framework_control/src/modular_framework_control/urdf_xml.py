@@ -8,7 +8,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
 
-from modular_framework_control.node_handle import ParameterError
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_urdf.xml_text import XmlError, refuse_doctype
 
 

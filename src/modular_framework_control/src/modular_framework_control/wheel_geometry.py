@@ -8,8 +8,8 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names
 from modular_framework_control.urdf_xml import parse_description
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 
 Array = npt.NDArray[np.float64]
 

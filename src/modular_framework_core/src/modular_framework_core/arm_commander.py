@@ -34,8 +34,6 @@ from moveit_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from modular_framework_control.ros_action_client import SteadyActionClient
-from modular_framework_control.ros_start_up import start_timeout, wait_for_start
 from modular_framework_core.commander_results import ExecutionResult, IkResult, PlanResult
 from modular_framework_core.moveit_requests import (
     StartState,
@@ -47,7 +45,8 @@ from modular_framework_core.moveit_requests import (
     robot_state,
 )
 from modular_framework_core.robot_groups import Group, RobotModelError, read_group
-from modular_framework_core.ros_calls import (
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.calls import (
     CallError,
     call_service,
     wait_for_action,
@@ -55,7 +54,8 @@ from modular_framework_core.ros_calls import (
     wait_for_service,
     wait_until,
 )
-from modular_framework_core.stop_requests import stop_requested
+from modular_framework_ros.start_up import start_timeout, wait_for_start
+from modular_framework_ros.stop_requests import stop_requested
 
 EXECUTE_ACTION = "execute_trajectory"
 PLANNERS_SERVICE = "query_planner_interface"

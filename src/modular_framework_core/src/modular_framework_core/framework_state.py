@@ -3,7 +3,8 @@
 
 A plain ``smach.State`` only returns an outcome, so nobody learns why a task failed, and a state that waits
 cannot be interrupted unless its author thought of it. ``FrameworkState`` settles both: its own waits, and calls of
-services and actions through ``ros_calls`` below it, end when the state is asked to stop. A state is written as::
+services and actions through ``modular_framework_ros.calls`` below it, end when the state is asked to stop. A state is
+written as::
 
     class OpenDoor(FrameworkState):
         def __init__(self, door_name, timeout=5.0, outcomes=("success", "fail"),
@@ -25,9 +26,9 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import smach
-from modular_framework_core.stop_requests import stoppable
 from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
 from modular_framework_core.task_constructor.option_checks import checks_options
+from modular_framework_ros.stop_requests import stoppable
 
 DEFAULT_OUTCOMES = ("success", "fail")
 

@@ -7,8 +7,6 @@ from typing import Any
 
 import rospy
 
-from modular_framework_control.ros_action_server import SteadyActionServer
-from modular_framework_control.ros_start_up import start_timeout, wait_for_start
 from modular_framework_core.grasp_server import (
     GraspCommandError,
     Outcome,
@@ -23,9 +21,11 @@ from modular_framework_core.grasp_server import (
 )
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_core.robot_groups import Group, RobotModelError, read_group
-from modular_framework_core.ros_calls import CallError
 from modular_framework_core.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
 from modular_framework_core.stall_evidence import Attempt, StallEvidence
+from modular_framework_ros.action_server import SteadyActionServer
+from modular_framework_ros.calls import CallError
+from modular_framework_ros.start_up import start_timeout, wait_for_start
 
 FEEDBACK_PERIOD_S = 0.1
 STAGE_FIELDS = {Stage.PREGRASP: ("pregrasp", "pregrasped"), Stage.GRASP: ("grasp", "grasped"),

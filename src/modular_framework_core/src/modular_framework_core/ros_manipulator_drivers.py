@@ -21,9 +21,9 @@ from control_msgs.msg import (
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_core.grasp_server import GraspCommandError, Outcome, refuse_no_effort
-from modular_framework_core.ros_calls import wait_for_action, wait_for_result, wait_until
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.calls import wait_for_action, wait_for_result, wait_until
 
 REST_SPEED = 0.02  # [rad/s or m/s]
 REST_TIMEOUT_S = 1.0

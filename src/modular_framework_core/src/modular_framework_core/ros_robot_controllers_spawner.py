@@ -19,7 +19,6 @@ from controller_manager_msgs.srv import (
 )
 from std_msgs.msg import Bool
 
-from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.robot_controllers_spawner import (
     JOINT_STATES_NAME,
     JOINT_STATES_RATE_HZ,
@@ -31,7 +30,8 @@ from modular_framework_core.robot_controllers_spawner import (
     ready_topics,
     with_joint_states,
 )
-from modular_framework_core.ros_calls import CallError, call_service
+from modular_framework_ros.calls import CallError, call_service
+from modular_framework_ros.start_up import start_timeout
 
 CALL_TIMEOUT_S = 30.0
 """Longest wait for the answer of the controller manager [s]; it waits 10 s itself for a loop that stands still."""

@@ -18,8 +18,6 @@ from moveit_msgs.srv import (
 )
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
-from modular_framework_control.ros_start_up import start_timeout
-from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_core.scene_file import (
     NO_COLOR,
     Scene,
@@ -31,6 +29,8 @@ from modular_framework_core.scene_file import (
     scene_text,
 )
 from modular_framework_core.whole_files import write_whole
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.start_up import start_timeout
 
 SERVICE_TIMEOUT_S = 10.0
 PRIMITIVES = {"box": SolidPrimitive.BOX, "sphere": SolidPrimitive.SPHERE, "cylinder": SolidPrimitive.CYLINDER,

@@ -10,11 +10,11 @@ import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from std_srvs.srv import Trigger, TriggerResponse
 
-from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.managers.named_poses import NamedPose, Placement
-from modular_framework_core.ros_calls import CallError, wait_for_service
 from modular_framework_core.sensor_frames import SensorFrame, load_sensor_frames
 from modular_framework_core.srv import GetPoseStamped
+from modular_framework_ros.calls import CallError, wait_for_service
+from modular_framework_ros.start_up import start_timeout
 
 
 def transform_message(frame: SensorFrame) -> TransformStamped:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from modular_framework_core.msg import GraspCommand, GraspGoal
-from modular_framework_core.ros_calls import CallError, wait_for_action, wait_for_result
+from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result
 
 Stage = Literal["pregrasp", "grasp", "postgrasp"]
 SERVER_TIMEOUT_S = 10.0

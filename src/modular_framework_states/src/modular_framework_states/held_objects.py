@@ -16,7 +16,7 @@ from moveit_msgs.srv import (
     GetPlanningSceneRequest,
 )
 
-from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
 
 PREFIX_PARAMETER = "manipulator_prefix"
 SERVICE_TIMEOUT_S = 10.0

@@ -8,7 +8,7 @@ import rospy
 from moveit_msgs.msg import RobotTrajectory
 
 from modular_framework_core import srv
-from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
 
 SERVICE_TIMEOUT_S = 10.0
 

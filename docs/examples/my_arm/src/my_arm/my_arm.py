@@ -11,8 +11,8 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
 )
 from modular_framework_control.joint_limits import JointLimitGuard
-from modular_framework_control.node_handle import NodeHandle, ParameterError, read_names
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, read_names
 
 LOGGER = logging.getLogger("rosout.my_arm")  # below "rosout", so that it reaches ROS's log
 

@@ -10,7 +10,7 @@ import rospy
 from actionlib import CommState
 from rosgraph.names import ns_join
 
-from modular_framework_control.ros_action_client import SteadyActionClient
+from modular_framework_ros.action_client import SteadyActionClient, is_connected
 from moveit_commander.exception import ServerError
 
 SERVICE_TIMEOUT_S = 5.0
@@ -71,7 +71,7 @@ class ActionCaller:
     def connect(self, timeout_s: float) -> None:
         """Waits for the server; 0 waits for ever. Raises ServerError."""
         begun = time.monotonic()
-        while not self._connected():
+        while not is_connected(self._client):
             if rospy.is_shutdown() or 0.0 < timeout_s <= time.monotonic() - begun:
                 raise ServerError(f"action {self.name}: Unable to connect to its server within allotted time "
                                   f"({timeout_s:g}s); does move_group run, and does it have this capability?")
@@ -95,7 +95,7 @@ class ActionCaller:
         begun = seen = time.monotonic()
         while not done.wait(POLL_PERIOD_S):
             now = time.monotonic()
-            seen = now if self._connected() and not self._ended() else seen
+            seen = now if is_connected(self._client) and not self._ended() else seen
             if rospy.is_shutdown():
                 raise ServerError(f"action {self.name}: this node is shut down before the result came")
             if now - begun > timeout_s:
@@ -109,12 +109,6 @@ class ActionCaller:
             raise ServerError(f"action {self.name}: ended without a result ({self._client.get_goal_status_text()}); "
                               "move_group's log says why")
         return result
-
-    def _connected(self) -> bool:
-        """Whether goals, cancels and results have a way; asked without rospy's clock, which may stand still."""
-        wires = self._client.action_client
-        ends = (wires.pub_goal, wires.pub_cancel, wires.result_sub, wires.feedback_sub)
-        return wires.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
 
     def _ended(self) -> bool:
         """Whether the server says that the goal has ended, while its result is not here yet."""

@@ -6,13 +6,13 @@ import rospy
 from std_srvs.srv import Trigger, TriggerRequest
 
 from modular_framework_core.msg import StandardisedGrasp
-from modular_framework_core.ros_calls import call_service, wait_for_service
 from modular_framework_core.srv import (
     AddStandardisedGrasp,
     AddStandardisedGraspRequest,
     RemoveMessage,
     RemoveMessageRequest,
 )
+from modular_framework_ros.calls import call_service, wait_for_service
 
 SERVICE_TIMEOUT_S = 10.0
 

@@ -11,7 +11,6 @@ from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
-from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
@@ -28,7 +27,8 @@ from modular_framework_core.grasp_generation.ros_stored_grasps import StoredGras
 from modular_framework_core.grasp_generation.top_down import TopDownGrasp, top_down_grasps
 from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import StandardisedGrasp
-from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.start_up import start_timeout
 
 SIGNAL_TOPIC = "grasp_generated"
 SERVICE_TIMEOUT_S = 10.0

@@ -10,7 +10,6 @@ from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
 from modular_framework_core.acm import AcmAnswer, AcmError, AcmManager, CollisionMatrix
 from modular_framework_core.managers.ros_simulated_objects import new_loose_objects
-from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
 from modular_framework_core.srv import (
     GetModifiedACM,
     GetModifiedACMRequest,
@@ -26,6 +25,7 @@ from modular_framework_core.srv import (
     UpdateAndPublishACMEntry,
     UpdateAndPublishACMEntryResponse,
 )
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
 
 INDICES_PARAMETER = "manipulator_links_indices"
 PREFIX_PARAMETER = "manipulator_prefix"

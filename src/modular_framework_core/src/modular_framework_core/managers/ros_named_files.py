@@ -19,8 +19,8 @@ from modular_framework_core.managers.named_trajectories import JointLookup, Time
 from modular_framework_core.managers.ros_message_services import MessageServices
 from modular_framework_core.managers.yaml_entries import EntryError
 from modular_framework_core.msg import RobotPose
-from modular_framework_core.ros_calls import CallError, wait_for_service
 from modular_framework_core.srv import GetJointState
+from modular_framework_ros.calls import CallError, wait_for_service
 
 NamedMessages = tuple[dict[str, Any], list[EntryError]]
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import rospy
 
-from modular_framework_control.ros_start_up import start_timeout
 from modular_framework_core.managers import ros_message_services as kinds
 from modular_framework_core.managers.ros_acm_services import AcmServices
 from modular_framework_core.managers.ros_message_services import MessageKind, MessageServices, NamedFile
@@ -23,6 +22,7 @@ from modular_framework_core.managers.ros_named_files import (
     trajectory_reader,
 )
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
+from modular_framework_ros.start_up import start_timeout
 
 TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
 COLLECT_AFTER = 50_000  # objects; messages are freed by their counts, and five plans are some thousand objects

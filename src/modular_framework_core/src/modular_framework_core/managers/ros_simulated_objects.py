@@ -10,7 +10,7 @@ from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
 from modular_framework_core.acm import LINK_SEPARATOR
-from modular_framework_core.ros_calls import call_service, wait_for_service
+from modular_framework_ros.calls import call_service, wait_for_service
 
 SIMULATION_PARAMETER = "simulation"
 SERVICE_TIMEOUT_S = 3.0

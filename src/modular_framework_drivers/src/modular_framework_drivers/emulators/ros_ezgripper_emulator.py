@@ -6,8 +6,6 @@ from pathlib import Path
 
 import rospy
 
-from modular_framework_control.node_handle import ParameterError, read_number
-from modular_framework_control.ros_node_handle import RosNodeHandle
 from modular_framework_drivers.emulators.command_port import CommandPort
 from modular_framework_drivers.emulators.dynamixel_finger import Finger
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
@@ -15,6 +13,8 @@ from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.emulators.ros_orders import offer_orders
 from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
+from modular_framework_ros.node_handle import ParameterError, read_number
+from modular_framework_ros.ros_node_handle import RosNodeHandle
 
 COMMAND_PORT = 29900
 

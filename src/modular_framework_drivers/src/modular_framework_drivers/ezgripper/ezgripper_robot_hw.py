@@ -12,12 +12,12 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
 )
 from modular_framework_control.joint_limits import JointLimitGuard
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.ezgripper_robot_hw")
 JOINT = "ezgripper_knuckle_palm_L1_1"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_number
 from modular_framework_drivers.ezgripper.dynamixel_bus import BAUDRATES
 from modular_framework_drivers.ezgripper.grip import GripRules
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_number
 
 LARGEST_ID = 252
 FULL_TORQUE = 800

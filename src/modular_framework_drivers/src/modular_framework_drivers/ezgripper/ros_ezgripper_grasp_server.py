@@ -9,9 +9,6 @@ from collections.abc import Mapping
 import rospy
 from sensor_msgs.msg import JointState
 
-from modular_framework_control.node_handle import ParameterError
-from modular_framework_control.ros_node_handle import RosNodeHandle
-from modular_framework_control.ros_telling import tell
 from modular_framework_core.grasp_server import GraspCommandError, Outcome, refuse_no_effort
 from modular_framework_core.robot_groups import Group, Joint
 from modular_framework_core.ros_grasp_server import GraspServer
@@ -22,6 +19,9 @@ from modular_framework_drivers.ezgripper.grip import Motion, Standing
 from modular_framework_drivers.ezgripper.gripper_servos import CALIBRATION_TORQUE, CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
+from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.publishing import publish
+from modular_framework_ros.ros_node_handle import RosNodeHandle
 
 ACTION_NAME = "moveit_grasp_action_server"
 POLL_S = 0.01
@@ -122,7 +122,7 @@ class EzGripperManipulator:
             state = self._gripper.state()
             if state.stamp_s > last_s and self._publisher is not None:
                 last_s = state.stamp_s
-                tell(self._publisher, self._message(state))
+                publish(self._publisher, self._message(state))
             time.sleep(self._gripper.settings.poll_period_s)
 
     def _message(self, state: GripperState) -> JointState:

@@ -10,10 +10,10 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerResponse
 
-from modular_framework_control.node_handle import NodeHandle, join_names
-from modular_framework_control.ros_telling import tell
 from modular_framework_drivers.ur.dashboard import DashboardError, ask_dashboard
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
+from modular_framework_ros.node_handle import NodeHandle, join_names
+from modular_framework_ros.publishing import publish
 
 # services of the dashboard under the names of ur_robot_driver: what to ask, and how the answer begins when it was done
 DASHBOARD_SERVICES = {
@@ -72,7 +72,7 @@ class UrArmRobotHW(UrArmHardware):
         while not self._closing.wait(_WATCH_PERIOD_S):
             ready = self.ready
             if ready != told and self._publisher is not None:
-                tell(self._publisher, Bool(ready))
+                publish(self._publisher, Bool(ready))
                 told = ready
 
     def _on_resume(self, request: Any) -> TriggerResponse:

@@ -15,13 +15,13 @@ from modular_framework_control.hardware_interface import (
     SpeedScalingHandle,
     SpeedScalingInterface,
 )
-from modular_framework_control.node_handle import NodeHandle, ParameterError, join_names, read_number
 from modular_framework_control.robot_hw import RobotHW
 from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, PROGRAM_STOPPED, robot_fault
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints, read_link_settings, read_prefix
 from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_number
 
 LOGGER = logging.getLogger("rosout.ur_arm")
 JOINT_NAMES = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint",

@@ -8,9 +8,9 @@ from typing import Any
 
 import rospy
 
-from modular_framework_control.ros_action_server import SteadyActionServer
-from modular_framework_control.ros_telling import going_down
 from modular_framework_planning.errors import ErrorCode
+from modular_framework_ros.action_server import SteadyActionServer
+from modular_framework_ros.publishing import going_down
 
 PREVIOUS_GOAL_TIMEOUT_S = 10.0
 

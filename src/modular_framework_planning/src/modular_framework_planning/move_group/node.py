@@ -30,7 +30,6 @@ from modular_framework_planning.move_group.capabilities.tf_publisher import TfPu
 from modular_framework_planning.move_group.capability_selection import Capability, chosen_capabilities
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.move_group.controllers.execution import load_execution
-from modular_framework_planning.move_group.many_clients import widen_backlog
 from modular_framework_planning.move_group.markers.scene_markers import MarkerPublisher
 from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
@@ -48,6 +47,7 @@ from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.process_setup.many_threads import prepare
+from modular_framework_ros.service_backlog import widen_backlog
 
 # Every endpoint of the node under the name MoveIt's parameters `capabilities` and `disable_capabilities` use.
 CAPABILITIES = (

@@ -10,9 +10,9 @@ import rospy
 from moveit_msgs.msg import MotionPlanRequest
 from std_msgs.msg import String
 
-from modular_framework_control.ros_telling import tell
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group import capability_names as names
+from modular_framework_ros.publishing import publish
 
 
 class Reporter:
@@ -28,7 +28,7 @@ class Reporter:
     def request(self, message: MotionPlanRequest) -> None:
         """Tells a request as it came."""
         if self._requests is not None:
-            tell(self._requests, message)
+            publish(self._requests, message)
 
     def report(self, kind: str, code: int, reason: str, **details: Any) -> None:
         """Publishes one result; a failure is logged as well.
@@ -44,7 +44,7 @@ class Reporter:
         if code != ErrorCode.SUCCESS:
             name = ErrorCode(code).name if code in set(ErrorCode) else str(code)
             rospy.logwarn("%s failed (%s): %s", kind, name, reason)
-        tell(self._publisher, String(json.dumps(entry)))
+        publish(self._publisher, String(json.dumps(entry)))
 
     def failure(self, kind: str, error: Exception, **details: Any) -> int:
         """Reports an exception and returns the code to answer with."""

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 import rospy
 
-from modular_framework_control.ros_reconfiguration import Adjustable, Reconfiguration
 from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
 NO_LIMIT = 1.0e9
 Settings = TypeVar("Settings")

@@ -15,7 +15,6 @@ from moveit_msgs.msg import RobotState
 from std_msgs.msg import Empty
 from visualization_msgs.msg import Marker, MarkerArray
 
-from modular_framework_control.ros_telling import tell
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.conversions import joint_values, pose_message
@@ -24,6 +23,7 @@ from modular_framework_planning.move_group.robot_parameters import load_robot_mo
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.visualization.goal_marker import Choice, GoalMarker
 from modular_framework_planning.visualization.move_group_client import MotionOptions, MoveGroupClient
+from modular_framework_ros.publishing import publish
 
 VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
 START_COLOR = (0.2, 0.4, 0.9, 0.4)
@@ -131,7 +131,7 @@ class InteractiveGoal:
     def follow_robot(self) -> None:
         """Lets motions start where the robot is."""
         self._start = None
-        tell(self._ghosts["start"], MarkerArray([Marker(action=Marker.DELETEALL)]))
+        publish(self._ghosts["start"], MarkerArray([Marker(action=Marker.DELETEALL)]))
 
     def _choose_planner(self, entry: str) -> None:
         pipeline, _, planner = entry.rpartition(": ")
@@ -249,7 +249,7 @@ class InteractiveGoal:
     def _take_start(self, state: RobotState) -> None:
         positions = self._positions_of(state)
         self._start, self._trajectory = state, None
-        tell(self._ghosts["start"], _numbered([
+        publish(self._ghosts["start"], _numbered([
             Marker(action=Marker.DELETEALL), *robot_markers(self._model, positions, "start", START_COLOR)]))
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
@@ -272,7 +272,7 @@ class InteractiveGoal:
         text.pose.position.z += WORDS_ABOVE_TIP_M
         text.scale.z = 0.04
         text.color.r = text.color.g = text.color.b = text.color.a = 1.0
-        tell(self._ghosts["goal"], _numbered([*markers, text] if text.text else markers))
+        publish(self._ghosts["goal"], _numbered([*markers, text] if text.text else markers))
 
     # ---------------------------------------------------------------- states
     def _tip_pose(self) -> Pose:

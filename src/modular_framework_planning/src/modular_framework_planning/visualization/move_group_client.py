@@ -24,9 +24,9 @@ from moveit_msgs.msg import (
 from moveit_msgs.srv import GetPlanningScene, GetPositionIK, GetStateValidity, QueryPlannerInterfaces
 from std_msgs.msg import String
 
-from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group import capability_names as names
+from modular_framework_ros.action_client import SteadyActionClient
 
 GOAL_TOLERANCE = 1.0e-4  # [rad or m]
 EXECUTION_MARGIN_S = 60.0

@@ -8,7 +8,7 @@ from typing import Any
 
 import rospy
 
-from modular_framework_control.node_handle import ParameterError
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
 
 

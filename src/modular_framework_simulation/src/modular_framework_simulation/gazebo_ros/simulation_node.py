@@ -11,9 +11,9 @@ import rospkg
 import rospy
 
 from modular_framework_control.hardware_interface import HardwareInterfaceError
-from modular_framework_control.node_handle import ParameterError
 from modular_framework_control.ros_controller_manager import RosControllerManager
-from modular_framework_control.ros_node_handle import RosNodeHandle
+from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices

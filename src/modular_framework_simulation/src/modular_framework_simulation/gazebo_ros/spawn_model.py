@@ -11,7 +11,7 @@ import rospy
 from gazebo_msgs import srv
 from std_srvs.srv import Empty
 
-from modular_framework_control.ros_start_up import start_timeout, wait_for_start
+from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.spawn_model_command import (
     Format,

@@ -27,8 +27,8 @@ from modular_framework_control.joint_limits import (
     soft_limits_from_urdf,
     soft_limits_with_parameters,
 )
-from modular_framework_control.node_handle import NodeHandle
 from modular_framework_control.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle
 from modular_framework_simulation.models.robot_description import RobotJoint
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 

@@ -10,7 +10,7 @@ import rosservice
 
 from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import NotNegative
-from modular_framework_core.ros_calls import CallError, call_service, wait_until
+from modular_framework_ros.calls import CallError, call_service, wait_until
 from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
 

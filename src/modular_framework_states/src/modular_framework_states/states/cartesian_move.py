@@ -15,7 +15,7 @@ from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.moveit_requests import error_name, robot_state
 from modular_framework_core.option_limits import Limits, Share, Vector
 from modular_framework_core.option_uses import Named
-from modular_framework_core.ros_calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.manager_clients import ManagerError, fetch
 
 TIMEOUT_S = 20.0

@@ -11,7 +11,7 @@ from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.option_limits import Positive
 from modular_framework_core.option_uses import Named
 from modular_framework_core.robot_groups import RobotModelError
-from modular_framework_core.ros_calls import CallError, wait_until
+from modular_framework_ros.calls import CallError, wait_until
 from modular_framework_states.grasp_goals import GraspGoalError, send
 from modular_framework_states.held_objects import detach, held_objects
 from modular_framework_states.manipulator_postures import posture_grasp, posture_positions

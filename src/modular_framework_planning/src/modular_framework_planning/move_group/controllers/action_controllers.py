@@ -11,7 +11,6 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, GripperCommandAction
 
-from modular_framework_control.ros_action_client import SteadyActionClient
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.execution_messages import MotionPart, gripper_goal, trajectory_goal
 from modular_framework_planning.trajectory_execution.controllers import (
@@ -20,6 +19,7 @@ from modular_framework_planning.trajectory_execution.controllers import (
     ControllerSpec,
     parse_controllers,
 )
+from modular_framework_ros.action_client import SteadyActionClient
 
 POLL_S = 0.01
 ACTION_TYPES = dict(zip(ACTION_KINDS, (FollowJointTrajectoryAction, GripperCommandAction), strict=True))

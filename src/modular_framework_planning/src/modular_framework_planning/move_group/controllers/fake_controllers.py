@@ -12,7 +12,6 @@ import rospy
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
-from modular_framework_control.ros_telling import tell
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.execution_messages import MotionPart
 from modular_framework_planning.move_group import capability_names as names
@@ -20,6 +19,7 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
+from modular_framework_ros.publishing import publish
 
 DEFAULT_RATE = 10.0
 SEEN_TIMEOUT_S = 2.0
@@ -108,7 +108,7 @@ class FakeMotion:
     def _publish(self, positions: Sequence[float]) -> None:
         message = JointState(name=self._part.trajectory.joint_names, position=list(positions))
         message.header.stamp = rospy.Time.now()
-        tell(self._publisher, message)
+        publish(self._publisher, message)
 
     def _end(self) -> None:
         self._publish(self._part.trajectory.points[-1].positions)

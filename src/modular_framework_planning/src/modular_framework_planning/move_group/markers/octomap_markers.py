@@ -10,11 +10,11 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from modular_framework_control.ros_telling import tell
 from modular_framework_planning.messages.conversions import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene
+from modular_framework_ros.publishing import publish
 
 MAX_CUBES = 100_000
 SHADES = [ColorRGBA(*colorsys.hsv_to_rgb(hue, 0.8, 0.9), 1.0) for hue in np.linspace(0.7, 0.0, 32)]  # blue to red
@@ -35,7 +35,7 @@ class OctomapMarkers:
         markers = [Marker(action=Marker.DELETEALL)]
         markers += [_cubes(body, shape, scene.model.planning_frame) for body in (scene.octomap,) if body is not None
                     for shape, _ in body.shapes if isinstance(shape, Octree) and len(shape.centers)]
-        tell(self._publisher, MarkerArray(markers))
+        publish(self._publisher, MarkerArray(markers))
 
 
 def _cubes(body: CollisionObject, octree: Octree, frame: str) -> Marker:

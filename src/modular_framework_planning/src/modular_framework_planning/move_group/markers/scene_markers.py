@@ -11,7 +11,6 @@ from geometry_msgs.msg import Point
 from moveit_msgs.msg import DisplayTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
-from modular_framework_control.ros_telling import tell
 from modular_framework_planning.collision_detection.exact_collision import Contact
 from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Array, Transform
@@ -20,6 +19,7 @@ from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
 from modular_framework_planning.planning_scene.planning_scene import Color, PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.publishing import publish
 
 OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz draws transparent markers in no order of depth
 ATTACHED_COLOR = (0.75, 0.3, 0.75, 1.0)
@@ -58,11 +58,11 @@ class MarkerPublisher:
                 markers.append(_shape_marker(shape, held.body.pose * pose, held.link, held.name, number))
                 markers[-1].frame_locked = True
                 _paint(markers[-1], scene.colors.get(held.name, ATTACHED_COLOR))
-        tell(self._scene, MarkerArray(markers))
+        publish(self._scene, MarkerArray(markers))
 
     def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
         """Publishes the planned motion: a line along which the tip goes and ghosts of the robot on its way."""
-        tell(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
+        publish(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
         group = scene.model.group(response.group_name)
         rows = answer.trajectory.positions
         markers = [Marker(action=Marker.DELETEALL), *_tip_line(scene, group, rows, answer.start)]
@@ -73,7 +73,7 @@ class MarkerPublisher:
                                      (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15))
         for number, marker in enumerate(markers):
             marker.id = number
-        tell(self._path, MarkerArray(markers))
+        publish(self._path, MarkerArray(markers))
 
     def show_contacts(self, contacts: Sequence[Contact]) -> None:
         """Publishes a ball where bodies touch, named by them: why the last plan failed; none takes old ones away."""
@@ -84,7 +84,7 @@ class MarkerPublisher:
             marker.scale.x = marker.scale.y = marker.scale.z = CONTACT_SIZE_M
             _paint(marker, CONTACT_COLOR)
             markers.append(marker)
-        tell(self._contacts, MarkerArray(markers))
+        publish(self._contacts, MarkerArray(markers))
 
 
 def _paint(marker: Marker, color: tuple[float, float, float, float]) -> None:

@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 import rospy
 
-from modular_framework_control.node_start import run_node
+from modular_framework_ros.node_start import run_node
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,7 @@ def going_down() -> bool:
     return bool(rospy.core.is_shutdown_requested())
 
 
-def tell(publisher: rospy.Publisher, message: Any) -> None:
+def publish(publisher: rospy.Publisher, message: Any) -> None:
     """Publishes a message; of a topic that is closed because the node goes down nothing more is said.
 
     Raises:

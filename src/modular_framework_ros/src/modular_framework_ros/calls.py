@@ -15,8 +15,9 @@ import rospy
 from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
-from modular_framework_control.ros_start_up import WaitReport, wait_for_start
-from modular_framework_core.stop_requests import stop_requested
+from modular_framework_ros.action_client import is_connected
+from modular_framework_ros.start_up import WaitReport, wait_for_start
+from modular_framework_ros.stop_requests import stop_requested
 
 POLL_PERIOD_S = 0.01
 STOP_PERIOD_S = 0.05
@@ -112,19 +113,12 @@ def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: 
     Raises:
         CallError: No server was there in time, or what needs it was asked to stop.
     """
-    inner = client.action_client
-
-    def connected() -> bool:
-        ends = (inner.pub_goal, inner.pub_cancel, inner.result_sub, inner.feedback_sub)
-        return inner.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
-
-    there = wait_for_start(lambda: connected() or stop_requested(), f"action server '{rospy.resolve_name(name)}'",
-                           timeout_s)
+    what = f"action server '{rospy.resolve_name(name)}'"
+    there = wait_for_start(lambda: is_connected(client) or stop_requested(), what, timeout_s)
     if stop_requested():
-        raise _given_up(f"action server '{rospy.resolve_name(name)}'")
+        raise _given_up(what)
     if not there:
-        raise CallError(f"action server '{rospy.resolve_name(name)}' was not there within {timeout_s:.1f} s; "
-                        "start the node that offers it")
+        raise CallError(f"{what} was not there within {timeout_s:.1f} s; start the node that offers it")
 
 
 def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,

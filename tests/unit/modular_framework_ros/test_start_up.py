@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control import ros_start_up
-from modular_framework_control.ros_start_up import start_timeout, wait_for_start
+from modular_framework_ros import start_up
+from modular_framework_ros.start_up import start_timeout, wait_for_start
 
 
 @pytest.fixture
@@ -19,8 +19,8 @@ def node(monkeypatch: pytest.MonkeyPatch) -> Any:
     def sleep(period_s: float) -> None:
         state.now_s += period_s
 
-    monkeypatch.setattr(ros_start_up, "time", SimpleNamespace(monotonic=lambda: state.now_s, sleep=sleep))
-    monkeypatch.setattr(ros_start_up, "rospy", SimpleNamespace(
+    monkeypatch.setattr(start_up, "time", SimpleNamespace(monotonic=lambda: state.now_s, sleep=sleep))
+    monkeypatch.setattr(start_up, "rospy", SimpleNamespace(
         get_param=state.parameters.get, is_shutdown=lambda: False, resolve_name=str,
         logwarn=lambda text, *values: state.warnings.append(text % values),
         logerr_throttle=lambda period_s, text: state.errors.append(text)))

@@ -14,8 +14,8 @@ class SteadyActionClient(actionlib.SimpleActionClient):
 
     actionlib's own client knows its goal only when `send_goal` has returned, and drops whatever the server says before
     that: a goal accepted or ended within that time stays pending for ever. This one lets such an answer wait. It also
-    lets the next goal wait until the end of the one before is noted: `done_cb` is told first, and whoever then sends a
-    goal would have it marked as done. So `done_cb` must not wait for another thread that sends a goal.
+    lets the next goal wait until the end of the one before is noted: `done_cb` is called first, and a goal sent then
+    would be marked as done. So `done_cb` must not wait for another thread that sends a goal.
     """
 
     def __init__(self, ns: str, action_spec: type[Any]) -> None:
@@ -31,3 +31,10 @@ class SteadyActionClient(actionlib.SimpleActionClient):
         with self._sending:
             if gh == self.gh:
                 super()._handle_transition(gh)
+
+
+def is_connected(client: actionlib.SimpleActionClient) -> bool:
+    """Whether an action server listens to a client and has reported its status; asks without rospy's clock."""
+    inner = client.action_client
+    ends = (inner.pub_goal, inner.pub_cancel, inner.result_sub, inner.feedback_sub)
+    return inner.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)

@@ -6,7 +6,7 @@ from typing import Any
 
 import rospy
 
-from modular_framework_control.node_handle import join_names
+from modular_framework_ros.node_handle import join_names
 
 
 class RosNodeHandle:
