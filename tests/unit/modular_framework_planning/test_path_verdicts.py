@@ -5,7 +5,7 @@ That the verdict on one sample is right is shown in test_collision_verdicts.
 """
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +16,7 @@ from independent_checker import IndependentChecker
 
 from modular_framework_planning.collision_detection import collision_checker
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision import ExactCollision
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
@@ -23,6 +24,7 @@ from modular_framework_planning.robot_model.urdf_document import package_resolve
 ARM_WORLDS, ARM_PATHS = 5, 6
 BARS_PATHS, OBSTACLES = 150, 30
 STEP = 0.01  # [rad or m]
+FINE_STEP = 1.0e-6  # [rad or m]
 LONGEST_WAY = 60  # [STEP]
 THICK, LONG = 0.02, 0.4  # of a bar [m]
 BARS = (("continuous", "0 0 1"), ("revolute", "0 1 0"), ("revolute", "0 1 0"), ("prismatic", "1 0 0"))
@@ -39,13 +41,14 @@ class Neighbourhood:
     """A group of joints in a world, and paths that graze something there."""
 
     def __init__(self, scene: PlanningScene, group: str) -> None:
-        self._rest, self._indices = scene.model.default_positions(), scene.model.group(group).indices
-        self.ours = CollisionChecker(scene, self._indices)
+        self.scene, self.indices = scene, scene.model.group(group).indices
+        self._rest = scene.model.default_positions()
+        self.ours = CollisionChecker(scene, self.indices)
 
     def whole(self, values: np.ndarray) -> np.ndarray:
         """Positions of the whole robot."""
         positions = self._rest.copy()
-        positions[self._indices] = values
+        positions[self.indices] = values
         return positions
 
     def free_steps(self, start: np.ndarray, way: np.ndarray) -> int:
@@ -58,7 +61,7 @@ class Neighbourhood:
 
         One joint moves, or about half of them; whole turns make no difference to what touches.
         """
-        count = len(self._indices)
+        count = len(self.indices)
         while True:
             start = rng.uniform(-np.pi, np.pi, count) + 2.0 * np.pi * rng.integers(-1, 2, count)
             moves = np.arange(count) == rng.integers(count) if rng.random() < 0.5 else rng.random(count) < 0.6
@@ -77,6 +80,16 @@ class Neighbourhood:
         turn = start + (free + rng.integers(0, 3)) * way
         ends = [start - rng.random() * behind * way for _ in range(3)]
         return np.array([self.whole(row) for row in (ends[0], ends[1], turn, turn, ends[2])])
+
+    def path_up_to_contact(self, rng: np.random.Generator) -> np.ndarray:
+        """A free path that ends within FINE_STEP of contact; vertices (2, joints)."""
+        start, way, free = self.way_into_contact(rng)
+        apart, touching = float(free), free + 1.0
+        while (touching - apart) * STEP > FINE_STEP:
+            middle = 0.5 * (apart + touching)
+            apart, touching = (middle, touching) if self.ours.is_free(self.whole(start + middle * way)) \
+                else (apart, middle)
+        return np.array([self.whole(start + free * way), self.whole(start + apart * way)])
 
     def touching_samples(self, path: np.ndarray) -> int:
         """Compares the verdicts on a path with those on its samples; returns how many of these touch."""
@@ -126,11 +139,11 @@ def assert_many_graze(counts: list[int]) -> None:
     assert counts.count(0) > len(counts) / 10 and sum(0 < count <= 5 for count in counts) > len(counts) / 3, counts
 
 
-@pytest.mark.parametrize("most_undecided", [collision_checker.MOST_UNDECIDED, 1])
+@pytest.mark.parametrize("undecided_rows", [collision_checker.UNDECIDED_ROWS, 1])
 def test_no_touching_sample_of_an_arms_path_is_passed_over_and_no_free_path_is_refused(
-        robot: object, monkeypatch: pytest.MonkeyPatch, most_undecided: int) -> None:
-    monkeypatch.setattr(collision_checker, "MOST_UNDECIDED", most_undecided)
-    rng = np.random.default_rng(31 + most_undecided)
+        robot: object, monkeypatch: pytest.MonkeyPatch, undecided_rows: int) -> None:
+    monkeypatch.setattr(collision_checker, "UNDECIDED_ROWS", undecided_rows)
+    rng = np.random.default_rng(31 + undecided_rows)
     assert_many_graze([world.touching_samples(world.grazing_path(rng)) for world in arm_worlds(robot, rng)
                        for _ in range(ARM_PATHS)])
 
@@ -138,6 +151,31 @@ def test_no_touching_sample_of_an_arms_path_is_passed_over_and_no_free_path_is_r
 def test_no_touching_sample_of_thin_bars_path_is_passed_over_and_no_free_path_is_refused(bars: Neighbourhood) -> None:
     rng = np.random.default_rng(42)
     assert_many_graze([bars.touching_samples(bars.grazing_path(rng)) for _ in range(BARS_PATHS)])
+
+
+def test_a_path_that_stays_close_to_contact_asks_the_exact_check_about_undecided_pairs_only(
+        bars: Neighbourhood, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(44)
+    paths = [bars.path_up_to_contact(rng) for _ in range(5)]
+    asked: list[int] = []
+    touches = ExactCollision.touches
+
+    def counted(exact: ExactCollision, positions: np.ndarray, numbers: Iterable[int]) -> bool:
+        pairs = list(numbers)
+        asked.append(len(pairs))
+        return touches(exact, positions, pairs)
+
+    def questions(rows: int) -> list[int]:
+        monkeypatch.setattr(collision_checker, "UNDECIDED_ROWS", rows)
+        checker = CollisionChecker(bars.scene, bars.indices)
+        asked.clear()
+        assert all(checker.path_is_free(path, FINE_STEP) for path in paths)
+        return list(asked)
+
+    monkeypatch.setattr(ExactCollision, "touches", counted)
+    expected = questions(100_000)
+    assert len(expected) > 200
+    assert questions(1) == expected
 
 
 def test_the_end_of_an_edge_is_looked_at_and_its_start_is_not(bars: Neighbourhood) -> None:

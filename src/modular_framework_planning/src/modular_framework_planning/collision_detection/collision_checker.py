@@ -25,9 +25,9 @@ from modular_framework_planning.collision_detection.collision_bodies import (
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
 from modular_framework_planning.collision_detection.exact_collision import Contact, ExactCollision
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
-from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
+from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
-    MOST_UNDECIDED,
+    UNDECIDED_ROWS,
     check_polyline,
     sample_at,
 )
@@ -68,7 +68,7 @@ class CollisionChecker:
                 self._tolerated[number] = depth
             elif not pair.is_fixed:
                 self._moving.append(number)
-        self._undecided = np.empty((MOST_UNDECIDED, 2), dtype=np.int64)
+        self._undecided = np.empty((UNDECIDED_ROWS, 2), dtype=np.int64)
 
     @cached_property
     def _exact(self) -> ExactCollision:
@@ -119,26 +119,29 @@ class CollisionChecker:
     def _colliding_sample(self, path: Array, step: float, first: int) -> tuple[int, NDArray[np.int64]]:
         """Returns the number of a colliding sample or -1, and the numbers of the samples at the vertices."""
         status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
+        decided = 0
+        while status == TOO_CLOSE:
+            written = min(count, len(self._undecided))
+            number = self._decide(path, numbers, self._undecided[decided:written])
+            if number >= 0:
+                return number, numbers
+            if written == count:
+                break
+            decided, self._undecided = written, np.empty((4 * written, 2), dtype=np.int64)
+            status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         if status == TOUCHING:
             return count, numbers
         end = int(numbers[-1])
-        if status != CLEAR:
-            number = self._decide(path, numbers, range(first, end + 1), count)
-            if number >= 0:
-                return number, numbers
         if self._tolerated or self._compiled.uncompiled:
             for number in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
                 if not self._rest_is_free(sample_at(path, numbers, number)):
                     return number, numbers
         return -1, numbers
 
-    def _decide(self, path: Array, numbers: NDArray[np.int64], samples: range, count: int) -> int:
-        """Asks the exact check what the bounds left open; returns the number of a sample that touches, or -1."""
-        if count > MOST_UNDECIDED:
-            return next((number for number in samples
-                         if self._exact.touches(sample_at(path, numbers, number), self._moving)), -1)
+    def _decide(self, path: Array, numbers: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
+        """Asks the exact check about (sample, pair) rows; returns the number of a sample that touches, or -1."""
         members = self._compiled.members
-        return next((number for number, pair in self._undecided[:count].tolist()
+        return next((number for number, pair in undecided.tolist()
                      if self._exact.touches(sample_at(path, numbers, number),
                                             (self._moving[member] for member in members[pair]))), -1)
 

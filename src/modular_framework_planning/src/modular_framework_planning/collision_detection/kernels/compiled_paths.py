@@ -34,7 +34,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_tables impo
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
-MOST_UNDECIDED = 256
+UNDECIDED_ROWS = 256  # to begin with
 
 
 class Samples(NamedTuple):
@@ -186,7 +186,7 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         world: what to check in.
         samples: of the path, positions of the whole robot.
         first: number of the first sample that has to be free.
-        undecided: filled with (sample, pair) too close to tell, shape (MOST_UNDECIDED, 2).
+        undecided: filled with (sample, pair) too close to tell, shape (n, 2).
 
     Returns:
         (status, number): TOUCHING with the number of a sample that touches; TOO_CLOSE with the number of undecided
