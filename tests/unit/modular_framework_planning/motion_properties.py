@@ -19,7 +19,7 @@ from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.ompl.planner import OmplPlanner
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
-from modular_framework_planning.planners.stomp import StompPlanner
+from modular_framework_planning.planners.stomp.planner import StompPlanner
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -28,6 +28,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.plugins import make_adapters
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -67,7 +68,7 @@ def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
     """The pipeline a problem of a kind is given to."""
     settings = PipelineSettings(seed=seed, robot_planning={"cartesian_limits": CARTESIAN_LIMITS})
     planner = {"ompl": OmplPlanner, "stomp": StompPlanner}.get(kind, CommandPlanner)
-    adapters = () if kind in ("ptp", "lin") else None
+    adapters = () if kind in ("ptp", "lin") else make_adapters()
     made = planner.configure(model, settings) if hasattr(planner, "configure") else planner()
     return PlanningPipeline(model, KinematicsPool(model), settings, made, adapters)
 

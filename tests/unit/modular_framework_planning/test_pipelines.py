@@ -29,12 +29,8 @@ from modular_framework_planning.planning_interface.planning_request import (
     PlanningRequest,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_parts import (
-    DEFAULT_ADAPTERS,
-    PipelineSpec,
-    make_adapters,
-    make_planner,
-)
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
+from modular_framework_planning.planning_pipeline.plugins import DEFAULT_ADAPTERS, make_adapters, make_planner
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
@@ -125,7 +121,7 @@ def test_a_planner_that_is_not_there_is_replaced_by_the_default_one(
 def test_a_default_planner_that_is_not_there_is_refused_with_the_list(model: RobotModel, pool: KinematicsPool) -> None:
     settings = PipelineSettings(groups={GROUP: {"default_planner_config": "BiTRRT"}})
     for name in ("", "nobody"):
-        error = failure(PlanningPipeline(model, pool, settings), wall_request(model, planner_id=name))
+        error = failure(PipelineSpec(settings=settings).build(model, pool), wall_request(model, planner_id=name))
         assert error.code == ErrorCode.PLANNING_FAILED
         assert all(word in error.reason for word in ("BiTRRT", *PLANNERS))
 
@@ -174,7 +170,7 @@ class Straight:
 
 def test_a_planner_of_ones_own_is_named_by_module_and_class(model: RobotModel, pool: KinematicsPool) -> None:
     own = make_planner(f"{Straight.__module__}/Straight", model, PipelineSettings())
-    given = PlanningPipeline(model, pool, PipelineSettings(), own, name="own")
+    given = PlanningPipeline(model, pool, PipelineSettings(), own, make_adapters(), "own")
     free = PlanningRequest(empty_scene(model, place(model, START)), GROUP, goal(model), "whatever")
     assert arrives(given.plan(free))
     error = failure(given, wall_request(model))
@@ -214,7 +210,7 @@ def test_a_start_beyond_a_bound_is_left_from_where_the_robot_is_or_refused(
     near = empty_scene(model, place(model, (1.57, -1.57, 1.2, -1.2, -1.57, upper + 0.05)))
     answer = pipeline.plan(PlanningRequest(near, GROUP, goal(model)))
     assert answer.trajectory.positions[0][5] == pytest.approx(upper + 0.05), "the motion begins where the robot is"
-    bare = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), adapters=())
+    bare = PipelineSpec(adapters="").build(model, KinematicsPool(model))
     assert "FixStartStateBounds" in failure(bare, PlanningRequest(near, GROUP, goal(model))).reason
 
 
@@ -236,7 +232,7 @@ def test_path_constraints_hold_along_the_whole_motion(model: RobotModel, pipelin
     motion = MotionChecker(CollisionChecker(wall_scene(model)), model.group(GROUP).indices, answer.start)
     curve = answer.trajectory.curve(0.004)
     assert arrives(answer) and len(curve) > 100
-    assert all(constraints.satisfied(motion.whole(values)) for values in curve)
+    assert all(constraints.satisfied(motion.full_positions(values)) for values in curve)
 
 
 def test_a_start_or_goal_that_violates_path_constraints_says_so(model: RobotModel, pipeline: PlanningPipeline) -> None:
@@ -247,7 +243,7 @@ def test_a_start_or_goal_that_violates_path_constraints_says_so(model: RobotMode
     request = PlanningRequest(scene, GROUP, goal(model, START), path_constraints=level(model, 0.1))
     answer = pipeline.plan(request)
     assert answer.trajectory.positions[0][3] == pytest.approx(-1.0), "FixStartStatePathConstraints leads it there"
-    bare = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), adapters=())
+    bare = PipelineSpec(adapters="").build(model, KinematicsPool(model))
     assert failure(bare, request).code == ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS
 
 

@@ -25,6 +25,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import (
     AttachedObject,
     CollisionObject,
@@ -43,7 +44,7 @@ PLANS = 100
 
 @pytest.fixture(scope="module")
 def pipeline(model: RobotModel) -> PlanningPipeline:
-    return PlanningPipeline(model, KinematicsPool(model), PipelineSettings(seed=3))
+    return PipelineSpec(settings=PipelineSettings(seed=3)).build(model, KinematicsPool(model))
 
 
 @pytest.fixture(scope="module")

@@ -249,7 +249,7 @@ def test_padding_and_scale_are_margins_that_never_fall_short(scene: Scene) -> No
     assert {item.link_name: item.padding for item in sent.link_padding}[WRIST] == 0.02
     assert {item.link_name: item.scale for item in sent.link_scale}["forearm_link"] == 1.1
     uniform = scene.with_padding(uniform_padding(scene.model.frame_ids, 0.01, 1.0, objects=0.005, attached=0.003))
-    assert np.allclose(uniform.link_margins(), 0.015) and uniform.held_margin() == pytest.approx(0.008)
+    assert np.allclose(uniform.link_margins(), 0.015) and uniform.attached_padding() == pytest.approx(0.008)
     for bad, text in ((LinkPadding("nowhere", 0.1), "nowhere"), (LinkPadding(WRIST, -0.1), "0 m or more")):
         change.link_padding = [bad]
         with pytest.raises(PlanningError, match=text):

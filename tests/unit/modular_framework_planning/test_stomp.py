@@ -11,8 +11,8 @@ from modular_framework_planning.constraints.kinematic_constraints import Kinemat
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planners.stomp import StompPlanner
 from modular_framework_planning.planners.stomp.optimiser import Optimiser
+from modular_framework_planning.planners.stomp.planner import StompPlanner
 from modular_framework_planning.planners.stomp.settings import StompSettings, read_settings
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
@@ -21,6 +21,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PlanningRequest,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.plugins import make_adapters
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -43,7 +44,8 @@ def scene_with(model: RobotModel, height_m: float) -> PlanningScene:
 def planned(model: RobotModel, height_m: float, parameters: dict[str, object] | None = None,
             **request: object) -> PlanningAnswer:
     settings = PipelineSettings(seed=4, parameters=parameters or {})
-    pipeline = PlanningPipeline(model, KinematicsPool(model), settings, StompPlanner.configure(model, settings))
+    pipeline = PlanningPipeline(model, KinematicsPool(model), settings, StompPlanner.configure(model, settings),
+                                make_adapters())
     joints = model.group(GROUP).joints
     goal = JointGoal(dict(zip(joints, GOAL, strict=True)))
     return pipeline.plan(PlanningRequest(scene_with(model, height_m), GROUP, (goal,),

@@ -26,8 +26,10 @@ from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.path_repair import EdgeError, repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
-from modular_framework_planning.planning_pipeline.last_check import GRACE_S, LastCheck
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
+from modular_framework_planning.planning_pipeline.plugins import make_adapters
+from modular_framework_planning.planning_pipeline.trajectory_validator import GRACE_S, TrajectoryValidator
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
@@ -80,7 +82,7 @@ class Stubborn(Coarse):
 def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
         model: RobotModel, robot: object, pool: KinematicsPool) -> None:
     planner, asked = Coarse(), request(model)
-    answer = PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(asked)
+    answer = PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(asked)
     assert len(planner.asked) == 1 and len(answer.path) > 2
     second = IndependentChecker(robot.urdf, robot.srdf, package_resolver)
     second.set_world([("board", box(*THIN), pin.SE3(np.eye(3), BOARD_AT).homogeneous)])
@@ -93,7 +95,7 @@ def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
 
 def test_what_could_not_be_repaired_is_named_with_bodies_and_state(model: RobotModel, pool: KinematicsPool) -> None:
     with pytest.raises(PlanningError) as caught:
-        PlanningPipeline(model, pool, PipelineSettings(seed=1), Stubborn()).plan(request(model))
+        PlanningPipeline(model, pool, PipelineSettings(seed=1), Stubborn(), make_adapters()).plan(request(model))
     assert caught.value.code == ErrorCode.INVALID_MOTION_PLAN
     for word in ("edge 1 of 1", "'board'", "mm deep", "shoulder_pan_joint"):
         assert word in caught.value.reason, caught.value.reason
@@ -108,18 +110,18 @@ def test_a_later_search_without_a_path_does_not_hide_what_the_first_one_failed_b
             return super().plan(problem)
 
     with pytest.raises(PlanningError, match="Once found no path.*a path was found before, but edge 1 of 1.*'board'"):
-        PlanningPipeline(model, pool, PipelineSettings(seed=1), Once()).plan(request(model))
+        PlanningPipeline(model, pool, PipelineSettings(seed=1), Once(), make_adapters()).plan(request(model))
 
 
 def test_the_planner_leaves_time_for_the_check_and_no_message_counts_from_a_later_begin(
         model: RobotModel, pool: KinematicsPool) -> None:
     planner = Coarse()
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(request(model, board=False))
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
     problem = planner.asked[0]
     assert problem.begun_s < problem.deadline_s < problem.end_s == pytest.approx(problem.begun_s + 60.0)
     assert problem.end_s - problem.deadline_s == pytest.approx(0.25)
     improving = Coarse()
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), improving).plan(
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), improving, make_adapters()).plan(
         replace(request(model, board=False), planner_id="BITstar"))
     assert improving.asked[0].end_s - improving.asked[0].deadline_s == pytest.approx(1.0), "it always uses all its time"
     late = replace(problem, begun_s=time.monotonic() - 60.0, deadline_s=time.monotonic() - 0.3)
@@ -137,7 +139,7 @@ def test_a_check_does_not_go_on_long_after_the_allowed_time() -> None:
         end_s=time.monotonic() - GRACE_S - 1.0, request=SimpleNamespace(allowed_time_s=2.0),
         motion=SimpleNamespace(colliding_state=lambda line, step: looked.append(step)))
     with pytest.raises(PlanningError, match="unchecked motion is not returned") as caught:
-        LastCheck().fault(problem, PlannedPath(motion.positions, motion))
+        TrajectoryValidator().fault(problem, PlannedPath(motion.positions, motion))
     assert caught.value.code == ErrorCode.TIMED_OUT and not looked
 
 
@@ -145,7 +147,7 @@ def test_a_check_does_not_go_on_long_after_the_allowed_time() -> None:
 def test_a_goal_a_hair_beyond_a_bound_ends_on_the_bound(model: RobotModel, pool: KinematicsPool, side: float) -> None:
     joint = model.group(GROUP).indices[-1]
     bound = float(model.upper[joint] if side > 0.0 else model.lower[joint])
-    pipeline = PlanningPipeline(model, pool, PipelineSettings(seed=1))
+    pipeline = PipelineSpec(settings=PipelineSettings(seed=1)).build(model, pool)
     for beyond in (5.0e-7, 9.0e-5):
         answer = pipeline.plan(request(model, (*START[:5], bound + side * beyond), board=False))
         assert answer.trajectory.positions[-1, 5] == bound
@@ -172,11 +174,11 @@ def test_industrial_motions_in_collision_are_invalid_motion_plans(model: RobotMo
 def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: KinematicsPool) -> None:
     planner = Coarse()
     asked = request(model)
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(asked)
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(asked)
     problem = planner.asked[0]
     way = OmplPlanner.repaired(problem, np.array([START, GOAL, START]))
     checker = CollisionChecker(asked.scene, problem.group.indices)
-    assert checker.path_is_free(problem.motion.whole_path(way), problem.settings.finest_step)
+    assert checker.path_is_free(problem.motion.full_path(way), problem.settings.finest_step)
     assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
     with pytest.raises(EdgeError, match="edge 1 of 2"):
         Stubborn.repaired(problem, np.array([START, GOAL, START]))
@@ -195,7 +197,7 @@ def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock
 
     monkeypatch.setattr(ConstrainedSearch, "_step_to", watched)
     planner = Coarse()
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner).plan(request(model, board=False))
+    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
     problem = planner.asked[0]
     tip = problem.group.tip_link
     frame = model.pin_model.frames[model.frame_ids[tip]]
@@ -226,7 +228,7 @@ def test_the_allowed_time_covers_building_the_world_and_what_was_built_is_kept(
     for number, mesh in enumerate(meshes):
         at = pin.SE3(np.eye(3), np.array([1.5, 0.3 * number, 1.0]))
         scene = scene.with_object(CollisionObject(f"ball{number}", at, ((mesh, pin.SE3.Identity()),)))
-    pipeline = PlanningPipeline(model, pool, PipelineSettings(seed=1))
+    pipeline = PipelineSpec(settings=PipelineSettings(seed=1)).build(model, pool)
     with pytest.raises(PlanningError, match="collision world of 3 objects was not built") as caught:
         pipeline.plan(replace(asked, scene=scene, allowed_time_s=1e-6))
     assert caught.value.code == ErrorCode.TIMED_OUT

@@ -12,7 +12,7 @@ import pytest
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
-from modular_framework_planning.planning_pipeline.last_check import LastCheck
+from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
 from modular_framework_planning.trajectory_processing.blended_path import BlendedPath
 from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S, parameterize
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -150,15 +150,15 @@ def checked_problem(colliding_state: Callable[[np.ndarray, float], np.ndarray | 
 
     return SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=Checker(), end_s=np.inf,
                            cancelled=lambda: False, group=SimpleNamespace(joints=("a",)), motion=SimpleNamespace(
-        colliding_state=colliding_state, whole=lambda values: values))
+        colliding_state=colliding_state, full_positions=lambda values: values))
 
 
-def test_last_check_looks_at_every_motion_once() -> None:
+def test_the_validator_looks_at_every_motion_once() -> None:
     looked: list[int] = []
     problem = checked_problem(lambda line, step: looked.append(len(line)))
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
     others = (motion, replace(motion, times=2.0 * motion.times), replace(motion, accelerations=motion.velocities))
-    check = LastCheck()
+    check = TrajectoryValidator()
     for number in (1, 2):
         for other in others:
             assert check.fault(problem, PlannedPath(other.positions, other)) == ""
@@ -171,7 +171,7 @@ def test_last_check_looks_at_every_motion_once() -> None:
     assert len(looked) > seen, "another world is another question"
 
 
-def test_last_check_sees_a_contact_a_twentieth_of_a_milliradian_long() -> None:
+def test_the_validator_sees_a_contact_a_twentieth_of_a_milliradian_long() -> None:
     def colliding_state(line: np.ndarray, step: float) -> np.ndarray | None:
         for start, end in zip(line[:-1], line[1:], strict=True):
             count = int(np.ceil(np.abs(end - start).max() / step))
@@ -183,7 +183,7 @@ def test_last_check_sees_a_contact_a_twentieth_of_a_milliradian_long() -> None:
 
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])
     problem = checked_problem(colliding_state)
-    fault = LastCheck().fault(problem, PlannedPath(motion.positions, motion))
+    fault = TrajectoryValidator().fault(problem, PlannedPath(motion.positions, motion))
     assert f"{problem.settings.finest_step} rad steps" in fault
     problem.motion.colliding_state = lambda line, step: None
-    assert LastCheck().fault(problem, PlannedPath(motion.positions, motion)) == ""
+    assert TrajectoryValidator().fault(problem, PlannedPath(motion.positions, motion)) == ""

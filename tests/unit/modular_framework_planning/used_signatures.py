@@ -19,11 +19,12 @@ from modular_framework_planning.kinematics.inverse_kinematics import KinematicsP
 from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import empty_map
-from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, mask_of
+from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, self_filter_of
 from modular_framework_planning.planners.ompl.planner import OmplPlanner
-from modular_framework_planning.planners.stomp import StompPlanner
+from modular_framework_planning.planners.stomp.planner import StompPlanner
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings, PlanningRequest, PoseGoal
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.plugins import make_adapters
 from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, empty_scene
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -59,12 +60,12 @@ def use(model: RobotModel) -> None:
     positions = model.merge(model.default_positions(), dict(zip(group.joints, START, strict=True)))
     scene = empty_scene(model, positions).with_octomap(Octree(voxels), pin.SE3.Identity())
     scene = scene.with_attached(held("held", group.tip_link))
-    mask_of(RegionCache(), bodies_in_scene(scene, positions), 1.0, 0.02).hides(far, np.zeros(3), 0.1)
+    self_filter_of(RegionCache(), bodies_in_scene(scene, positions), 1.0, 0.02).hides(far, np.zeros(3), 0.1)
     goal = model.link_transforms(model.merge(positions, {group.joints[0]: -0.9}))[group.tip_link]
     kinematics = KinematicsPool(model)
     settings = PipelineSettings(seed=1, parameters={"num_iterations": 5})
     for planner in (OmplPlanner(), StompPlanner.configure(model, settings)):
-        pipeline = PlanningPipeline(model, kinematics, settings, planner)
+        pipeline = PlanningPipeline(model, kinematics, settings, planner, make_adapters())
         pipeline.plan(PlanningRequest(scene, GROUP, (PoseGoal(group.tip_link, goal),), allowed_time_s=60.0))
     CollisionChecker(scene).contacts(positions)
 

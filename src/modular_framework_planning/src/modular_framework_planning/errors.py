@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from modular_framework_planning.collision_detection.exact_collision import Contact
+from modular_framework_planning.contacts import Contact
 
 
 class ErrorCode(IntEnum):

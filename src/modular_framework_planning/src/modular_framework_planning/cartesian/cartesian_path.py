@@ -82,7 +82,7 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
         touching = motion.colliding_state(np.vstack([before, after]), step)
         if touching is None:
             return ""
-        contacts = checker.contacts(motion.whole(touching), include_fixed=False)
+        contacts = checker.contacts(motion.full_positions(touching), include_fixed=False)
         return "; ".join(item.describe() for item in contacts[:4]) or "a collision"
 
     return objection

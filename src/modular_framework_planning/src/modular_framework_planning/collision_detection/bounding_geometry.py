@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the stand-ins of collision geometries that compiled checks work on.
+"""Makes the bounding geometries that compiled checks work on.
 
-Whatever Coal geometry a body has, it gets stand-ins: a surface of triangles, a solid in closed form, or both. A
-stand-in encloses the body; where it is larger, a hit with it is not final and the exact check is asked.
+Whatever Coal geometry a body has, it gets a surface of triangles, a solid in closed form, or both. Either
+encloses the body; where it is larger, a hit with it is not final and the exact check is asked.
 """
 from __future__ import annotations
 
@@ -40,20 +40,20 @@ _lock = threading.Lock()
 
 
 @dataclass(frozen=True, eq=False)
-class StandIn:
+class BoundingGeometry:
     """What a geometry is checked as, in its own frame.
 
     Attributes:
         corners: gives the corners of the surface's triangles, shape (m, 9) [m]; None for no surface.
-        swell: radius of a ball around every point of the surface that belongs to it [m].
-        surface_is_exact: whether the swollen surface is the geometry's own.
+        inflation_radius: radius of a ball around every point of the surface that belongs to it [m].
+        surface_is_exact: whether the inflated surface is the geometry's own.
         kind, size: closed form, SURFACE for none; solid_is_exact: whether it is the geometry's own.
         offset: pose of both in the geometry's frame.
         is_closed: whether the surface has an inside.
     """
 
     corners: Callable[[], Array] | None
-    swell: float = 0.0
+    inflation_radius: float = 0.0
     surface_is_exact: bool = True
     kind: int = SURFACE
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -80,11 +80,11 @@ class StandIn:
         return np.inf
 
 
-_of_shapes: WeakKeyDictionary[Shape, StandIn] = WeakKeyDictionary()
+_of_shapes: WeakKeyDictionary[Shape, BoundingGeometry] = WeakKeyDictionary()
 
 
-def stand_in(part: PlacedGeometry) -> StandIn:
-    """Returns the stand-in of a geometry; that of a shape is made once."""
+def bounding_geometry_of(part: PlacedGeometry) -> BoundingGeometry:
+    """Returns the bounding geometry of a body's geometry; that of a shape is made once."""
     with _lock:
         found = _of_shapes.get(part.source)
         if found is None:
@@ -92,47 +92,49 @@ def stand_in(part: PlacedGeometry) -> StandIn:
         return found
 
 
-def _make(source: Shape) -> StandIn:
+def _make(source: Shape) -> BoundingGeometry:
     if isinstance(source, Octree):
         points = np.tile(source.centers, 3)
-        return StandIn(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
+        return BoundingGeometry(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
     if isinstance(source, Mesh):
         vertices, faces = np.asarray(source.vertices, dtype=float), np.asarray(source.triangles, dtype=np.int64)
-        return StandIn(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
+        return BoundingGeometry(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
     geometry = source.geometry
     match geometry:
         case coal.Box():
             x, y, z = (float(value) for value in geometry.halfSide)
-            return StandIn(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
+            return BoundingGeometry(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
         case coal.Sphere():
-            return StandIn(lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
-                           size=(float(geometry.radius), 0.0, 0.0))
+            return BoundingGeometry(lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
+                                    size=(float(geometry.radius), 0.0, 0.0))
         case coal.Capsule():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
-                           kind=CAPSULE, size=(radius, half, 0.0))
+            return BoundingGeometry(lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
+                                    kind=CAPSULE, size=(radius, half, 0.0))
         case coal.Cylinder():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0))
+            return BoundingGeometry(lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER,
+                                    (radius, half, 0.0))
         case coal.Cone():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return StandIn(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
+            return BoundingGeometry(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE,
+                                    (radius, half, 0.0))
         case coal.Plane() | coal.Halfspace():
             normal = np.array(geometry.n, dtype=float)
             kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
-            return StandIn(None, kind=kind, size=(float(normal[0]), float(normal[1]), float(normal[2])),
-                           offset=pin.SE3(np.eye(3), normal * float(geometry.d)))
+            return BoundingGeometry(None, kind=kind, size=(float(normal[0]), float(normal[1]), float(normal[2])),
+                                    offset=pin.SE3(np.eye(3), normal * float(geometry.d)))
         case _:
             return _bounding_box(geometry)
 
 
-def _bounding_box(geometry: Any) -> StandIn:
+def _bounding_box(geometry: Any) -> BoundingGeometry:
     geometry.computeLocalAABB()
     low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
     x, y, z = (float(value) for value in 0.5 * (high - low))
     middle = 0.5 * (low + high)
-    return StandIn(lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
-                   pin.SE3(np.eye(3), middle))
+    return BoundingGeometry(lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
+                            pin.SE3(np.eye(3), middle))
 
 
 def _surface(triangles: Array) -> Surfaces:

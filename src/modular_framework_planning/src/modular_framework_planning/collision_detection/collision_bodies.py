@@ -9,23 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modular_framework_planning.contacts import ATTACHED, LINK, WORLD, Body
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-LINK, ATTACHED, WORLD = "robot_link", "robot_attached", "world_object"
 Joints = Sequence[int] | NDArray[np.int64] | None
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """What one collision geometry belongs to."""
-
-    name: str
-    kind: str
-    link: str = ""
-    touch_links: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +63,7 @@ def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
         for shape, pose in held.body.shapes:
             placement = frame.placement * held.body.pose * pose
             result.append(PlacedGeometry(body, frame.parentJoint, placement, shape,
-                                         scene.held_margin()))
+                                         scene.attached_padding()))
     for thing in scene.obstacles():
         for shape, pose in thing.shapes:
             result.append(PlacedGeometry(Body(thing.name, WORLD), 0, thing.pose * pose, shape, 0.0))
@@ -86,7 +76,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
     Args:
         scene: whose allowed collisions count.
         parts: geometries of the scene.
-        moving: joints that will move, as places in a position vector; all by default.
+        moving: joints that will move, as indices in a position vector; all by default.
     """
     supports = _supports(scene.model, moving)
     verdicts: dict[tuple[str, str, str, str], bool] = {}

@@ -12,10 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.collision_bodies import (
-    ATTACHED,
-    LINK,
-    WORLD,
-    Body,
     Joints,
     PlacedGeometry,
     WatchedPair,
@@ -23,7 +19,7 @@ from modular_framework_planning.collision_detection.collision_bodies import (
     watched_pairs,
 )
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
-from modular_framework_planning.collision_detection.exact_collision import Contact, ExactCollision
+from modular_framework_planning.collision_detection.exact_collision import ExactCollision
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
 from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
@@ -31,11 +27,11 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
     check_polyline,
     sample_at,
 )
+from modular_framework_planning.contacts import Body, Contact
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-__all__ = ["ATTACHED", "LINK", "WORLD", "Body", "CollisionChecker", "Contact"]
 DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may look through numerical noise
 EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can tell about
 
@@ -52,7 +48,7 @@ class CollisionChecker:
 
         Args:
             scene: the snapshot to check in.
-            moving: joints that will move, as places in a position vector; all by default.
+            moving: joints that will move, as indices in a position vector; all by default.
             tolerated: contacts of held bodies that may stay but not deepen.
         """
         self.scene = scene
@@ -88,7 +84,7 @@ class CollisionChecker:
 
     @property
     def world(self) -> World:
-        """The compiled stand-ins of all bodies, and the pairs the moving joints can bring together."""
+        """The bounding geometries of all bodies as arrays, and the pairs the moving joints can bring together."""
         return self._compiled.world
 
     @property

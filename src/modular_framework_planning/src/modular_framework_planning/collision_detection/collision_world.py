@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.bounding_geometry import StandIn, moved, stacked, stand_in
-from modular_framework_planning.collision_detection.collision_bodies import (
-    LINK,
-    WORLD,
-    Body,
-    PlacedGeometry,
-    WatchedPair,
+from modular_framework_planning.collision_detection.bounding_geometry import (
+    BoundingGeometry,
+    bounding_geometry_of,
+    moved,
+    stacked,
 )
+from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     CELLS,
     UNKNOWN,
@@ -26,6 +25,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     arguments,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
+from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import tree_of
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -41,7 +41,7 @@ class CompiledWorld:
     Attributes:
         arguments: the world as compiled functions take it.
         members: for every pair of the arrays, the watched pairs (by number) it stands for.
-        uncompiled: watched pairs that have no stand-in and need the exact check at every state.
+        uncompiled: watched pairs that have no bounding geometry and need the exact check at every state.
     """
 
     world: World
@@ -52,25 +52,26 @@ class CompiledWorld:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Member:
-    """One body of the arrays: the stand-in, where it hangs, and where its surface begins."""
+    """One body of the arrays: its bounding geometry, where it hangs, and where its surface begins."""
 
-    shape: StandIn
+    shape: BoundingGeometry
     joint: int
     pose: Array
     root: int
-    scenic: bool
+    is_environment: bool
     sphere: Array
 
 
 @lru_cache(maxsize=KEPT_MODELS)
-def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
-    """Stand-ins of all link geometries; surfaces without a closed form are moved into their joints' frames."""
+def _link_bounding_geometries(model: RobotModel) -> tuple[BoundingGeometry, ...]:
+    """Bounding geometries of all links' shapes; surfaces without a closed form are moved into their joints' frames."""
     result = []
     for item in model.link_geometries:
         part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.shape, 0.0)
-        shape = stand_in(part)
+        shape = bounding_geometry_of(part)
         if shape.kind == SURFACE and shape.corners is not None:
-            shape = StandIn(partial(moved, shape.corners(), item.placement * shape.offset), is_closed=shape.is_closed)
+            shape = BoundingGeometry(partial(moved, shape.corners(), item.placement * shape.offset),
+                                     is_closed=shape.is_closed)
         result.append(shape)
     return tuple(result)
 
@@ -78,7 +79,7 @@ def _link_stand_ins(model: RobotModel) -> tuple[StandIn, ...]:
 @lru_cache(maxsize=KEPT_GROUPINGS)
 def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple[int, ...]]:
     """Surfaces of groups of links that share a joint, and the root of each group."""
-    shapes = _link_stand_ins(model)
+    shapes = _link_bounding_geometries(model)
     flat = [shapes[number].surface for group in groups for number in group]
     surfaces, roots = stacked([item for item in flat if item is not None])
     spheres, boxes, links = list(surfaces.spheres), list(surfaces.boxes), list(surfaces.links)
@@ -116,7 +117,7 @@ def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[
         partners.setdefault(pair.first, set()).add((pair.second, pair.margin))
         partners.setdefault(pair.second, set()).add((pair.first, pair.margin))
     groups: dict[tuple[object, ...], list[int]] = {}
-    for number, shape in enumerate(_link_stand_ins(model)):
+    for number, shape in enumerate(_link_bounding_geometries(model)):
         if shape.kind == SURFACE and shape.corners is not None and number in partners:
             groups.setdefault((parts[number].joint_id, frozenset(partners[number])), []).append(number)
     return tuple(tuple(group) for group in groups.values())
@@ -153,8 +154,8 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
         else:
             found.setdefault((*ordered, pair.margin), []).append(number)
     world = _arrays(model, members, robot, scene, list(found))
-    scenic: list[bool] = np.any(world.scenic[world.pairs], axis=1).tolist()
-    keys = tuple(None if scenic[number] else _table_key(world, number) for number in range(len(found)))
+    is_environment: list[bool] = np.any(world.is_environment[world.pairs], axis=1).tolist()
+    keys = tuple(None if is_environment[number] else _table_key(world, number) for number in range(len(found)))
     chosen = tuple(key for key in keys if key is not None)
     tables, joints = _tables(model, groups, chosen)
     numbers = iter(range(len(chosen)))
@@ -167,9 +168,9 @@ def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Gr
                   roots: Sequence[int]) -> tuple[list[_Member], dict[int, int]]:
     members, place = [], {}
     for group, root in zip(groups, roots, strict=True):
-        shapes = [_link_stand_ins(model)[number] for number in group]
+        shapes = [_link_bounding_geometries(model)[number] for number in group]
         closed = all(shape.is_closed for shape in shapes)
-        shape = StandIn(None, is_closed=closed)
+        shape = BoundingGeometry(None, is_closed=closed)
         members.append(_Member(shape, parts[group[0]].joint_id - 1, np.eye(4)[:3], root, False, robot.spheres[root]))
         place.update(dict.fromkeys(group, len(members) - 1))
     return members, place
@@ -178,12 +179,12 @@ def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Gr
 def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
                 members: list[_Member], place: dict[int, int], go_on: Callable[[], None]) -> Surfaces:
     """Appends links in closed form, held objects and the world; returns the surfaces they need."""
-    links = _link_stand_ins(model)
+    links = _link_bounding_geometries(model)
     watched = {number for pair in pairs for number in (pair.first, pair.second)}
     others = [number for number in sorted(watched) if number not in place]
     shapes = []
     for number in others:
-        shapes.append(links[number] if number < len(links) else stand_in(parts[number]))
+        shapes.append(links[number] if number < len(links) else bounding_geometry_of(parts[number]))
         go_on()
     wanted = _with_surface(dict(zip(others, shapes, strict=True)), parts, pairs)
     found = []
@@ -196,7 +197,7 @@ def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seque
     for number, shape in zip(others, shapes, strict=True):
         root = next(remaining) if number in wanted and shape.corners is not None else -1
         sphere = np.array([0.0, 0.0, 0.0, shape.radius]) if root < 0 else (
-            surfaces.spheres[root] + [0, 0, 0, shape.swell])
+            surfaces.spheres[root] + [0, 0, 0, shape.inflation_radius])
         pose = (parts[number].placement * shape.offset).homogeneous[:3]
         place[number] = len(members)
         members.append(_Member(shape, parts[number].joint_id - 1, pose, root, True, sphere))
@@ -204,13 +205,13 @@ def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seque
 
 
 @lru_cache(maxsize=KEPT_SCENES)
-def _scene_surfaces(shapes: tuple[StandIn, ...]) -> tuple[Surfaces, tuple[int, ...]]:
+def _scene_surfaces(shapes: tuple[BoundingGeometry, ...]) -> tuple[Surfaces, tuple[int, ...]]:
     """Surfaces of a scene in one set of arrays; the next plan mostly has the same ones."""
     together, roots = stacked([shape.surface for shape in shapes if shape.surface is not None])
     return together, tuple(roots)
 
 
-def _with_surface(shapes: Mapping[int, StandIn], parts: Sequence[PlacedGeometry],
+def _with_surface(shapes: Mapping[int, BoundingGeometry], parts: Sequence[PlacedGeometry],
                   pairs: Sequence[WatchedPair]) -> set[int]:
     """Returns which bodies are checked by their surface.
 
@@ -266,21 +267,22 @@ def _tables(model: RobotModel, groups: Grouping,
 
 def _arrays(model: RobotModel, members: Sequence[_Member], robot: Surfaces, scene: Surfaces,
             pairs: Sequence[tuple[int, int, float]]) -> World:
-    swell = [members[one].shape.swell + (members[two].shape.swell if members[two].shape.kind == SURFACE else 0.0)
-             for one, two, _ in pairs]
+    inflation = [members[one].shape.inflation_radius
+                 + (members[two].shape.inflation_radius if members[two].shape.kind == SURFACE else 0.0)
+                 for one, two, _ in pairs]
     return World(
         tree=tree_of(model),
         joints=np.array([item.joint for item in members], dtype=np.int64),
         poses=np.array([item.pose for item in members], dtype=float).reshape(-1, 3, 4),
         roots=np.array([item.root for item in members], dtype=np.int64),
-        scenic=np.array([item.scenic for item in members], dtype=bool),
+        is_environment=np.array([item.is_environment for item in members], dtype=bool),
         kinds=np.array([item.shape.kind for item in members], dtype=np.int64),
         sizes=np.array([item.shape.size for item in members], dtype=float).reshape(-1, 3),
         spheres=np.array([item.sphere for item in members], dtype=float).reshape(-1, 4),
         closed=np.array([item.shape.is_closed for item in members], dtype=bool),
         robot=robot, scene=scene,
         pairs=np.array([item[:2] for item in pairs], dtype=np.int64).reshape(-1, 2),
-        margins=np.array([item[2] for item in pairs], dtype=float) + np.array(swell, dtype=float),
+        margins=np.array([item[2] for item in pairs], dtype=float) + np.array(inflation, dtype=float),
         exact=np.array([_is_exact(members, one, two) for one, two, _ in pairs], dtype=bool),
         tables=np.zeros((0, CELLS, CELLS), dtype=np.int8), table_joints=np.zeros((0, 2), dtype=np.int64),
         table_of=np.full(len(pairs), -1, dtype=np.int64))

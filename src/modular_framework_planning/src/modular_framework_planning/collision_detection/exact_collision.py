@@ -3,49 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from modular_framework_planning.collision_detection.collision_bodies import (
-    ATTACHED,
-    LINK,
-    Body,
-    PlacedGeometry,
-    WatchedPair,
-)
+from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
+from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 ROUNDING = 1.0e-9  # [m]
 MOST_CONTACTS = 20  # of a pair, among which the deepest is told
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """Two bodies that touch; position [m] and normal (from first to second) in the planning frame, depth [m].
-
-    Where a distance has to be kept, touching means being closer, and the depth is what is missing.
-    """
-
-    first: Body
-    second: Body
-    depth: float
-    position: Array
-    normal: Array
-
-    def describe(self) -> str:
-        """Says which body touches which and how deep."""
-        return f"{_label(self.first)} touches {_label(self.second)}, {self.depth * 1000.0:.1f} mm deep"
-
-
-def _label(body: Body) -> str:
-    if body.kind == LINK:
-        return f"link '{body.name}'"
-    return f"object '{body.name}'" + (f" held by '{body.link}'" if body.kind == ATTACHED else "")
 
 
 class ExactCollision:

@@ -13,7 +13,7 @@ class MotionChecker:
     """Answers for joint vectors of one group while the rest of the robot stays at given positions."""
 
     def __init__(self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array) -> None:
-        """Args: the checker to ask; places of the group's joints; positions of the whole robot for all others."""
+        """Args: the checker to ask; indices of the group's joints; positions of the whole robot for all others."""
         self._checker = checker
         self._indices = indices
         self._rest = np.array(rest, dtype=float)
@@ -22,7 +22,7 @@ class MotionChecker:
         members = {int(number) for number in indices}
         self._members = members if any(leader in members for _, leader, _, _ in model.mimics) else set()
 
-    def whole(self, values: Array) -> Array:
+    def full_positions(self, values: Array) -> Array:
         """Returns positions of the whole robot for a joint vector of the group."""
         result = self._rest.copy()
         result[self._indices] = values
@@ -31,7 +31,7 @@ class MotionChecker:
     def state_is_free(self, values: Array) -> bool:
         """Whether the state is free of collisions."""
         if self._members:
-            return self._checker.is_free(self.whole(values))
+            return self._checker.is_free(self.full_positions(values))
         self._state[0, self._indices] = values
         return self._checker.path_is_free(self._state, 1.0)
 
@@ -41,20 +41,20 @@ class MotionChecker:
         The start itself is not looked at, the end is.
         """
         if self._members:
-            return self._checker.path_is_free(self.whole_path(np.array([start, end])), step, 1)
+            return self._checker.path_is_free(self.full_path(np.array([start, end])), step, 1)
         edge = self._edge
         edge[0, self._indices], edge[1, self._indices] = start, end
         return self._checker.path_is_free(edge, step, 1)
 
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding sample along straight pieces (start included), or None."""
-        found = self._checker.colliding_state(self.whole_path(polyline), step)
+        found = self._checker.colliding_state(self.full_path(polyline), step)
         return None if found is None else found[self._indices]
 
-    def whole_path(self, path: Array) -> Array:
+    def full_path(self, path: Array) -> Array:
         """Returns positions of the whole robot for joint vectors of the group, shape (n, joints)."""
         if self._members:
-            return np.array([self.whole(values) for values in path])
+            return np.array([self.full_positions(values) for values in path])
         result = np.empty((len(path), len(self._rest)))
         result[:] = self._rest
         result[:, self._indices] = path

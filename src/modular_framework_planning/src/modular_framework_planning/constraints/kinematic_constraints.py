@@ -113,7 +113,7 @@ class KinematicConstraints:
 
         Args:
             positions: where to begin.
-            indices: the joints that may move, as places in a position vector; mimic joints follow theirs.
+            indices: the joints that may move, as indices in a position vector; mimic joints follow theirs.
             steps: how many steps to try.
 
         Returns:

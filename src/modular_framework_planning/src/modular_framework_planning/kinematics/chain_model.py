@@ -62,7 +62,7 @@ class ChainModel:
         """Args: the robot, the group whose joints move the chain, the link at its end."""
         frame = model.pin_model.frames[model.frame_ids[last_link]]
         path = [int(number) for number in model.pin_model.supports[frame.parentJoint] if number > 0]
-        self.positions = np.array([number - 1 for number in path], dtype=np.int64)  # places in a position vector
+        self.positions = np.array([number - 1 for number in path], dtype=np.int64)  # indices in a position vector
         column = {int(number): place for place, number in enumerate(group.indices)}
         followers = {follower: (leader, gain, offset) for follower, leader, gain, offset in model.mimics}
         drivers, gains, offsets = [], [], []

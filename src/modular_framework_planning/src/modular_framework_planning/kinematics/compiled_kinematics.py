@@ -130,7 +130,7 @@ def rotation_vector(first: Array, second: Array, out: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, positions: Array,
-               places: Array) -> float:
+               poses: Array) -> float:
     """Compares the tip with a target.
 
     Args:
@@ -139,7 +139,7 @@ def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, erro
         jacobian: filled; how the values move the tip, linear above angular, shape (6, group).
         error: filled; what is missing to the target, linear [m] above angular [rad], shape (6,).
         positions: working memory, shape (joints,).
-        places: working memory, shape (joints + 1, 3, 4); the last one is the tip's pose.
+        poses: working memory, shape (joints + 1, 3, 4); the last one is the tip's pose.
 
     Returns:
         The length of the error.
@@ -150,11 +150,11 @@ def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, erro
         positions[number] = chain.offsets[number]
         if driver >= 0:
             positions[number] += chain.gains[number] * values[driver]
-    joint_placements(chain.tree, positions, places)
+    joint_placements(chain.tree, positions, poses)
     end = chain.tip
     for column in range(4):
-        _place(places, count - 1, end[0, column], end[1, column], end[2, column], column, places, count)
-    tip = places[count]
+        _place(poses, count - 1, end[0, column], end[1, column], end[2, column], column, poses, count)
+    tip = poses[count]
     for row in range(3):
         error[row] = target[row, 3] - tip[row, 3]
     rotation_vector(tip, target, error[3:])
@@ -164,17 +164,17 @@ def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, erro
         if driver < 0:
             continue
         u, v, w = chain.tree.axes[number, 0], chain.tree.axes[number, 1], chain.tree.axes[number, 2]
-        x = places[number, 0, 0] * u + places[number, 0, 1] * v + places[number, 0, 2] * w
-        y = places[number, 1, 0] * u + places[number, 1, 1] * v + places[number, 1, 2] * w
-        z = places[number, 2, 0] * u + places[number, 2, 1] * v + places[number, 2, 2] * w
+        x = poses[number, 0, 0] * u + poses[number, 0, 1] * v + poses[number, 0, 2] * w
+        y = poses[number, 1, 0] * u + poses[number, 1, 1] * v + poses[number, 1, 2] * w
+        z = poses[number, 2, 0] * u + poses[number, 2, 1] * v + poses[number, 2, 2] * w
         if chain.tree.prismatic[number]:
             jacobian[0, driver] += gain * x
             jacobian[1, driver] += gain * y
             jacobian[2, driver] += gain * z
         else:
-            a = places[count, 0, 3] - places[number, 0, 3]
-            b = places[count, 1, 3] - places[number, 1, 3]
-            c = places[count, 2, 3] - places[number, 2, 3]
+            a = poses[count, 0, 3] - poses[number, 0, 3]
+            b = poses[count, 1, 3] - poses[number, 1, 3]
+            c = poses[count, 2, 3] - poses[number, 2, 3]
             jacobian[0, driver] += gain * (y * c - z * b)
             jacobian[1, driver] += gain * (z * a - x * c)
             jacobian[2, driver] += gain * (x * b - y * a)
@@ -230,10 +230,10 @@ def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Ar
     """
     width = len(values)
     jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
-    positions, places = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
+    positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
     step, solved, free = np.empty(width), np.empty(POSE_SIZE), np.empty(width, dtype=np.bool_)
     for _ in range(steps):
-        size = pose_error(chain, values, target, jacobian, error, positions, places)
+        size = pose_error(chain, values, target, jacobian, error, positions, poses)
         if size < tolerance:
             return True
         damping = min(1.0e-3, 0.1 * size * size) + 1.0e-14
@@ -256,7 +256,7 @@ def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Ar
         for joint in range(width):
             if free[joint]:
                 values[joint] = min(max(values[joint] + share * step[joint], lower[joint]), upper[joint])
-    return bool(pose_error(chain, values, target, jacobian, error, positions, places) < tolerance)
+    return bool(pose_error(chain, values, target, jacobian, error, positions, poses) < tolerance)
 
 
 @njit(cache=True, nogil=True)
@@ -271,9 +271,9 @@ def polish(chain: Chain, candidates: Array, target: Array, lower: Array, upper: 
     count, width = candidates.shape
     arrived = np.zeros(count, dtype=np.bool_)
     jacobian, error = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE)
-    positions, places = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
+    positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
     for number in range(count):
-        size = pose_error(chain, candidates[number], target, jacobian, error, positions, places)
+        size = pose_error(chain, candidates[number], target, jacobian, error, positions, poses)
         if size < furthest:
             arrived[number] = size < tolerance or converge(chain, candidates[number], target, lower, upper, tolerance,
                                                            steps)
@@ -300,10 +300,10 @@ def approach_seed(chain: Chain, values: Array, seed: Array, target: Array, lower
     """Moves a solution of a redundant chain nearer to the seed while the tip stays; changes `values` in place."""
     width = len(values)
     jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
-    positions, places = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
+    positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
     back, solved, free = np.empty(width), np.empty(POSE_SIZE), np.ones(width, dtype=np.bool_)
     for _ in range(steps):
-        pose_error(chain, values, target, jacobian, error, positions, places)
+        pose_error(chain, values, target, jacobian, error, positions, poses)
         wish = seed - values
         for row in range(POSE_SIZE):
             error[row] = 0.0

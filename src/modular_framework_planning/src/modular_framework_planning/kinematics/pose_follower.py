@@ -65,7 +65,7 @@ class PoseFollower:
         self._frame = self.model.frame_ids[link]
         self._data = self.model.pin_model.createData()
 
-    def whole(self, values: Array) -> Array:
+    def full_positions(self, values: Array) -> Array:
         """Returns positions of the whole robot for joint values of the group."""
         positions = self._rest.copy()
         positions[self.group.indices] = values
@@ -73,7 +73,7 @@ class PoseFollower:
 
     def pose(self, values: Array) -> Transform:
         """Returns the link's pose in the planning frame."""
-        pin.framesForwardKinematics(self.model.pin_model, self._data, self.whole(values))
+        pin.framesForwardKinematics(self.model.pin_model, self._data, self.full_positions(values))
         return self._data.oMf[self._frame].copy()
 
     def _jacobian(self, positions: Array, frame: Any) -> Array:
@@ -110,7 +110,7 @@ class PoseFollower:
             number = int(jump.argmax())
             raise self._refusal(f"joint '{self.group.joints[number]}' would jump from {guess[number]:.3f} to "
                                 f"{values[number]:.3f}, because the arm is near a singular posture")
-        problems = self.model.bound_violations(self.whole(values), self.group.indices, BOUND_TOLERANCE)
+        problems = self.model.bound_violations(self.full_positions(values), self.group.indices, BOUND_TOLERANCE)
         if problems:
             raise self._refusal("; ".join(problems))
         return np.clip(values, self.model.lower[self.group.indices], self.model.upper[self.group.indices])
@@ -122,7 +122,7 @@ class PoseFollower:
         """Solves from the guess by damped least squares; None where it does not converge."""
         values, size = guess, np.inf
         for _ in range(NEWTON_STEPS):
-            jacobian = self._jacobian(self.whole(values), pin.ReferenceFrame.LOCAL)
+            jacobian = self._jacobian(self.full_positions(values), pin.ReferenceFrame.LOCAL)
             error = pin.log6(self._data.oMf[self._frame].actInv(target)).vector
             size = float(np.linalg.norm(error))
             if size < POSE_TOLERANCE:
@@ -134,7 +134,8 @@ class PoseFollower:
         return values if size < ACCEPTED_ERROR else None
 
     def _nearest_solution(self, guess: Array, target: Transform) -> Array:
-        seed = self.whole(np.clip(guess, self.model.lower[self.group.indices], self.model.upper[self.group.indices]))
+        indices = self.group.indices
+        seed = self.full_positions(np.clip(guess, self.model.lower[indices], self.model.upper[indices]))
         found = self._solver.solutions(self.link, target, seed)
         if not found:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, self._solver.explain_unreachable(self.link, target, seed))
@@ -149,17 +150,17 @@ class PoseFollower:
             motion: of the link.
             wanted: velocities and accelerations a redundant arm keeps nearest to; rest by default.
         """
-        model, data, positions = self.model.pin_model, self._data, self.whole(values)
+        model, data, positions = self.model.pin_model, self._data, self.full_positions(values)
         world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobian = self._jacobian(positions, world)
         inverse = np.linalg.pinv(jacobian)
         rest = np.zeros(len(values))
         speeds, changes = wanted if wanted is not None and self.is_redundant else (rest, rest)
         velocities = speeds + inverse @ (motion.velocity - jacobian @ speeds)
-        whole = np.zeros(model.nv)
-        whole[self.group.indices] = velocities
+        rates = np.zeros(model.nv)
+        rates[self.group.indices] = velocities
         for follower, leader, multiplier in self._followers:
-            whole[follower] = multiplier * velocities[leader]
-        pin.forwardKinematics(model, data, positions, whole, np.zeros(model.nv))
+            rates[follower] = multiplier * velocities[leader]
+        pin.forwardKinematics(model, data, positions, rates, np.zeros(model.nv))
         drift: Any = pin.getFrameClassicalAcceleration(model, data, self._frame, world)
         return velocities, changes + inverse @ (motion.acceleration - drift.vector - jacobian @ changes)

@@ -7,13 +7,12 @@ from typing import Any
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Pose, PoseStamped
 from moveit_msgs.msg import RobotState, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_planning.collision_detection.collision_checker import ATTACHED, LINK, WORLD
+from modular_framework_planning.contacts import ATTACHED, LINK, WORLD
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
-from modular_framework_planning.geometry.spatial import Array, Transform, make_transform, pose_of
+from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
 from modular_framework_planning.messages.scene_conversions import apply_attached_object, attached_to_message
 from modular_framework_planning.planning_interface.planning_request import ConstraintGoal, JointGoal, PoseGoal
@@ -22,26 +21,6 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 BODY_TYPES = {LINK: 0, WORLD: 1, ATTACHED: 2}
-
-
-def transform_from_pose(pose: Pose, where: str) -> Transform:
-    """Reads a pose; raises GeometryError."""
-    p, q = pose.position, pose.orientation
-    return make_transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), where)
-
-
-def pose_message(transform: Transform) -> Pose:
-    """Writes a pose."""
-    position, quaternion = pose_of(transform)
-    pose = Pose()
-    pose.position.x, pose.position.y, pose.position.z = (float(v) for v in position)
-    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = (float(v) for v in quaternion)
-    return pose
-
-
-def stamped_in_scene(scene: PlanningScene, stamped: PoseStamped, where: str) -> Transform:
-    """Returns a stamped pose in the planning frame; raises PlanningError for an unknown frame or bad numbers."""
-    return scene.frame_transform(stamped.header.frame_id) * transform_from_pose(stamped.pose, where)
 
 
 def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[float], where: str) -> dict[str, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Transform
-from modular_framework_planning.messages.conversions import stamped_in_scene
+from modular_framework_planning.messages.poses import stamped_in_scene
 from modular_framework_planning.pick_place.manipulation import Manoeuvre, SceneChange, Translation, allowing
 from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, PlanningScene
 from modular_framework_urdf.mimics import Mimic, with_leaders

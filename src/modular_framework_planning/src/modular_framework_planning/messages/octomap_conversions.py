@@ -7,7 +7,7 @@ import pinocchio as pin
 from octomap_msgs.msg import OctomapWithPose
 
 from modular_framework_planning.errors import GeometryError
-from modular_framework_planning.messages.conversions import pose_message, transform_from_pose
+from modular_framework_planning.messages.poses import pose_message, transform_from_pose
 from modular_framework_planning.octomap.encoding import TREE_TYPE, read_stream, write_full
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap

@@ -16,6 +16,7 @@ from shape_msgs.msg import Plane as PlaneMessage
 from modular_framework_planning.errors import ErrorCode, GeometryError, UnknownNameError
 from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Transform, make_transform, quaternion_or_identity
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.planning_scene import planning_scene as core
 from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
 from modular_framework_planning.planning_scene.planning_scene import OCTOMAP_ID, PlanningScene
@@ -196,8 +197,6 @@ def fixed_frames_from(scene: PlanningScene, transforms: Sequence[Any]) -> dict[s
 def object_to_message(scene: PlanningScene, body: core.CollisionObject, frame: str,
                       with_geometry: bool = True) -> CollisionObject:
     """Writes an object whose pose is given in `frame`."""
-    from modular_framework_planning.messages.conversions import pose_message
-
     message = CollisionObject(id=body.name, operation=CollisionObject.ADD)
     message.header.frame_id = frame
     message.pose = pose_message(body.pose)
@@ -255,8 +254,6 @@ def colors_to_message(scene: PlanningScene) -> list[ObjectColor]:
 
 def frames_to_message(scene: PlanningScene) -> list[TransformStamped]:
     """Writes the fixed frames."""
-    from modular_framework_planning.messages.conversions import pose_message
-
     result = []
     for name, transform in {scene.model.planning_frame: pin.SE3.Identity(), **scene.fixed_frames}.items():
         item = TransformStamped(child_frame_id=name)

@@ -6,8 +6,9 @@ import numpy as np
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject
 from moveit_msgs.msg import PlanningScene as SceneMessage
 
-from modular_framework_planning.messages.conversions import pose_message, state_message
+from modular_framework_planning.messages.conversions import state_message
 from modular_framework_planning.messages.octomap_conversions import octomap_message
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.messages.scene_conversions import (
     attached_to_message,
     colors_to_message,

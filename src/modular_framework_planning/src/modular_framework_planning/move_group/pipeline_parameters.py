@@ -17,8 +17,9 @@ from modular_framework_planning.planning_interface.planning_request import (
     PlanningRequest,
     SamplingSettings,
 )
-from modular_framework_planning.planning_pipeline.pipeline import DEFAULT_PLANNER, PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_parts import DEFAULT_ADAPTERS, PipelineSpec
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
+from modular_framework_planning.planning_pipeline.plugins import DEFAULT_ADAPTERS, DEFAULT_PLANNER
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
 

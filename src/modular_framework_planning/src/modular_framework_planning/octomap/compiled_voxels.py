@@ -19,12 +19,12 @@ HASH_FACTOR = 0x9E3779B97F4A7C15 - (1 << 64)  # 2**64 / golden ratio, as a signe
 def _insert(table: Keys, key: int) -> bool:
     """Puts a key into an open-addressed table; returns whether it is new."""
     mask = len(table) - 1
-    place = ((key * HASH_FACTOR) >> 20) & mask
-    while table[place] != EMPTY:
-        if table[place] == key:
+    slot = ((key * HASH_FACTOR) >> 20) & mask
+    while table[slot] != EMPTY:
+        if table[slot] == key:
             return False
-        place = (place + 1) & mask
-    table[place] = key
+        slot = (slot + 1) & mask
+    table[slot] = key
     return True
 
 

@@ -6,7 +6,7 @@ so it holds at least what the padded shape holds; a mesh is covered by its conve
 """
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,7 +52,7 @@ class Region:
 
 
 @dataclass(frozen=True, slots=True)
-class SightMask:
+class SelfFilter:
     """Regions at their places in one frame, padded and scaled.
 
     Attributes:
@@ -88,6 +88,9 @@ class RegionCache:
         """Forgets geometries that are no longer in use."""
         wanted = {id(item) for item in geometries}
         self._regions = {key: value for key, value in list(self._regions.items()) if key in wanted}
+
+
+FilterMaker = Callable[[RegionCache, Sequence[tuple[Any, Transform]], Array], SelfFilter]
 
 
 def _region_of(geometry: Any) -> Region:
@@ -151,14 +154,15 @@ def bodies_in_scene(scene: PlanningScene, positions: Array) -> list[tuple[Any, T
                      if not isinstance(shape, Plane | Octree)]
 
 
-def mask_of(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], scale: float, padding: float) -> SightMask:
-    """Returns the mask of bodies whose shapes are scaled about their centre and padded [m]."""
+def self_filter_of(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], scale: float,
+                   padding: float) -> SelfFilter:
+    """Returns the filter of bodies whose shapes are scaled about their centre and padded [m]."""
     return _assembled([(cache.region(geometry), pose, scale, padding) for geometry, pose in bodies])
 
 
-def depth_mask_of(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], origin: Array, scale: float,
-                  padding: float) -> SightMask:
-    """Returns the mask for a depth camera at `origin`: padding plus `scale` times the camera's noise at the body."""
+def depth_self_filter(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], origin: Array, scale: float,
+                      padding: float) -> SelfFilter:
+    """Returns the filter for a depth camera at `origin`: padding plus `scale` times the camera's noise at the body."""
     items = []
     for geometry, pose in bodies:
         region = cache.region(geometry)
@@ -167,7 +171,7 @@ def depth_mask_of(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], o
     return _assembled(items)
 
 
-def _assembled(items: Sequence[tuple[Region, Transform, float, float]]) -> SightMask:
+def _assembled(items: Sequence[tuple[Region, Transform, float, float]]) -> SelfFilter:
     balls, planes, counts = [], [], [0]
     for region, pose, scale, padding in items:
         normals = region.planes[:, :3] @ pose.rotation.T
@@ -176,4 +180,4 @@ def _assembled(items: Sequence[tuple[Region, Transform, float, float]]) -> Sight
         balls.append([*center, scale * region.radius + padding])
         planes.append(np.column_stack([normals, heights - normals @ center]))
         counts.append(len(normals))
-    return SightMask(np.array(balls).reshape(-1, 4), np.vstack([np.empty((0, 4)), *planes]), np.cumsum(counts))
+    return SelfFilter(np.array(balls).reshape(-1, 4), np.vstack([np.empty((0, 4)), *planes]), np.cumsum(counts))

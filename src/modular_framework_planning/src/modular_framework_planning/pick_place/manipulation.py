@@ -19,10 +19,10 @@ from modular_framework_planning.cartesian.cartesian_path import (
     collision_objection,
     straight_line,
 )
-from modular_framework_planning.collision_detection.collision_checker import ATTACHED, WORLD, CollisionChecker
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.contacts import ATTACHED, WORLD, describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
@@ -188,9 +188,9 @@ class ManoeuvrePlanner:
         touches = collision_objection(checker, motion, CHECK_STEP)
 
         def objection(before: Array, after: Array) -> str:
-            whole = motion.whole(after)
-            if self._constraints is not None and not self._constraints.satisfied(whole):
-                return f"path constraints: {self._constraints.describe(whole)}"
+            full = motion.full_positions(after)
+            if self._constraints is not None and not self._constraints.satisfied(full):
+                return f"path constraints: {self._constraints.describe(full)}"
             return touches(before, after)
 
         return objection

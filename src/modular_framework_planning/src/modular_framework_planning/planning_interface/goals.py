@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
 from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
@@ -88,16 +88,16 @@ class GoalResolver:
     def _is_good(self, values: Array) -> bool:
         """Whether a state satisfies the path constraints and is free."""
         constraints = self._path_constraints
-        return (constraints is None or constraints.satisfied(self._motion.whole(values))) and (
+        return (constraints is None or constraints.satisfied(self._motion.full_positions(values))) and (
             self._motion.state_is_free(values))
 
     def _why_not(self, values: Array, what: str) -> PlanningError:
         """Says what is wrong with the best candidate of a goal."""
-        whole, constraints = self._motion.whole(values), self._path_constraints
-        if constraints is not None and not constraints.satisfied(whole):
+        full, constraints = self._motion.full_positions(values), self._path_constraints
+        if constraints is not None and not constraints.satisfied(full):
             return PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, f"{what} violates the path constraints: "
-                                 f"{constraints.describe(whole)}; move the goal or widen the tolerances")
-        contacts = self._checker.contacts(whole, include_fixed=False)
+                                 f"{constraints.describe(full)}; move the goal or widen the tolerances")
+        contacts = self._checker.contacts(full, include_fixed=False)
         return PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}",
                              contacts)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
@@ -48,7 +48,7 @@ def edge_fault(problem: PlanningProblem, first: Array, second: Array) -> str:
     step = problem.settings.finest_step
     hit = problem.motion.colliding_state(np.vstack([first, second]), step)
     if hit is not None:
-        contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)
+        contacts = problem.checker.contacts(problem.motion.full_positions(hit), include_fixed=False)
         return f"collides: {describe_contacts(contacts)}, at {describe_state(problem, hit)}"
     return f"leaves the path constraints between {describe_state(problem, first)} and {describe_state(problem, second)}"
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
@@ -20,9 +21,21 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
-    from modular_framework_planning.planning_pipeline.last_check import LastCheck
+
+class SolutionValidator(Protocol):
+    """Checks a timed motion before a client gets it."""
+
+    def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
+        """Returns what is wrong with the timed motion of a path; empty where nothing is.
+
+        Args:
+            problem: what was planned; its checker and constraints are asked.
+            path: with a trajectory.
+
+        Raises:
+            PlanningError: the check takes longer than the request allows.
+        """
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +55,7 @@ class PlanningProblem:
             planner_configs.
         constraints: path constraints every state must satisfy, or None.
         step: distance of collision checks along an edge of the search [rad or m].
-        last_check: the check every timed motion must pass (see last_check.py).
+        solution_validator: what every timed motion must pass.
         repeatable: the search is bounded by iterations and not by the clock.
     """
 
@@ -60,7 +73,7 @@ class PlanningProblem:
     begun_s: float
     deadline_s: float
     end_s: float
-    last_check: LastCheck
+    solution_validator: SolutionValidator
     planner_id: str = ""
     planner_parameters: Mapping[str, Any] = field(default_factory=dict)
     constraints: KinematicConstraints | None = None
@@ -106,7 +119,7 @@ class PlanningProblem:
     def state_is_valid(self, values: Array) -> bool:
         """Whether a joint vector is free of collisions and satisfies the path constraints."""
         return self.motion.state_is_free(values) and (
-            self.constraints is None or self.constraints.satisfied(self.motion.whole(values)))
+            self.constraints is None or self.constraints.satisfied(self.motion.full_positions(values)))
 
     def edge_is_valid(self, first: Array, second: Array, step: float | None = None) -> bool:
         """Whether the straight motion is free and satisfies the path constraints (its start is not looked at).
@@ -120,7 +133,7 @@ class PlanningProblem:
             return True
         step = max(step, self.settings.motion_step)
         count = max(1, int(np.ceil(float(np.abs(second - first).max()) / step)))
-        return all(self.constraints.satisfied(self.motion.whole(first + number / count * (second - first)))
+        return all(self.constraints.satisfied(self.motion.full_positions(first + number / count * (second - first)))
                    for number in range(1, count + 1))
 
     def cancelled(self) -> bool:
@@ -145,7 +158,7 @@ class PlannedPath:
     Attributes:
         vertices: joint vectors from start to goal, shape (n, joints).
         trajectory: the timed motion, once there is one.
-        lead_in: number of vertices before the first that has to be free: the way out of a colliding start.
+        path_prefix: number of vertices before the first that has to be free: those that lead out of a colliding start.
         unconstrained: number of vertices before the first that has to satisfy the path constraints.
         planner_id: what the answer calls the planner; empty for the problem's own planner_id.
         found_s: time.monotonic() when the planner was done.
@@ -154,7 +167,7 @@ class PlannedPath:
 
     vertices: Array
     trajectory: Trajectory | None = None
-    lead_in: int = 0
+    path_prefix: int = 0
     unconstrained: int = 0
     planner_id: str = ""
     found_s: float = 0.0

@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import replace
 
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem

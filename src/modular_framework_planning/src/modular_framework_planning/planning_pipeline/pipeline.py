@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.collision_checker import ATTACHED, WORLD, CollisionChecker
-from modular_framework_planning.collision_detection.contact_report import describe_contacts as describe_contacts
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.contacts import ATTACHED, WORLD, describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
@@ -29,17 +29,14 @@ from modular_framework_planning.planning_pipeline.adapters.limit_max_cartesian_l
     LimitMaxCartesianLinkSpeed,
 )
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter, chain
-from modular_framework_planning.planning_pipeline.last_check import LastCheck
 from modular_framework_planning.planning_pipeline.path_search import PathSearch
-from modular_framework_planning.planning_pipeline.pipeline_parts import DEFAULT_ADAPTERS, make_adapters, make_planner
+from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
 RESERVED_S, RESERVED_SHARE = 0.25, 0.2  # of the allowed time, for what follows the search
 RESERVED_AFTER_IMPROVING_S = 1.0  # where the planner always uses all of its time, so that the rest is all there is
-DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
-CheckerSource = Callable[..., CollisionChecker]
 LOGGER = logging.getLogger("rosout.planning_pipeline")
 
 
@@ -47,24 +44,21 @@ class PlanningPipeline:
     """Plans for one robot; threads may share it, each plan has its own collision world."""
 
     def __init__(self, model: RobotModel, kinematics: KinematicsPool, settings: PipelineSettings,
-                 planner: Planner | None = None, adapters: Sequence[RequestAdapter] | None = None,
-                 name: str = "ompl", checkers: CheckerSource = CollisionChecker) -> None:
-        """Stores the parts.
+                 planner: Planner, adapters: Sequence[RequestAdapter] = (), name: str = "ompl") -> None:
+        """Stores the parts; PipelineSpec builds them from their names.
 
         Args:
             model: the robot.
             kinematics: inverse kinematics of its groups.
             settings: the pipeline's parameters.
-            planner: OMPL by default.
-            adapters: outermost first; DEFAULT_ADAPTERS by default.
+            planner: finds the path.
+            adapters: outermost first.
             name: what `pipeline_id` calls it.
-            checkers: gives the collision checker for (scene, moving joints, tolerated contacts).
         """
         self._model = model
         self._kinematics = kinematics
-        self._planner = planner if planner is not None else make_planner(DEFAULT_PLANNER, model, settings)
-        self._adapters = tuple(adapters) if adapters is not None else make_adapters(DEFAULT_ADAPTERS)
-        self._checkers = checkers
+        self._planner = planner
+        self._adapters = tuple(adapters)
         self.name = name
         self.settings = settings
         self.configurations = PlannerConfigurations(settings.planner_configs)
@@ -165,13 +159,13 @@ class PlanningPipeline:
         if path.trajectory is None:
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"pipeline '{self.name}': the path was not timed; add "
                                 "default_planner_request_adapters/AddTimeOptimalParameterization to request_adapters")
-        fault = problem.last_check.fault(problem, path)
+        fault = problem.solution_validator.fault(problem, path)
         if fault:
             return fault, None
         start = problem.start.copy()
         start[problem.group.indices] = path.vertices[0]
-        return "", PlanningAnswer(path.trajectory, start, problem.motion.whole(path.vertices[-1]), path.vertices,
-                                  path.planner_id or problem.planner_id, path.found_s - begun,
+        return "", PlanningAnswer(path.trajectory, start, problem.motion.full_positions(path.vertices[-1]),
+                                  path.vertices, path.planner_id or problem.planner_id, path.found_s - begun,
                                   time.monotonic() - begun)
 
     def checker(self, scene: PlanningScene, group: JointGroup, start: Array,
@@ -187,7 +181,7 @@ class PlanningPipeline:
         Raises:
             PlanningError: bodies touch that the group cannot separate.
         """
-        checker = self._checkers(scene, group.indices)
+        checker = CollisionChecker(scene, group.indices)
         checker.build(go_on)
         fixed = checker.fixed_contacts(start)
         if fixed:
@@ -198,7 +192,7 @@ class PlanningPipeline:
         shallow = [item for item in checker.contacts(start, include_fixed=False)
                    if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
                    and item.depth <= self.settings.start_state_contact_tolerance]
-        return self._checkers(scene, group.indices, shallow) if shallow else checker
+        return CollisionChecker(scene, group.indices, shallow) if shallow else checker
 
     def _problem(self, request: PlanningRequest, begun: float) -> PlanningProblem:
         """Reads the request; everything that can be refused without planning is refused here."""
@@ -219,7 +213,7 @@ class PlanningPipeline:
             request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
             self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
             begun, begun + request.allowed_time_s - self._reserved(request.allowed_time_s, planner_id),
-            begun + request.allowed_time_s, LastCheck(), planner_id, parameters, request.path_constraints)
+            begun + request.allowed_time_s, TrajectoryValidator(), planner_id, parameters, request.path_constraints)
 
     def _reserved(self, allowed_time_s: float, planner_id: str) -> float:
         """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""

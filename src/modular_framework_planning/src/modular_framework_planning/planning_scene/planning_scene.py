@@ -127,7 +127,7 @@ class PlanningScene:
         """Returns the distance [m] each of the model's link geometries keeps from the world; (n,), in their order."""
         return np.array([self.padding.margin(item.link, item.geometry) for item in self.model.link_geometries])
 
-    def held_margin(self) -> float:
+    def attached_padding(self) -> float:
         """Returns the distance [m] held objects keep from the world."""
         return self.padding.attached + self.padding.objects
 

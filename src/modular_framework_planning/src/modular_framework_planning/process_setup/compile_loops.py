@@ -18,7 +18,7 @@ from modular_framework_planning.kinematics import compiled_kinematics
 from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
-from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, mask_of
+from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, self_filter_of
 from modular_framework_planning.planners.stomp import costs
 from modular_framework_planning.planning_scene.planning_scene import (
     AttachedObject,
@@ -40,7 +40,7 @@ def compile_all() -> float:
     time_parameterization.warm_up()
     scene = _scene(_robot(), _voxels())
     _check_motions(scene)
-    mask_of(RegionCache(), bodies_in_scene(scene, scene.positions), 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
+    self_filter_of(RegionCache(), bodies_in_scene(scene, scene.positions), 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
     return time.monotonic() - begun
 
 

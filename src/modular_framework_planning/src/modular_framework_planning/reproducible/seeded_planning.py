@@ -18,7 +18,7 @@ from pathlib import Path
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_parts import PipelineSpec
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
 from modular_framework_planning.reproducible.seeded_worker import LENGTH, Failure, WorkerSetup, receive, send
 from modular_framework_planning.robot_model.robot_model import RobotModel

@@ -21,14 +21,15 @@ from typing import Any
 import numpy as np
 from pinocchio import SE3 as Transform
 
-from modular_framework_planning.collision_detection.exact_collision import Contact
+from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_parts import PipelineSpec
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
+from modular_framework_planning.planning_pipeline.plugins import make_adapters
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
@@ -137,7 +138,7 @@ def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
     compile_all()
     far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
     scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
-    straight = PlanningPipeline(model, kinematics, PipelineSettings(), _Straight())
+    straight = PlanningPipeline(model, kinematics, PipelineSettings(), _Straight(), make_adapters())
     for group in model.groups.values():
         if not group.joints:
             continue

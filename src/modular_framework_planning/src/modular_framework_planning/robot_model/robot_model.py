@@ -52,7 +52,7 @@ class JointGroup:
 
     Attributes:
         joints: joints the planner may move, in the order of the kinematic tree.
-        indices: their places in a position vector of the whole robot.
+        indices: theirs in a position vector of the whole robot.
         links: links whose parent joint belongs to the group.
         base_link, tip_link: ends of the chain; empty where the group is not a chain.
     """
@@ -205,7 +205,7 @@ class RobotModel:
         return self.groups[name]
 
     def joint_index(self, name: str) -> int:
-        """Returns the place of a joint in a position vector; raises UnknownNameError."""
+        """Returns the index of a joint in a position vector; raises UnknownNameError."""
         if name not in self.index:
             raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, "joint", name, self.joint_names)
         return self.index[name]

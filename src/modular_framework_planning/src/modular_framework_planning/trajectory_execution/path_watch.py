@@ -49,7 +49,7 @@ class PathWatch:
         _, before = self._checkers(self._planned_in.with_positions(scene.positions))
         for values in _samples(rest):
             if not motion.state_is_free(values) and before.state_is_free(values):
-                return "; ".join(item.describe() for item in checker.contacts(motion.whole(values), False)[:4])
+                return "; ".join(item.describe() for item in checker.contacts(motion.full_positions(values), False)[:4])
         return ""
 
     def _checkers(self, scene: PlanningScene) -> tuple[CollisionChecker, MotionChecker]:

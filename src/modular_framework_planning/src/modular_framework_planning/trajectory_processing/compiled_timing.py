@@ -176,13 +176,13 @@ def _grid(breaks: Array, longest: float, fewest: int) -> tuple[Array, NDArray[np
     for piece in range(pieces):
         counts[piece] = max(fewest, int((breaks[piece + 1] - breaks[piece]) / longest))
     grid, numbers = np.empty(counts.sum() + 1), np.empty(counts.sum(), dtype=np.int64)
-    place = 0
+    index = 0
     for piece in range(pieces):
         for k in range(counts[piece]):
-            grid[place] = breaks[piece] + (breaks[piece + 1] - breaks[piece]) * k / counts[piece]
-            numbers[place] = piece
-            place += 1
-    grid[place] = breaks[pieces]
+            grid[index] = breaks[piece] + (breaks[piece + 1] - breaks[piece]) * k / counts[piece]
+            numbers[index] = piece
+            index += 1
+    grid[index] = breaks[pieces]
     return grid, numbers
 
 

@@ -18,14 +18,14 @@ EASE_S = 0.1  # over which the pace changes, on both sides of a fast stretch
 LONGEST_SLOWED_PERIOD_S = 2.5 * LONGEST_PERIOD_S
 
 
-def link_speeds(model: RobotModel, trajectory: Trajectory, whole: Callable[[Array], Array], link: str,
+def link_speeds(model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array], link: str,
                 times: Array) -> Array:
     """Returns speeds of a link's origin [m/s] at some times, shape (m,).
 
     Args:
         model: the robot.
         trajectory: motion of some joints.
-        whole: gives positions of the whole robot for a joint vector.
+        full_positions: gives positions of the whole robot for a joint vector.
         link: name of the link.
         times: [s], shape (m,).
     """
@@ -38,7 +38,7 @@ def link_speeds(model: RobotModel, trajectory: Trajectory, whole: Callable[[Arra
         all_rates[indices] = rates
         for follower, leader, multiplier, _ in model.mimics:
             all_rates[follower] = multiplier * all_rates[leader]
-        jacobian = pin.computeFrameJacobian(model.pin_model, data, whole(values), frame,
+        jacobian = pin.computeFrameJacobian(model.pin_model, data, full_positions(values), frame,
                                             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         result[number] = np.linalg.norm(jacobian[:3] @ all_rates)
     return result
@@ -68,12 +68,12 @@ def _eased(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
                       (accelerations - velocities * change / factor) / factor**2)
 
 
-def with_limited_link_speed(model: RobotModel, trajectory: Trajectory, whole: Callable[[Array], Array], link: str,
-                            highest: float, velocity: Array, acceleration: Array) -> Trajectory:
+def with_limited_link_speed(model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array],
+                            link: str, highest: float, velocity: Array, acceleration: Array) -> Trajectory:
     """Returns the motion along the same curve with the link at or below a speed at every sample.
 
     Args:
-        model, trajectory, whole, link: see link_speeds.
+        model, trajectory, full_positions, link: see link_speeds.
         highest: speed [m/s], above 0.
         velocity, acceleration: limits of the joints, shape (joints,).
     """
@@ -81,10 +81,10 @@ def with_limited_link_speed(model: RobotModel, trajectory: Trajectory, whole: Ca
         return trajectory
     allowed = highest * (1.0 - MARGIN)
     times = trajectory.sample_times(min(PERIOD_S, trajectory.duration_s / 20.0))
-    slowing = link_speeds(model, trajectory, whole, link, times) / allowed
+    slowing = link_speeds(model, trajectory, full_positions, link, times) / allowed
     if slowing.max() <= 1.0:
         return trajectory
     eased = _eased(trajectory, times, slowing)
-    fastest = float(link_speeds(model, eased, whole, link, eased.sample_times()).max()) / allowed
+    fastest = float(link_speeds(model, eased, full_positions, link, eased.sample_times()).max()) / allowed
     factor = max(fastest, overrun(eased, velocity * (1.0 - MARGIN), acceleration * (1.0 - MARGIN)))
     return eased.slowed(max(factor, 1.0))

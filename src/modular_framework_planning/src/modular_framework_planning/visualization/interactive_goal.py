@@ -17,7 +17,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.messages.conversions import joint_values, pose_message
+from modular_framework_planning.messages.conversions import joint_values
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group.markers.scene_markers import robot_markers
 from modular_framework_planning.move_group.robot_parameters import load_robot_model
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel

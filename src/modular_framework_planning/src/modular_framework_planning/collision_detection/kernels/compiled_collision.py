@@ -42,13 +42,13 @@ class World(NamedTuple):
         tree: joints of the robot.
         joints: joint each body hangs on, -1 for the world; shape (b,).
         poses: of each body in its joint's frame; shape (b, 3, 4).
-        roots: node of each body's surface; scenic: whether that is in `scene` instead of `robot`.
+        roots: node of each body's surface; is_environment: whether that is in `scene` and not in `robot`.
         kinds, sizes: closed form of each body (SURFACE for none) and its three numbers.
         spheres: centre (in the body's frame) and radius around each body; shape (b, 4).
         closed: whether each body's surface has an inside.
         robot, scene: the surfaces of links, and those of the world and of held objects.
         pairs: two bodies each, the first one has a surface, shape (p, 2); margins: distance they must keep [m].
-        exact: whether the pair touches where these stand-ins of its bodies do; shape (p,).
+        exact: whether the pair touches where the bounding geometries of its bodies do; shape (p,).
         tables: what is known about cells of pairs of links that two joints move against each other: UNKNOWN, APART
             (all through the cell) or NEAR; filled while checking, shape (t, CELLS, CELLS).
         table_joints: the two joints of each table, the one nearer to the base first, -1 for none; shape (t, 2).
@@ -59,7 +59,7 @@ class World(NamedTuple):
     joints: NDArray[np.int64]
     poses: Array
     roots: NDArray[np.int64]
-    scenic: NDArray[np.bool_]
+    is_environment: NDArray[np.bool_]
     kinds: NDArray[np.int64]
     sizes: Array
     spheres: Array
@@ -121,14 +121,14 @@ def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no
     if gap - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
         return CLEAR, limit
     relative_pose(poses[first], poses[second], relative)
-    surface = world.scene if world.scenic[first] else world.robot
+    surface = world.scene if world.is_environment[first] else world.robot
     if world.kinds[second] != SURFACE:
         size = world.sizes[second]
         status, bound = surface_to_solid(surface.spheres, surface.boxes, surface.links, surface.triangles,
                                          world.roots[first], relative, world.kinds[second], size[0], size[1], size[2],
                                          margin, limit)
     else:
-        other = world.scene if world.scenic[second] else world.robot
+        other = world.scene if world.is_environment[second] else world.robot
         status, bound = surface_to_surface(
             surface.spheres, surface.boxes, surface.links, surface.triangles, world.roots[first],
             other.spheres, other.boxes, other.links, other.triangles, world.roots[second], relative, margin, limit)
@@ -138,13 +138,13 @@ def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no
 
 
 @njit(cache=True, nogil=True)
-def _goes_round(world, outer, inner, poses):  # type: ignore[no-untyped-def]
+def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
     """Whether a body without touching it surrounds a point of another body."""
     if not np.isfinite(world.spheres[inner, 3]) or (world.kinds[outer] == SURFACE and not world.closed[outer]):
         return False
     corner = np.zeros(3)  # of a body in closed form: its centre
     if world.roots[inner] >= 0:
-        surface = world.scene if world.scenic[inner] else world.robot
+        surface = world.scene if world.is_environment[inner] else world.robot
         node = world.roots[inner]
         while surface.links[node, 0] >= 0:
             node = surface.links[node, 0]
@@ -164,7 +164,7 @@ def _goes_round(world, outer, inner, poses):  # type: ignore[no-untyped-def]
     if ((local[0] - sphere[0]) ** 2 + (local[1] - sphere[1]) ** 2 + (local[2] - sphere[2]) ** 2
             > sphere[3] * sphere[3]):
         return False
-    surface = world.scene if world.scenic[outer] else world.robot
+    surface = world.scene if world.is_environment[outer] else world.robot
     return encloses(surface.spheres, surface.links, surface.triangles, world.roots[outer],
                     local[0], local[1], local[2])
 
@@ -178,7 +178,7 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
         x, y, z = (centres[first, 0] - centres[second, 0], centres[first, 1] - centres[second, 1],
                    centres[first, 2] - centres[second, 2])
         if (exact[pair] and np.sqrt(x * x + y * y + z * z) < spheres[first, 3] + spheres[second, 3]
-                and (_goes_round(world, first, second, poses) or _goes_round(world, second, first, poses))):
+                and (_contains(world, first, second, poses) or _contains(world, second, first, poses))):
             return pair
     return -1
 
@@ -189,13 +189,13 @@ def arguments(world: World) -> tuple[NDArray[Any], ...]:
 
 
 @njit(cache=True, nogil=True)
-def world_of(parents, placements, axes, prismatic, joints, poses, roots, scenic,  # type: ignore[no-untyped-def]
+def world_of(parents, placements, axes, prismatic, joints, poses, roots, is_environment,  # type: ignore[no-untyped-def]
              kinds, sizes, spheres, closed, robot_spheres, robot_boxes, robot_links, robot_triangles,
              scene_spheres, scene_boxes, scene_links, scene_triangles, pairs, margins, exact,
              tables, table_joints, table_of):
     """Puts the arrays that `arguments` gives together again."""
-    return World(Tree(parents, placements, axes, prismatic), joints, poses, roots, scenic, kinds, sizes, spheres,
-                 closed, Surfaces(robot_spheres, robot_boxes, robot_links, robot_triangles),
+    return World(Tree(parents, placements, axes, prismatic), joints, poses, roots, is_environment, kinds, sizes,
+                 spheres, closed, Surfaces(robot_spheres, robot_boxes, robot_links, robot_triangles),
                  Surfaces(scene_spheres, scene_boxes, scene_links, scene_triangles), pairs, margins, exact, tables,
                  table_joints, table_of)
 

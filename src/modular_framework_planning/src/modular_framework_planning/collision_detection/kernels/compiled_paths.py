@@ -202,7 +202,7 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
     relative, change, motions = np.empty((3, 4)), np.empty(joints), np.zeros(bodies)
     state, begun, ended, row = np.empty(joints), np.empty(joints), np.empty(joints), np.empty(joints)
     reach, still = np.empty((2, joints)), np.empty((2, joints))
-    ranges = np.empty((64, 4), np.int64)  # first sample, last sample, and their pairs' place in `active`
+    ranges = np.empty((64, 4), np.int64)  # first sample, last sample, and their pairs' indices in `active`
     active = np.arange(4 * len(pairs) + 16)
     used = len(pairs)
     ranges[0] = last, last, 0, used
@@ -237,8 +237,8 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
             larger[:used] = active[:used]
             active = larger
         kept, share = used, 1.0
-        for place in range(begin, end):
-            pair = active[place]
+        for index in range(begin, end):
+            pair = active[index]
             if table_of[pair] >= 0:
                 if low < high and _table_says(world, tables, table_joints, table_of, pair, reach) == APART:
                     continue

@@ -42,13 +42,13 @@ def _fill_cell(world, table, pair, row, column):  # type: ignore[no-untyped-def]
     relative_pose(poses[first], poses[second], relative)
     for turn in range(turns):
         joint = far if turns == 2 and turn == 0 else near
-        place, axis, base = placements[joint], world.tree.axes[joint], poses[second]
+        placement, axis, base = placements[joint], world.tree.axes[joint], poses[second]
         for line in range(3):
             origins[turn, line], axes[turn, line] = 0.0, 0.0
             for inner in range(3):
-                origins[turn, line] += base[inner, line] * (place[inner, 3] - base[inner, 3])
+                origins[turn, line] += base[inner, line] * (placement[inner, 3] - base[inner, 3])
                 axes[turn, line] += base[inner, line] * (
-                    place[inner, 0] * axis[0] + place[inner, 1] * axis[1] + place[inner, 2] * axis[2])
+                    placement[inner, 0] * axis[0] + placement[inner, 1] * axis[1] + placement[inner, 2] * axis[2])
     surfaces = world.robot
     apart = surfaces_stay_apart(
         surfaces.spheres, surfaces.boxes, surfaces.links, surfaces.triangles, world.roots[first],

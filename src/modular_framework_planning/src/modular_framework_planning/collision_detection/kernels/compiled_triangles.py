@@ -103,10 +103,10 @@ def _split(triangles, members):  # type: ignore[no-untyped-def]
         if most - least > extent:
             widest, extent, value = axis, most - least, 0.5 * (least + most)
     before = 0
-    for place in range(len(members)):
-        member = members[place]
+    for index in range(len(members)):
+        member = members[index]
         if triangles[member, widest] + triangles[member, widest + 3] + triangles[member, widest + 6] < value:
-            members[place], members[before] = members[before], member
+            members[index], members[before] = members[before], member
             before += 1
     return before if 0 < before < len(members) else len(members) // 2
 
@@ -116,19 +116,19 @@ def _enclose(triangles, members, sphere):  # type: ignore[no-untyped-def]
     """Writes a small sphere around the members' corners (Badoiu and Clarkson's steps towards the farthest corner)."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for member in members:
-        for place in range(9):
-            low[place % 3] = min(low[place % 3], triangles[member, place])
-            high[place % 3] = max(high[place % 3], triangles[member, place])
+        for index in range(9):
+            low[index % 3] = min(low[index % 3], triangles[member, index])
+            high[index % 3] = max(high[index % 3], triangles[member, index])
     x, y, z = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     best = np.inf
     for step in range(CENTRING_STEPS):
         squared, far, corner = -1.0, 0, 0
         for member in members:
-            for place in range(0, 9, 3):
-                distance = ((triangles[member, place] - x) ** 2 + (triangles[member, place + 1] - y) ** 2
-                            + (triangles[member, place + 2] - z) ** 2)
+            for index in range(0, 9, 3):
+                distance = ((triangles[member, index] - x) ** 2 + (triangles[member, index + 1] - y) ** 2
+                            + (triangles[member, index + 2] - z) ** 2)
                 if distance > squared:
-                    squared, far, corner = distance, member, place
+                    squared, far, corner = distance, member, index
         if squared < best:
             best = squared
             sphere[0], sphere[1], sphere[2] = x, y, z
@@ -155,9 +155,9 @@ def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
         nx, ny, nz = 0.0, 0.0, 1.0
     longest, ax, ay, az = 0.0, 0.0, 0.0, 0.0
     for member in members:
-        for place in range(0, 9, 3):
-            x, y = triangles[member, place] - mx, triangles[member, place + 1] - my
-            z = triangles[member, place + 2] - mz
+        for index in range(0, 9, 3):
+            x, y = triangles[member, index] - mx, triangles[member, index + 1] - my
+            z = triangles[member, index + 2] - mz
             height = x * nx + y * ny + z * nz
             x, y, z = x - height * nx, y - height * ny, z - height * nz
             if x * x + y * y + z * z > longest:
@@ -180,9 +180,9 @@ def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
         dx, dy, dz = box[3 + 3 * axis], box[4 + 3 * axis], box[5 + 3 * axis]
         low, high = np.inf, -np.inf
         for member in members:
-            for place in range(0, 9, 3):
-                value = (dx * triangles[member, place] + dy * triangles[member, place + 1]
-                         + dz * triangles[member, place + 2])
+            for index in range(0, 9, 3):
+                value = (dx * triangles[member, index] + dy * triangles[member, index + 1]
+                         + dz * triangles[member, index + 2])
                 low, high = min(low, value), max(high, value)
         box[12 + axis] = 0.5 * (high - low) + 1e-12
         middle = 0.5 * (low + high)

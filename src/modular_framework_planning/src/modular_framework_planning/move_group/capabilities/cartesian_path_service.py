@@ -23,12 +23,8 @@ from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownN
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
-from modular_framework_planning.messages.conversions import (
-    scene_with_state,
-    state_message,
-    trajectory_message,
-    transform_from_pose,
-)
+from modular_framework_planning.messages.conversions import scene_with_state, state_message, trajectory_message
+from modular_framework_planning.messages.poses import transform_from_pose
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
@@ -120,8 +116,8 @@ class CartesianPathService:
                                            self._context.pipeline("").settings.motion_step)
 
         def objection(before: Array, after: Array) -> str:
-            if not constraints.is_empty and not constraints.satisfied(lines.motion.whole(after)):
-                return f"path_constraints: {constraints.describe(lines.motion.whole(after))}"
+            if not constraints.is_empty and not constraints.satisfied(lines.motion.full_positions(after)):
+                return f"path_constraints: {constraints.describe(lines.motion.full_positions(after))}"
             return collides(before, after)
 
         return objection
@@ -141,8 +137,8 @@ class CartesianPathService:
         link = request.cartesian_speed_limited_link or lines.link
         if not model.has_link(link):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "cartesian_speed_limited_link", link, model.frame_ids)
-        return with_limited_link_speed(model, trajectory, lines.motion.whole, link, request.max_cartesian_speed,
-                                       velocity, acceleration)
+        return with_limited_link_speed(model, trajectory, lines.motion.full_positions, link,
+                                       request.max_cartesian_speed, velocity, acceleration)
 
 
 def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Transform, ...]:

@@ -16,18 +16,14 @@ from moveit_msgs.srv import (
 )
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.solution_choice import clearest, first_free
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
-from modular_framework_planning.messages.conversions import (
-    pose_message,
-    scene_with_state,
-    stamped_in_scene,
-    state_message,
-)
+from modular_framework_planning.messages.conversions import scene_with_state, state_message
+from modular_framework_planning.messages.poses import pose_message, stamped_in_scene
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene

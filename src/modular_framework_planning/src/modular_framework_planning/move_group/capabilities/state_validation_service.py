@@ -9,7 +9,8 @@ import rospy
 from moveit_msgs.msg import ContactInformation
 from moveit_msgs.srv import GetStateValidity, GetStateValidityResponse
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker, Contact
+from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.constraint_conversions import evaluated_one_by_one, result_messages
 from modular_framework_planning.messages.conversions import BODY_TYPES, scene_with_state

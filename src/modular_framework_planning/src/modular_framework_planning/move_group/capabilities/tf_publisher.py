@@ -9,7 +9,7 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 
 from modular_framework_planning.geometry.spatial import Transform
-from modular_framework_planning.messages.conversions import pose_message
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group.context import MoveGroupContext
 
 DEFAULT_RATE_HZ = 10.0

@@ -10,7 +10,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from modular_framework_planning.messages.conversions import pose_message
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene

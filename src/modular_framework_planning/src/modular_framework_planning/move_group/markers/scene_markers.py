@@ -11,10 +11,10 @@ from geometry_msgs.msg import Point
 from moveit_msgs.msg import DisplayTrajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
-from modular_framework_planning.collision_detection.exact_collision import Contact
+from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Plane, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Array, Transform
-from modular_framework_planning.messages.conversions import pose_message
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
 from modular_framework_planning.planning_scene.planning_scene import Color, PlanningScene

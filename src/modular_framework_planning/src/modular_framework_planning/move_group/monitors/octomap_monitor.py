@@ -2,7 +2,6 @@
 """Keeps the scene's octomap up to date with what depth sensors see, and saves and loads it."""
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +15,25 @@ from modular_framework_planning.geometry.spatial import Array, Transform, make_t
 from modular_framework_planning.messages.octomap_conversions import voxels_of
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.markers.octomap_markers import OctomapMarkers
+from modular_framework_planning.move_group.monitors.octomap_updaters import updater_of
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
 from modular_framework_planning.octomap.encoding import read_file, write_file
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
 from modular_framework_planning.perception.depth_images import SeenPoints
-from modular_framework_planning.perception.self_filter import RegionCache, SightMask, bodies_in_scene, mask_of
+from modular_framework_planning.perception.self_filter import (
+    FilterMaker,
+    RegionCache,
+    SelfFilter,
+    bodies_in_scene,
+    self_filter_of,
+)
 from modular_framework_planning.perception.sensor_settings import read_sensors
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
 DEFAULT_RESOLUTION = 0.1  # [m]
 ATTEMPTS = 3
 WAIT_S = 1.0  # for transforms and joint positions of the moment a sensor looked
-MaskMaker = Callable[[RegionCache, Sequence[Any], Array], SightMask]
 
 
 class OctomapMonitor:
@@ -63,23 +68,22 @@ class OctomapMonitor:
             return
         import tf2_ros
 
-        from modular_framework_planning.move_group.monitors.octomap_updaters import updater_of
-
         self._transforms = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._transforms)
         self._monitor.listeners.append(self.free_new_objects)
         _compile_loops()
         for settings in sensors:
-            updater_of(settings, self).connect()
+            updater_of(settings, self.insert_point_cloud).connect()
 
-    def look(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_mask: MaskMaker, shadow: float = 0.0) -> Array:
-        """Puts one look of a sensor into the map.
+    def insert_point_cloud(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker,
+                           shadow: float = 0.0) -> Array:
+        """Puts what a sensor saw at one moment into the map.
 
         Args:
             frame: of the points.
             stamp: when they were seen; robot and sensor are taken where they were then.
             seen: the points.
-            make_mask: makes the mask of what the scene knows, from bodies and the sensor's place.
+            make_filter: makes the filter of what the scene knows, from bodies and the sensor's position.
             shadow: how far behind a known body a point still belongs to it [m].
 
         Returns:
@@ -97,8 +101,8 @@ class OctomapMonitor:
             scene = self._monitor.snapshot()
             bodies = bodies_in_scene(scene, positions)
             self._regions.keep_only(geometry for geometry, _ in bodies)
-            mask = make_mask(self._regions, bodies, sensor.translation)
-            hidden = np.asarray(mask.hides(ends, sensor.translation, shadow))
+            known = make_filter(self._regions, bodies, sensor.translation)
+            hidden = np.asarray(known.hides(ends, sensor.translation, shadow))
             hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
             if self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map):
                 return hidden
@@ -145,10 +149,10 @@ class OctomapMonitor:
         if not fresh or voxels is None or scene.octomap is None:
             return
         things = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries):]
-        mask = mask_of(self._regions, things, 1.0, voxels.resolution * np.sqrt(0.75))
+        known = self_filter_of(self._regions, things, 1.0, voxels.resolution * np.sqrt(0.75))
         centers = scene.octomap.shapes[0][0].centers  # type: ignore[attr-defined]
         points = centers @ scene.octomap.pose.rotation.T + scene.octomap.pose.translation
-        inside = mask.hides(points, np.zeros(3))
+        inside = known.hides(points, np.zeros(3))
         if not inside.any():
             return
         keys, resolution = voxels.occupied_keys[inside], voxels.resolution
@@ -203,7 +207,7 @@ def _compile_loops() -> None:
     """Looks once at nothing, so that the first look of a sensor need not wait for the compiler."""
     here, point = np.zeros(3), np.ones((1, 3))
     empty_map(DEFAULT_RESOLUTION).with_look(here, point, point, point)
-    SightMask(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, here)
+    SelfFilter(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, here)
 
 
 def _into(pose: Transform, points: Array) -> Array:

@@ -5,33 +5,43 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import rospy
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
+from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.perception.depth_images import (
     Pinhole,
+    SeenPoints,
     cloud_array,
     depth_array,
     points_of_cloud,
     points_of_depth,
 )
-from modular_framework_planning.perception.self_filter import depth_mask_of, mask_of
+from modular_framework_planning.perception.self_filter import FilterMaker, depth_self_filter, self_filter_of
 from modular_framework_planning.perception.sensor_settings import DepthImageSettings, PointCloudSettings, SensorSettings
 
 FLOAT_POINT = np.dtype("<f4")
 
 
+class InsertPointCloud(Protocol):
+    """Puts what a sensor saw into the map; see OctomapMonitor.insert_point_cloud."""
+
+    def __call__(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker,
+                 shadow: float = 0.0) -> Array:
+        """Returns which of the points lie on the robot or on known objects."""
+        ...
+
+
 class _Updater(ABC):
     """Takes messages as they come and works on them in a thread of its own; when it is late, the oldest are dropped."""
 
-    def __init__(self, settings: SensorSettings, monitor: OctomapMonitor, waiting: int) -> None:
+    def __init__(self, settings: SensorSettings, insert: InsertPointCloud, waiting: int) -> None:
         self._settings: Any = settings
-        self._monitor = monitor
+        self._insert = insert
         self._messages: deque[Any] = deque(maxlen=waiting)
         self._arrived = threading.Event()
         self._last = rospy.Time()
@@ -63,33 +73,33 @@ class _Updater(ABC):
             while self._messages:
                 message = self._messages.popleft()
                 try:
-                    self._look(message)
+                    self._process(message)
                 except PlanningError as error:
                     rospy.logwarn_throttle(5.0, "octomap: a look is left out: %s", error.reason)
                 except rospy.ROSException as error:  # the node is going down
                     rospy.logdebug("octomap: %s", error)
 
     @abstractmethod
-    def _look(self, message: Any) -> None:
+    def _process(self, message: Any) -> None:
         """Brings one message into the map."""
 
 
 class PointCloudUpdater(_Updater):
     """Subscribes to a PointCloud2; publishes the points that are neither robot nor known object."""
 
-    def __init__(self, settings: PointCloudSettings, monitor: OctomapMonitor) -> None:
-        super().__init__(settings, monitor, 1)
+    def __init__(self, settings: PointCloudSettings, insert: InsertPointCloud) -> None:
+        super().__init__(settings, insert, 1)
 
     def connect(self) -> None:
         """Starts to listen."""
         self._connect(self._settings.point_cloud_topic, PointCloud2, PointCloud2)
 
-    def _look(self, message: PointCloud2) -> None:
+    def _process(self, message: PointCloud2) -> None:
         s = self._settings
         seen = points_of_cloud(cloud_array(message), s.max_range, s.point_subsample)
-        hidden = self._monitor.look(
+        hidden = self._insert(
             message.header.frame_id, message.header.stamp, seen,
-            lambda regions, bodies, _: mask_of(regions, bodies, s.padding_scale, s.padding_offset))
+            lambda regions, bodies, _: self_filter_of(regions, bodies, s.padding_scale, s.padding_offset))
         if self._filtered is not None:
             self._filtered.publish(_cloud_message(message.header, seen.ends[~hidden]))
 
@@ -97,8 +107,8 @@ class PointCloudUpdater(_Updater):
 class DepthImageUpdater(_Updater):
     """Subscribes to a depth image and the camera_info beside it; publishes the image without robot and objects."""
 
-    def __init__(self, settings: DepthImageSettings, monitor: OctomapMonitor) -> None:
-        super().__init__(settings, monitor, settings.queue_size)
+    def __init__(self, settings: DepthImageSettings, insert: InsertPointCloud) -> None:
+        super().__init__(settings, insert, settings.queue_size)
         self._camera: Pinhole | None = None
 
     def connect(self) -> None:
@@ -113,7 +123,7 @@ class DepthImageUpdater(_Updater):
         except PlanningError as error:
             rospy.logwarn_throttle(5.0, "octomap: %s", error.reason)
 
-    def _look(self, message: Image) -> None:
+    def _process(self, message: Image) -> None:
         s = self._settings
         if self._camera is None:
             rospy.logwarn_throttle(5.0, "octomap: no usable camera_info beside '%s' yet; its images are left out",
@@ -123,9 +133,10 @@ class DepthImageUpdater(_Updater):
                             bool(message.is_bigendian))
         seen = points_of_depth(depth, self._camera, s.near_clipping_plane_distance, s.far_clipping_plane_distance,
                                (s.skip_vertical_pixels, s.skip_horizontal_pixels))
-        hidden = self._monitor.look(
+        hidden = self._insert(
             message.header.frame_id, message.header.stamp, seen,
-            lambda regions, bodies, origin: depth_mask_of(regions, bodies, origin, s.padding_scale, s.padding_offset),
+            lambda regions, bodies, origin: depth_self_filter(regions, bodies, origin, s.padding_scale,
+                                                              s.padding_offset),
             s.shadow_threshold)
         if self._filtered is not None:
             kept = np.zeros(depth.size)
@@ -141,10 +152,10 @@ def _cloud_message(header: Any, points: Any) -> PointCloud2:
     return PointCloud2(header, 1, len(points), fields, False, 12, 12 * len(points), data, True)
 
 
-def updater_of(settings: SensorSettings, monitor: OctomapMonitor) -> PointCloudUpdater | DepthImageUpdater:
+def updater_of(settings: SensorSettings, insert: InsertPointCloud) -> PointCloudUpdater | DepthImageUpdater:
     """Returns the updater of a sensor."""
     match settings:
         case PointCloudSettings():
-            return PointCloudUpdater(settings, monitor)
+            return PointCloudUpdater(settings, insert)
         case DepthImageSettings():
-            return DepthImageUpdater(settings, monitor)
+            return DepthImageUpdater(settings, insert)

@@ -25,7 +25,7 @@ def constraints_are_tight(problem: PlanningProblem) -> bool:
         return False
     low, high = _search_bounds(problem)
     states = problem.rng.uniform(low, high, (SAMPLES, len(low)))
-    kept = sum(constraints.satisfied(problem.motion.whole(values)) for values in states)
+    kept = sum(constraints.satisfied(problem.motion.full_positions(values)) for values in states)
     return kept < TIGHT_SHARE * SAMPLES
 
 
@@ -130,9 +130,9 @@ class ConstrainedSearch:
         assert problem.constraints is not None
         for _ in range(4):
             self._states += 1
-            whole = problem.motion.whole(wanted)
-            if not problem.constraints.satisfied(whole):
-                projected = problem.constraints.project(whole, problem.group.indices)
+            full = problem.motion.full_positions(wanted)
+            if not problem.constraints.satisfied(full):
+                projected = problem.constraints.project(full, problem.group.indices)
                 if projected is None:
                     return None
                 wanted = projected[problem.group.indices]

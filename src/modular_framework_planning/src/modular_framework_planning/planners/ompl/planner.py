@@ -92,8 +92,8 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
 
     The search ends after a number of iterations or states, so that a seed repeats it, or with the allowed time.
     """
-    near = replace(problem.with_start(problem.motion.whole(first)), planner_id="RRTConnect", planner_parameters={},
-                   deadline_s=problem.end_s)
+    near = replace(problem.with_start(problem.motion.full_positions(first)), planner_id="RRTConnect",
+                   planner_parameters={}, deadline_s=problem.end_s)
     fine = problem.settings.finest_step
     if problem.constraints is not None and constraints_are_tight(problem):
         try:

@@ -64,6 +64,6 @@ def projection_evaluator(text: str, problem: PlanningProblem, space: Any) -> Any
                             f"known: {', '.join(problem.model.frame_ids)}")
 
     def place(values: Array) -> Array:
-        return problem.model.link_transforms(problem.motion.whole(values))[names[0]].translation
+        return problem.model.link_transforms(problem.motion.full_positions(values))[names[0]].translation
 
     return _LinkPosition(space, place, len(joints))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
 from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
@@ -165,11 +165,11 @@ class SequenceJoiner:
         curve = inside.curve(self._step)
         hit = motion.colliding_state(curve, self._step)
         if hit is not None:
-            contacts = describe_contacts(checker.contacts(motion.whole(hit), include_fixed=False))
+            contacts = describe_contacts(checker.contacts(motion.full_positions(hit), include_fixed=False))
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blended within {radius} m: {contacts}")
         for constraints in (item.request.path_constraints, following.request.path_constraints):
             for values in curve if constraints is not None else ():
-                if constraints is not None and not constraints.satisfied(motion.whole(values)):
+                if constraints is not None and not constraints.satisfied(motion.full_positions(values)):
                     raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blended within {radius} m: a path constraint "
-                                        f"is violated: {constraints.describe(motion.whole(values))}")
+                                        f"is violated: {constraints.describe(motion.full_positions(values))}")
         return trajectory

@@ -36,7 +36,7 @@ def cover_of(world: World, widest: float) -> Cover:
     rows: list[Array] = []
     starts = [0]
     for body, root in enumerate(world.roots.tolist()):
-        surface = world.scene if world.scenic[body] else world.robot
+        surface = world.scene if world.is_environment[body] else world.robot
         open_nodes = [root] if root >= 0 else []
         while open_nodes:
             node = open_nodes.pop()

@@ -23,7 +23,7 @@ class StateCosts:
 
     def __call__(self, values: Array) -> Array:
         """Returns costs of joint vectors (n, joints), shape (n,)."""
-        states = self._problem.motion.whole_path(values)
+        states = self._problem.motion.full_path(values)
         costs = DEPTH_WEIGHT * np.asarray(depths(self._world, self._cover, states))
         if self._problem.constraints is not None:
             costs += [self._violation(row) for row in values]
@@ -32,7 +32,7 @@ class StateCosts:
     def _violation(self, values: Array) -> float:
         constraints = self._problem.constraints
         assert constraints is not None
-        results = constraints.evaluate(self._problem.motion.whole(values))
+        results = constraints.evaluate(self._problem.motion.full_positions(values))
         return float(sum(1.0 + item.distance for item in results if not item.satisfied))
 
 

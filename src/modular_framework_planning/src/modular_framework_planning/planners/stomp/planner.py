@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.stomp.costs import StateCosts
@@ -67,7 +67,7 @@ def _failure(problem: PlanningProblem, settings: StompSettings, motion: Array) -
     if not invalid:
         return PlanningError(reason.code, f"{reason.reason}; in its best motion only the ways between timesteps are "
                              "invalid: raise num_timesteps")
-    middle = problem.motion.whole(invalid[len(invalid) // 2])
+    middle = problem.motion.full_positions(invalid[len(invalid) // 2])
     contacts = problem.checker.contacts(middle, include_fixed=False)
     violated = "" if problem.constraints is None else problem.constraints.describe(middle)
     return PlanningError(reason.code, f"{reason.reason}; in its best motion {len(invalid)} of {len(motion)} timesteps "
@@ -133,7 +133,7 @@ class _Attempt:
         result = motion.copy()
         indices = self._problem.group.indices
         for number in range(1, len(motion) - 1):
-            moved = constraints.project(self._problem.motion.whole(motion[number]), indices)
+            moved = constraints.project(self._problem.motion.full_positions(motion[number]), indices)
             if moved is not None:
                 result[number] = moved[indices]
         return result

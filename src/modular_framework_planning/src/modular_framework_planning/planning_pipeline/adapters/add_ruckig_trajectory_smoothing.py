@@ -35,7 +35,7 @@ class AddRuckigTrajectorySmoothing(RequestAdapter):
             return timed
         candidates = [replace(timed, trajectory=item) for item in self._candidates(problem, timed)]
         for candidate in sorted(candidates, key=_duration):
-            if not problem.last_check.fault(problem, candidate):
+            if not problem.solution_validator.fault(problem, candidate):
                 return candidate
         return replace(timed, trajectory=slowed_to_limits(timed.trajectory, *limits))
 

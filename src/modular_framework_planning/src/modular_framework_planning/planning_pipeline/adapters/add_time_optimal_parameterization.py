@@ -47,7 +47,7 @@ def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     blends = choose_blends(vertices, tolerance, lambda curve: _is_valid(problem, curve))
     if blends.any():
         rounded = timed(blends)
-        if not problem.last_check.fault(problem, rounded):
+        if not problem.solution_validator.fault(problem, rounded):
             return rounded
     return timed(np.zeros_like(blends))
 
@@ -55,7 +55,7 @@ def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
 def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
     """Whether a rounded corner is free and keeps the path constraints."""
     if problem.constraints is not None and not all(
-            problem.constraints.satisfied(problem.motion.whole(values)) for values in curve):
+            problem.constraints.satisfied(problem.motion.full_positions(values)) for values in curve):
         return False
     return problem.motion.colliding_state(curve, problem.settings.finest_step) is None
 

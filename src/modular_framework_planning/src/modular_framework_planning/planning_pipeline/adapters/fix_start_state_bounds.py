@@ -6,8 +6,8 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.path_prefix import with_path_prefix
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
-from modular_framework_planning.planning_pipeline.adapters.way_in import with_way_in
 
 NEGLIGIBLE = 1.0e-6  # [rad or m]; a start this near to its bounds is taken as being on them
 
@@ -29,4 +29,4 @@ class FixStartStateBounds(RequestAdapter):
         start = problem.start.copy()
         start[indices] = inner
         path = plan_next(problem.with_start(start))
-        return path if beyond < NEGLIGIBLE else with_way_in(problem, path)
+        return path if beyond < NEGLIGIBLE else with_path_prefix(problem, path)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.path_prefix import with_path_prefix
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
-from modular_framework_planning.planning_pipeline.adapters.way_in import with_way_in
 
 
 class FixStartStateCollision(RequestAdapter):
@@ -20,8 +20,8 @@ class FixStartStateCollision(RequestAdapter):
         if problem.motion.state_is_free(problem.start_values):
             return plan_next(problem)
         free = self._free_state(problem)
-        path = plan_next(problem.with_start(problem.motion.whole(free)))
-        return with_way_in(problem, path, collides=True)
+        path = plan_next(problem.with_start(problem.motion.full_positions(free)))
+        return with_path_prefix(problem, path, collides=True)
 
     def _free_state(self, problem: PlanningProblem) -> Array:
         settings, start = problem.settings, problem.start_values

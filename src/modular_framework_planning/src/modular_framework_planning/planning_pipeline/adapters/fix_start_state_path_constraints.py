@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
+from modular_framework_planning.planning_pipeline.adapters.path_prefix import with_path_prefix
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
-from modular_framework_planning.planning_pipeline.adapters.way_in import with_way_in
 
 
 class FixStartStatePathConstraints(RequestAdapter):
@@ -24,4 +24,4 @@ class FixStartStatePathConstraints(RequestAdapter):
                                 f"{constraints.describe(problem.start)}; no free straight motion leads to a state that "
                                 "satisfies the path constraints: start from one that does")
         path = plan_next(problem.with_start(nearest))
-        return with_way_in(problem, path)
+        return with_path_prefix(problem, path)

@@ -32,7 +32,7 @@ class LimitMaxCartesianLinkSpeed(RequestAdapter):
         timed = path if path.trajectory is not None else time_path(problem, path)
         assert timed.trajectory is not None
         return replace(timed, trajectory=with_limited_link_speed(
-            problem.model, timed.trajectory, problem.motion.whole, link, highest, problem.max_velocity,
+            problem.model, timed.trajectory, problem.motion.full_positions, link, highest, problem.max_velocity,
             problem.max_acceleration))
 
     @staticmethod

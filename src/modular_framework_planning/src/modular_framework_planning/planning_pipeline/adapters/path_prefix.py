@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the way from the real start to the mended one in front of a path."""
+"""Puts a prefix in front of a path: from the real start to the mended one it was planned from."""
 from __future__ import annotations
 
 from dataclasses import replace
@@ -13,20 +13,20 @@ from modular_framework_planning.trajectory_processing.time_parameterization impo
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 
-def with_way_in(problem: PlanningProblem, path: PlannedPath, collides: bool = False) -> PlannedPath:
+def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool = False) -> PlannedPath:
     """Returns the path with the problem's start in front.
 
     Args:
         problem: its start is where the robot is.
         path: planned from a start that was mended.
-        collides: the way in may collide.
+        collides: the prefix may collide.
 
     Raises:
-        PlanningError: the path is timed already, and the way in takes longer than `start_state_max_dt`.
+        PlanningError: the path is timed already, and the prefix takes longer than `start_state_max_dt`.
     """
     start = problem.start_values
     result = replace(path, vertices=np.vstack([start, path.vertices]), unconstrained=path.unconstrained + 1,
-                     lead_in=path.lead_in + 1 if collides or path.lead_in else 0)
+                     path_prefix=path.path_prefix + 1 if collides or path.path_prefix else 0)
     if path.trajectory is None or np.abs(path.vertices[0] - start).max() < 1e-9:
         return result
     return replace(result, trajectory=_joined(problem, start, path.trajectory))

@@ -26,10 +26,10 @@ from modular_framework_planning.perception.depth_images import (
 from modular_framework_planning.perception.self_filter import (
     DEPTH_NOISE,
     RegionCache,
-    SightMask,
+    SelfFilter,
     bodies_in_scene,
-    depth_mask_of,
-    mask_of,
+    depth_self_filter,
+    self_filter_of,
 )
 from modular_framework_planning.perception.sensor_settings import DepthImageSettings, PointCloudSettings, read_sensors
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
@@ -104,7 +104,7 @@ def test_clouds_are_read_field_by_field_and_thinned_out() -> None:
 def test_a_region_holds_all_of_the_padded_shape_and_little_more(shape: object, padding: float) -> None:
     rng = np.random.default_rng(1)
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.2), np.array([0.5, -0.2, 1.0]))
-    mask = mask_of(RegionCache(), [(shape.geometry, pose)], 1.0, padding)
+    mask = self_filter_of(RegionCache(), [(shape.geometry, pose)], 1.0, padding)
     points = pose.translation + rng.uniform(-0.4, 0.4, (1500, 3))
     solid = coal.Box(0.2, 0.2, 0.2) if shape is CUBE else shape.geometry
     place, point = coal.Transform3s(pose.rotation, pose.translation), coal.Sphere(1.0e-6)
@@ -117,7 +117,8 @@ def test_a_region_holds_all_of_the_padded_shape_and_little_more(shape: object, p
 
 
 def test_what_lies_just_behind_a_body_is_its_shadow() -> None:
-    mask = mask_of(RegionCache(), [(Sphere(0.1).geometry, pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))], 1.0, 0.0)
+    ball = Sphere(0.1).geometry, pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    mask = self_filter_of(RegionCache(), [ball], 1.0, 0.0)
     line = np.column_stack([np.array([0.85, 0.95, 1.05, 1.15, 1.25]), np.zeros((5, 2))])
     assert mask.hides(line, np.zeros(3)).tolist() == [False, True, True, False, False]
     assert mask.hides(line, np.zeros(3), shadow=0.1).tolist() == [False, True, True, True, False]
@@ -126,7 +127,7 @@ def test_what_lies_just_behind_a_body_is_its_shadow() -> None:
 
 def test_depth_noise_grows_with_the_square_of_the_distance() -> None:
     body = [(Sphere(0.1).geometry, pin.SE3(np.eye(3), np.array([0.0, 0.0, 2.9])))]
-    mask = depth_mask_of(RegionCache(), body, np.zeros(3), 4.0, 0.03)
+    mask = depth_self_filter(RegionCache(), body, np.zeros(3), 4.0, 0.03)
     assert mask.balls[0, 3] == pytest.approx(0.1 + 0.03 + 4.0 * DEPTH_NOISE * 9.0)
 
 
@@ -137,7 +138,7 @@ def test_links_and_objects_are_masked_and_planes_are_not(model: RobotModel) -> N
                            ((Box(0.1, 1, 1), pin.SE3.Identity()), (Plane(0, 0, 1, 0), pin.SE3.Identity())))
     bodies = bodies_in_scene(scene.with_object(wall), turned)
     assert len(bodies) == len(model.link_geometries) + 1
-    mask = mask_of(RegionCache(), bodies, 1.0, 0.0)
+    mask = self_filter_of(RegionCache(), bodies, 1.0, 0.0)
     points = np.vstack([[3.0, 0.3, 0.3], [3.0, 0.3, 2.0]])
     assert mask.hides(points, np.zeros(3)).tolist() == [True, False]
     for item, (_, pose) in zip(model.link_geometries, bodies, strict=False):
@@ -186,9 +187,9 @@ def test_a_look_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) ->
     """Needs no master: whatever is asked of the scene monitor is answered here."""
     scene, caches = empty_scene(model), []
 
-    def mask(cache: RegionCache, bodies: Sequence[object], _: np.ndarray) -> SightMask:
+    def mask(cache: RegionCache, bodies: Sequence[object], _: np.ndarray) -> SelfFilter:
         caches.append(cache)
-        return mask_of(cache, bodies, 1.0, 0.0)
+        return self_filter_of(cache, bodies, 1.0, 0.0)
 
     monitor = SimpleNamespace(model=model, positions_at=lambda *_: scene.positions, snapshot=lambda: seen,
                               apply=lambda change: change(seen))
@@ -196,7 +197,7 @@ def test_a_look_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) ->
     for number in range(5):
         thing = CollisionObject("thing", pin.SE3.Identity(), ((Box(0.1, 0.1, 1.0 + number), pin.SE3.Identity()),))
         seen = scene.with_object(thing)
-        octomap.look("", rospy.Time(1), looked, mask)
+        octomap.insert_point_cloud("", rospy.Time(1), looked, mask)
     seen = scene
-    octomap.look("", rospy.Time(1), looked, mask)
+    octomap.insert_point_cloud("", rospy.Time(1), looked, mask)
     assert len(caches[-1]._regions) == len(model.link_geometries)

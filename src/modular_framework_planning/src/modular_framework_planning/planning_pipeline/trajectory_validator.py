@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The check every returned motion has passed, whatever planner and adapters made it."""
+"""The solution validator of every pipeline: it checks each motion, whatever planner and adapters made it."""
 from __future__ import annotations
 
 import time
@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.contact_report import describe_contacts
+from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.path_repair import describe_state
@@ -17,7 +17,7 @@ SAMPLES_AT_ONCE = 200  # of a motion, between two looks at the clock
 GRACE_S = 0.2  # after the allowed time, in which a check that has begun may end
 
 
-class LastCheck:
+class TrajectoryValidator:
     """Looks at a timed motion, at its curve and at the straight ways between its points.
 
     A motion it has seen and passed is not looked at twice.
@@ -45,9 +45,9 @@ class LastCheck:
         text = _not_in_order(path)
         if not text:
             curve = path.trajectory.curve(problem.settings.motion_step)
-            chords = path.trajectory.chords(_place(path.trajectory.positions, path, path.lead_in))
+            chords = path.trajectory.chords(_place(path.trajectory.positions, path, path.path_prefix))
             text = next(filter(None, (_collision(problem, line) for line in (
-                curve[_place(curve, path, path.lead_in):], *chords))), "")
+                curve[_place(curve, path, path.path_prefix):], *chords))), "")
             text = text or _violation(problem, curve[_place(curve, path, path.unconstrained):])
         if not text:
             self._passed.add(key)
@@ -74,7 +74,7 @@ def _collision(problem: PlanningProblem, samples: Array) -> str:
         _require_time(problem)
         hit = problem.motion.colliding_state(samples[begin:begin + SAMPLES_AT_ONCE + 1], step)
         if hit is not None:
-            contacts = problem.checker.contacts(problem.motion.whole(hit), include_fixed=False)
+            contacts = problem.checker.contacts(problem.motion.full_positions(hit), include_fixed=False)
             return f"{describe_contacts(contacts)}, at {describe_state(problem, hit)} (checked at {step} rad steps)"
     return ""
 
@@ -93,8 +93,8 @@ def _violation(problem: PlanningProblem, samples: Array) -> str:
     if problem.constraints is None:
         return ""
     for number, values in enumerate(samples):
-        whole = problem.motion.whole(values)
-        if not problem.constraints.satisfied(whole):
+        full = problem.motion.full_positions(values)
+        if not problem.constraints.satisfied(full):
             return (f"sample {number} of {len(samples)} violates a path constraint: "
-                    f"{problem.constraints.describe(whole)}")
+                    f"{problem.constraints.describe(full)}")
     return ""

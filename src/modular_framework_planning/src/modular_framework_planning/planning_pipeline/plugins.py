@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import importlib
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.planning_interface.planner_interface import Planner
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.robot_model.robot_model import RobotModel
-
-if TYPE_CHECKING:
-    from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-    from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 
 PACKAGE = "modular_framework_planning"
 PLANNERS = {
@@ -29,32 +24,11 @@ ADAPTERS = ("AddIterativeSplineParameterization", "AddRuckigTrajectorySmoothing"
             "FixStartStatePathConstraints", "FixWorkspaceBounds", "LimitMaxCartesianLinkSpeed")
 # Names of MoveIt's adapters that have nothing left to do here, and why.
 NOT_NEEDED = {"Empty": "does nothing", "ResolveConstraintFrames": "frames are resolved when a request is read"}
+DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 MOVEIT_ADAPTERS = "default_planner_request_adapters"
 DEFAULT_ADAPTERS = " ".join(f"{MOVEIT_ADAPTERS}/{name}" for name in (
     "LimitMaxCartesianLinkSpeed", "AddTimeOptimalParameterization", "FixWorkspaceBounds", "FixStartStateBounds",
     "FixStartStateCollision", "FixStartStatePathConstraints"))
-
-
-@dataclass(frozen=True, slots=True)
-class PipelineSpec:
-    """How a pipeline is built; can be sent to another process.
-
-    Attributes:
-        name: what `pipeline_id` calls it.
-        planner, adapters: parameters planning_plugin and request_adapters.
-    """
-
-    name: str
-    planner: str
-    adapters: str
-    settings: PipelineSettings
-
-    def build(self, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
-        """Builds the pipeline; raises PlanningError for an unknown part or a parameter a part refuses."""
-        from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-
-        return PlanningPipeline(model, kinematics, self.settings, make_planner(self.planner, model, self.settings),
-                                make_adapters(self.adapters), self.name)
 
 
 def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> Planner:
@@ -77,7 +51,7 @@ def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> 
     return planner
 
 
-def make_adapters(names: str) -> tuple[RequestAdapter, ...]:
+def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
     """Makes the adapters of a pipeline, outermost first.
 
     Args:

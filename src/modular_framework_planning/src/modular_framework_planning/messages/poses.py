@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses as messages."""
+from __future__ import annotations
+
+from geometry_msgs.msg import Pose, PoseStamped
+
+from modular_framework_planning.geometry.spatial import Transform, make_transform, pose_of
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+
+
+def transform_from_pose(pose: Pose, where: str) -> Transform:
+    """Reads a pose; raises GeometryError."""
+    p, q = pose.position, pose.orientation
+    return make_transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), where)
+
+
+def pose_message(transform: Transform) -> Pose:
+    """Writes a pose."""
+    position, quaternion = pose_of(transform)
+    pose = Pose()
+    pose.position.x, pose.position.y, pose.position.z = (float(v) for v in position)
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = (float(v) for v in quaternion)
+    return pose
+
+
+def stamped_in_scene(scene: PlanningScene, stamped: PoseStamped, where: str) -> Transform:
+    """Returns a stamped pose in the planning frame; raises PlanningError for an unknown frame or bad numbers."""
+    return scene.frame_transform(stamped.header.frame_id) * transform_from_pose(stamped.pose, where)
