@@ -265,7 +265,7 @@ class GoalWithoutRobot(InteractiveGoal):
         self._job = WatchedLock()
         self.awaited = self._job.awaited
         self.said: list[str] = []
-        self._tell = self.said.append
+        self._set_status = self.said.append
 
 
 def test_a_job_begins_when_the_one_before_has_said_its_last_word_and_not_while_it_works() -> None:

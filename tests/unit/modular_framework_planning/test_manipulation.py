@@ -70,8 +70,8 @@ def test_a_direction_turns_with_the_hand_only_in_a_frame_fixed_to_it(scene: Plan
 
 
 def test_no_direction_is_fine_only_for_no_distance(scene: PlanningScene) -> None:
-    assert translation(scene, moving(0, 0, 0, "", 0.0, 0.0), "ee_link", "retreat").wished_m == 0.0
-    assert translation(scene, moving(0, 0, 1, "world", 0.0, 0.2), "ee_link", "retreat").wished_m == 0.2
+    assert translation(scene, moving(0, 0, 0, "", 0.0, 0.0), "ee_link", "retreat").desired_distance_m == 0.0
+    assert translation(scene, moving(0, 0, 1, "world", 0.0, 0.2), "ee_link", "retreat").desired_distance_m == 0.2
     for bad in (moving(0, 0, 0, "world"), moving(0, 0, np.nan, "world"), moving(0, 0, 1, "world", -1.0, 0.0),
                 moving(0, 0, 1, "world", np.inf, 0.0), moving(0, 0, 1, "world", 0.1, -0.1)):
         with pytest.raises(PlanningError, match="retreat"):

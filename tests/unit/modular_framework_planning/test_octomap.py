@@ -27,7 +27,7 @@ NOTHING = np.empty((0, 3))
 def looked() -> VoxelMap:
     voxels = empty_map(REFERENCE["resolution"])
     for look in REFERENCE["looks"]:
-        voxels = voxels.with_look(np.array(look["origin"]), np.array(look["points"]), NOTHING, NOTHING)
+        voxels = voxels.with_point_cloud(np.array(look["origin"]), np.array(look["points"]), NOTHING, NOTHING)
     return voxels
 
 
@@ -106,22 +106,22 @@ def test_files_that_are_no_maps_are_refused(tmp_path: Path, content: bytes, text
 
 def test_a_ray_clears_what_it_goes_through_and_repeated_looks_win() -> None:
     origin, wall, behind = np.zeros(3) + 0.01, np.array([[1.0, 0.02, 0.03]]), np.array([[2.0, 0.04, 0.06]])
-    voxels = empty_map(0.1).with_look(origin, wall, NOTHING, NOTHING)
+    voxels = empty_map(0.1).with_point_cloud(origin, wall, NOTHING, NOTHING)
     assert voxels.value_at(wall[0]) > 0.0 > voxels.value_at(wall[0] / 2)
     assert voxels.value_at(behind[0]) is None
     for _ in range(3):
-        voxels = voxels.with_look(origin, behind, NOTHING, NOTHING)
+        voxels = voxels.with_point_cloud(origin, behind, NOTHING, NOTHING)
     assert voxels.value_at(wall[0]) < 0.0, "three looks through it against one that saw it"
-    assert voxels.with_look(origin, NOTHING, behind, NOTHING).value_at(behind[0]) < 0.0, "robot: free at once"
-    assert voxels.with_look(origin, NOTHING, NOTHING, 2 * behind).value_at(behind[0]) == pytest.approx(
+    assert voxels.with_point_cloud(origin, NOTHING, behind, NOTHING).value_at(behind[0]) < 0.0, "robot: free at once"
+    assert voxels.with_point_cloud(origin, NOTHING, NOTHING, 2 * behind).value_at(behind[0]) == pytest.approx(
         voxels.value_at(behind[0]) - 0.405, abs=1e-3), "rays that end beyond the range clear"
 
 
 def test_points_beyond_the_tree_are_left_out_and_a_sensor_there_is_refused() -> None:
     far = np.array([[1.0e9, 0.0, 0.0], [np.nan, 0.0, 0.0]])
-    assert len(empty_map(0.1).with_look(np.zeros(3), far, NOTHING, NOTHING).keys) == 0
+    assert len(empty_map(0.1).with_point_cloud(np.zeros(3), far, NOTHING, NOTHING).keys) == 0
     with pytest.raises(GeometryError, match="reaches 3277 m"):
-        empty_map(0.1).with_look(far[0], NOTHING, NOTHING, NOTHING)
+        empty_map(0.1).with_point_cloud(far[0], NOTHING, NOTHING, NOTHING)
     with pytest.raises(GeometryError, match="resolution"):
         empty_map(0.0)
 
@@ -132,7 +132,8 @@ def test_points_beyond_the_tree_are_left_out_and_a_sensor_there_is_refused() -> 
 @pytest.mark.parametrize("margin", [0.0, 0.03])
 def test_the_octree_touches_what_one_of_its_cubes_touches(geometry: object, margin: float) -> None:
     rng = np.random.default_rng(3)
-    octree = Octree(empty_map(0.05).with_look(np.full(3, 2.0), rng.uniform(-0.3, 0.3, (100, 3)), NOTHING, NOTHING))
+    points = rng.uniform(-0.3, 0.3, (100, 3))
+    octree = Octree(empty_map(0.05).with_point_cloud(np.full(3, 2.0), points, NOTHING, NOTHING))
     cube, here = coal.Box(0.05, 0.05, 0.05), coal.Transform3s.Identity()
     request, verdicts = coal.CollisionRequest(), []
     request.security_margin = margin

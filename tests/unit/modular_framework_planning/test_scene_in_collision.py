@@ -92,7 +92,8 @@ def test_a_held_object_keeps_its_own_margin(scene: PlanningScene) -> None:
 
 def test_voxels_are_obstacles_that_an_entry_for_the_octomap_allows(scene: PlanningScene) -> None:
     wrist = scene.model.link_transforms(scene.positions)["wrist_2_link"].translation
-    seen = empty_map(0.05).with_look(np.zeros(3) + 3.0, wrist[None] + np.array([[0.0, 0.0, 0.0]]), NOTHING, NOTHING)
+    points = wrist[None] + np.array([[0.0, 0.0, 0.0]])
+    seen = empty_map(0.05).with_point_cloud(np.zeros(3) + 3.0, points, NOTHING, NOTHING)
     blocked = scene.with_octomap(Octree(seen))
     assert not is_free(blocked)
     names = {name for item in CollisionChecker(blocked).contacts(blocked.positions)
@@ -114,7 +115,7 @@ CUBE = trimesh.creation.box((0.05, 0.05, 0.05))
 
 @pytest.mark.parametrize("thing", [
     Box(0.05, 0.05, 0.05), Sphere(0.03), Mesh(np.asarray(CUBE.vertices), np.asarray(CUBE.faces, dtype=np.int64)),
-    Octree(empty_map(0.05).with_look(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING))],
+    Octree(empty_map(0.05).with_point_cloud(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING))],
     ids=lambda item: type(item).__name__)
 def test_a_thing_wholly_inside_a_link_that_is_a_box_collides(thing: Shape) -> None:
     scene = empty_scene(RobotModel(BOX_LINK_URDF, BOX_LINK_SRDF, {}, lambda name: name))

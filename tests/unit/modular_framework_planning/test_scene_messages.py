@@ -260,7 +260,7 @@ def test_padding_and_scale_are_margins_that_never_fall_short(scene: Scene) -> No
 
 def voxels(seed: int) -> VoxelMap:
     points = np.random.default_rng(seed).uniform(-1, 1, (50, 3))
-    return empty_map(0.1).with_look(np.zeros(3), points, np.empty((0, 3)), np.empty((0, 3)))
+    return empty_map(0.1).with_point_cloud(np.zeros(3), points, np.empty((0, 3)), np.empty((0, 3)))
 
 
 def test_an_octomap_comes_and_goes_in_both_encodings(scene: Scene) -> None:

@@ -47,7 +47,7 @@ class PlanningError(Exception):
     """Base of the package's errors.
 
     Attributes:
-        code: what the caller on the wire is told.
+        code: the result code in the answer on the wire.
         reason: where, what was got, what was allowed and what to do.
         contacts: what touches, where that is the reason.
     """

@@ -22,7 +22,7 @@ from modular_framework_planning.kinematics.pose_follower import PoseFollower
 LONGEST_STEP_M = 0.01  # a longer max_step is followed in steps of this length
 RADIANS_PER_METRE = 3.5  # a step of 0.01 m may turn by 0.035 rad, as in MoveIt
 MOST_STEPS = 50_000  # of one request
-FEWEST_STEPS_FOR_MEAN = 10  # of a line, where a jump is told by the mean step
+FEWEST_STEPS_FOR_MEAN = 10  # of a line, where a jump is judged by the mean step
 
 Objection = Callable[[Array, Array], str]
 
@@ -75,7 +75,7 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
     Args:
         checker: of the scene.
         motion: of the group.
-        step: between two looked-at states [rad or m].
+        step: between two checked states [rad or m].
     """
 
     def objection(before: Array, after: Array) -> str:
@@ -100,7 +100,7 @@ def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints:
         waypoints: poses in the planning frame of what follows the lines.
         max_step_m: longest step [m].
         jumps: what counts as a jump.
-        objection: told the joint values before and after each step; says why it is not allowed, or nothing.
+        objection: takes the joint values before and after each step; returns why it is not allowed, or nothing.
         carried: pose, in the link's frame, of what follows the lines (a held object); None: the link itself does.
 
     Raises:

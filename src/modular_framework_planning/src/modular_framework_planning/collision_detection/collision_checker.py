@@ -32,15 +32,15 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may look through numerical noise
-EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can tell about
+DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may seem through numerical noise
+EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can decide
 
 
 class CollisionChecker:
     """Checks states and paths of the robot in one snapshot of the scene.
 
     Not for use from two threads at a time: it holds the working memory of the check. Pairs whose relative pose the
-    given joints cannot change are looked at once, in `fixed_contacts`.
+    given joints cannot change are checked once, in `fixed_contacts`.
     """
 
     def __init__(self, scene: PlanningScene, moving: Joints = None, tolerated: Sequence[Contact] = ()) -> None:
@@ -74,13 +74,14 @@ class CollisionChecker:
     def _compiled(self) -> CompiledWorld:
         return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
 
-    def build(self, go_on: Callable[[], None]) -> None:
+    def build(self, check_interrupt: Callable[[], None]) -> None:
         """Builds now what the first question would build: seconds for 100,000 triangles.
 
         Args:
-            go_on: called between shapes; raises an exception to end the work. What was built is kept.
+            check_interrupt: called between shapes; raises an exception to stop. What was built is kept.
         """
-        self._compiled = compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving], go_on)
+        pairs = [self._pairs[number] for number in self._moving]
+        self._compiled = compile_world(self.model, self._parts, pairs, check_interrupt)
 
     @property
     def world(self) -> World:
@@ -107,7 +108,7 @@ class CollisionChecker:
         return self._colliding_sample(np.ascontiguousarray(vertices, dtype=float), step, first)[0] < 0
 
     def colliding_state(self, vertices: Array, step: float) -> Array | None:
-        """Returns a colliding sample along straight pieces, as path_is_free looks at them, or None."""
+        """Returns a colliding sample along straight pieces, at the samples of path_is_free, or None."""
         path = np.ascontiguousarray(vertices, dtype=float)
         number, numbers = self._colliding_sample(path, step, 0)
         return sample_at(path, numbers, number) if number >= 0 else None
@@ -151,7 +152,7 @@ class CollisionChecker:
     def contacts(self, positions: Array, include_fixed: bool = True) -> list[Contact]:
         """Returns every pair that touches, the deepest contact of each, deepest pair first.
 
-        A body wholly inside another one, touching none of its surface, is told only where no other pair touches.
+        A body wholly inside another one, touching none of its surface, is reported only where no other pair touches.
         """
         numbers = [number for number, pair in enumerate(self._pairs) if include_fixed or not pair.is_fixed]
         found = [contact for number, contact in self._exact.contacts(positions, numbers)
@@ -166,8 +167,8 @@ class CollisionChecker:
         pair = self._pairs[inner]
         first, second = self._parts[pair.first], self._parts[pair.second]
         depth = self._exact.distance(positions, [inner])
-        place = self._exact.position(positions, pair.second)
-        return [Contact(first.body, second.body, depth, place, np.zeros(3))]
+        position = self._exact.position(positions, pair.second)
+        return [Contact(first.body, second.body, depth, position, np.zeros(3))]
 
     def fixed_contacts(self, positions: Array) -> list[Contact]:
         """Returns contacts of watched pairs the moving joints cannot change."""

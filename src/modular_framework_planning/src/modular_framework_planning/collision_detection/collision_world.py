@@ -52,7 +52,16 @@ class CompiledWorld:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Member:
-    """One body of the arrays: its bounding geometry, where it hangs, and where its surface begins."""
+    """One body of the arrays.
+
+    Attributes:
+        shape: its bounding geometry.
+        joint: index of the joint that moves it, -1 for the world.
+        pose: in the joint's frame, shape (3, 4).
+        root: node at which its surface begins, -1 for none.
+        is_environment: whether the surface is in the arrays of the scene and not in those of the robot.
+        sphere: centre in the body's frame and radius [m] of a sphere around it.
+    """
 
     shape: BoundingGeometry
     joint: int
@@ -83,10 +92,10 @@ def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple
     flat = [shapes[number].surface for group in groups for number in group]
     surfaces, roots = stacked([item for item in flat if item is not None])
     spheres, boxes, links = list(surfaces.spheres), list(surfaces.boxes), list(surfaces.links)
-    result, place = [], 0
+    result, begin = [], 0
     for group in groups:
-        result.append(_joined(spheres, boxes, links, roots[place:place + len(group)]))
-        place += len(group)
+        result.append(_joined(spheres, boxes, links, roots[begin:begin + len(group)]))
+        begin += len(group)
     return Surfaces(np.array(spheres).reshape(-1, 4), np.array(boxes).reshape(-1, 15),
                     np.array(links, dtype=np.int32).reshape(-1, 2), surfaces.triangles), tuple(result)
 
@@ -111,7 +120,7 @@ def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots:
 
 
 def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> Grouping:
-    """Puts links together that hang on one joint, have surfaces and watch the same bodies at the same distance."""
+    """Groups links that one joint moves, that have surfaces and are checked against the same bodies at one distance."""
     partners: dict[int, set[tuple[int, float]]] = {}
     for pair in pairs:
         partners.setdefault(pair.first, set()).add((pair.second, pair.margin))
@@ -123,32 +132,32 @@ def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[
     return tuple(tuple(group) for group in groups.values())
 
 
-def _go_on() -> None:
-    """Lets a world be built however long that takes."""
+def _never_interrupt() -> None:
+    """Lets the work go on however long it takes."""
 
 
 def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
-                  go_on: Callable[[], None] = _go_on) -> CompiledWorld:
+                  check_interrupt: Callable[[], None] = _never_interrupt) -> CompiledWorld:
     """Builds the arrays. What was built for a shape is kept as long as the shape.
 
     Args:
         model: the robot.
         parts: geometries of the scene, the model's links first.
         pairs: the pairs to watch; those that no joint moves should not be among them.
-        go_on: called between shapes; raises an exception to end the work.
+        check_interrupt: called between shapes; raises an exception to stop.
     """
     groups = _groups(model, parts, pairs)
     robot, roots = _link_surfaces(model, groups)
-    members, place = _link_members(model, parts, groups, robot, roots)
-    scene = _add_others(model, parts, pairs, members, place, go_on)
+    members, member_of = _link_members(model, parts, groups, robot, roots)
+    scene = _add_others(model, parts, pairs, members, member_of, check_interrupt)
     found: dict[tuple[int, int, float], list[int]] = {}
     uncompiled = []
-    orders: dict[tuple[int, int], tuple[int, int] | None] = {}
+    ordered_pairs: dict[tuple[int, int], tuple[int, int] | None] = {}
     for number, pair in enumerate(pairs):
-        both = place[pair.first], place[pair.second]
-        if both not in orders:
-            orders[both] = _ordered(members, *both)
-        ordered = orders[both]
+        both = member_of[pair.first], member_of[pair.second]
+        if both not in ordered_pairs:
+            ordered_pairs[both] = _ordered(members, *both)
+        ordered = ordered_pairs[both]
         if ordered is None:
             uncompiled.append(number)
         else:
@@ -166,32 +175,32 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
 
 def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Grouping, robot: Surfaces,
                   roots: Sequence[int]) -> tuple[list[_Member], dict[int, int]]:
-    members, place = [], {}
+    members, member_of = [], {}
     for group, root in zip(groups, roots, strict=True):
         shapes = [_link_bounding_geometries(model)[number] for number in group]
         closed = all(shape.is_closed for shape in shapes)
         shape = BoundingGeometry(None, is_closed=closed)
         members.append(_Member(shape, parts[group[0]].joint_id - 1, np.eye(4)[:3], root, False, robot.spheres[root]))
-        place.update(dict.fromkeys(group, len(members) - 1))
-    return members, place
+        member_of.update(dict.fromkeys(group, len(members) - 1))
+    return members, member_of
 
 
 def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
-                members: list[_Member], place: dict[int, int], go_on: Callable[[], None]) -> Surfaces:
+                members: list[_Member], member_of: dict[int, int], check_interrupt: Callable[[], None]) -> Surfaces:
     """Appends links in closed form, held objects and the world; returns the surfaces they need."""
     links = _link_bounding_geometries(model)
     watched = {number for pair in pairs for number in (pair.first, pair.second)}
-    others = [number for number in sorted(watched) if number not in place]
+    others = [number for number in sorted(watched) if number not in member_of]
     shapes = []
     for number in others:
         shapes.append(links[number] if number < len(links) else bounding_geometry_of(parts[number]))
-        go_on()
+        check_interrupt()
     wanted = _with_surface(dict(zip(others, shapes, strict=True)), parts, pairs)
     found = []
     for number, shape in zip(others, shapes, strict=True):
         if number in wanted and shape.surface is not None:
             found.append(shape)
-            go_on()
+            check_interrupt()
     surfaces, roots = _scene_surfaces(tuple(found))
     remaining = iter(roots)
     for number, shape in zip(others, shapes, strict=True):
@@ -199,7 +208,7 @@ def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seque
         sphere = np.array([0.0, 0.0, 0.0, shape.radius]) if root < 0 else (
             surfaces.spheres[root] + [0, 0, 0, shape.inflation_radius])
         pose = (parts[number].placement * shape.offset).homogeneous[:3]
-        place[number] = len(members)
+        member_of[number] = len(members)
         members.append(_Member(shape, parts[number].joint_id - 1, pose, root, True, sphere))
     return surfaces
 
@@ -215,8 +224,8 @@ def _with_surface(shapes: Mapping[int, BoundingGeometry], parts: Sequence[Placed
                   pairs: Sequence[WatchedPair]) -> set[int]:
     """Returns which bodies are checked by their surface.
 
-    A solid of the world against a body whose surface is its own is checked in closed form. Its triangles would not be
-    looked at, and to build a tree over them takes longer than many plans.
+    A solid of the world against a body whose surface is exact is checked in closed form. Its triangles would not be
+    used, and building a tree over them takes longer than many plans.
     """
     plain = {number for number, shape in shapes.items()
              if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_is_exact}
@@ -241,7 +250,7 @@ def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, 
 
 
 def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
-    """Returns roots and joints (one or two) of a pair of links, where one hangs on the other, or None."""
+    """Returns roots and joints (one or two) of a pair of links where one link moves the other, or None."""
     first, second = (int(number) for number in world.pairs[pair])
     if world.joints[first] > world.joints[second]:
         first, second = second, first

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks Coal whether single pairs of bodies touch, and how deep: exact geometry, one pair at a time."""
+"""Checks single pairs of bodies with Coal, on their exact geometry: whether they touch, and how deep."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
@@ -15,21 +15,27 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 ROUNDING = 1.0e-9  # [m]
-MOST_CONTACTS = 20  # of a pair, among which the deepest is told
+MOST_CONTACTS = 20  # of a pair, of which the deepest is reported
 
 
 class ExactCollision:
-    """Coal's verdicts on the watched pairs; not for two threads at a time: it holds the poses of one state."""
+    """Coal's results for the watched pairs; not for two threads at a time: it holds the poses of one state."""
 
     def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> None:
-        """Args: the robot, the geometries of a scene, the pairs (told by their numbers from now on)."""
+        """Stores what to check.
+
+        Args:
+            model: the robot.
+            parts: geometries of a scene.
+            pairs: of those geometries; the methods below take their indices.
+        """
         self._model, self._parts, self._pairs = model, parts, pairs
         self._data = model.pin_model.createData()
         self._poses: dict[int, Any] = {}
         self._balls: dict[int, tuple[Array, float]] = {}
         self._at: Array | None = None
 
-    def _place(self, positions: Array) -> None:
+    def _update_poses(self, positions: Array) -> None:
         if self._at is None or not np.array_equal(positions, self._at):
             pin.forwardKinematics(self._model.pin_model, self._data, positions)
             self._poses.clear()
@@ -43,7 +49,7 @@ class ExactCollision:
         return self._poses[number]
 
     def _is_far(self, number: int) -> bool:
-        """Whether balls around both bodies are apart: then Coal need not build or ask anything."""
+        """Whether the bounding spheres are apart: then Coal need not build its tree of a mesh."""
         pair = self._pairs[number]
         (one, radius), (other, reach) = (self._ball(which) for which in (pair.first, pair.second))
         return float(np.linalg.norm(one - other)) > radius + reach + pair.margin + ROUNDING
@@ -65,13 +71,13 @@ class ExactCollision:
 
     def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
         """Whether any of the pairs touches at these positions (of the whole robot)."""
-        self._place(positions)
+        self._update_poses(positions)
         return any(not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
                    for number in numbers)
 
     def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
         """Returns those of the pairs that touch, each with its deepest contact."""
-        self._place(positions)
+        self._update_poses(positions)
         found = []
         for number in numbers:
             if self._is_far(number):
@@ -95,12 +101,12 @@ class ExactCollision:
 
     def position(self, positions: Array, number: int) -> Array:
         """Returns where a geometry's own frame has its origin in the planning frame [m]."""
-        self._place(positions)
+        self._update_poses(positions)
         return np.array(self._pose(number).getTranslation())
 
     def distance(self, positions: Array, numbers: Iterable[int]) -> float:
         """Returns the smallest distance [m] of the pairs, 0 or less where they touch."""
-        self._place(positions)
+        self._update_poses(positions)
         return min((coal.distance(self._parts[pair.first].geometry, self._pose(pair.first),
                                   self._parts[pair.second].geometry, self._pose(pair.second),
                                   coal.DistanceRequest(), coal.DistanceResult())

@@ -13,7 +13,13 @@ class MotionChecker:
     """Answers for joint vectors of one group while the rest of the robot stays at given positions."""
 
     def __init__(self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array) -> None:
-        """Args: the checker to ask; indices of the group's joints; positions of the whole robot for all others."""
+        """Stores what to check.
+
+        Args:
+            checker: of the scene.
+            indices: of the group's joints.
+            rest: positions of the whole robot, for all other joints [rad or m].
+        """
         self._checker = checker
         self._indices = indices
         self._rest = np.array(rest, dtype=float)
@@ -38,7 +44,7 @@ class MotionChecker:
     def edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         """Whether the straight motion is free at samples at most `step` [rad or m, any joint] apart.
 
-        The start itself is not looked at, the end is.
+        The end is checked, the start is not.
         """
         if self._members:
             return self._checker.path_is_free(self.full_path(np.array([start, end])), step, 1)

@@ -75,7 +75,7 @@ class KinematicConstraints:
 
     @property
     def is_loose(self) -> bool:
-        """Whether quite different states satisfy, so that looking around the middle of the tolerances pays."""
+        """Whether quite different states satisfy, so that sampling around the middle of the tolerances pays."""
         return (any(solid.extent > LOOSE for item in self.positions for solid, _ in item.regions)
                 or any(float(item.tolerances.max()) > LOOSE for item in self.orientations))
 

@@ -134,7 +134,7 @@ class ConeSolid:
         return float(np.hypot(0.5 * self.height, self.radius))
 
     def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the cone, looked for in the triangle that makes the cone by turning."""
+        """Returns the nearest point of the cone: that of the triangle whose rotation makes the cone."""
         at = np.array([float(np.hypot(point[0], point[1])), float(point[2])])
         base, tip = np.array([self.radius, -0.5 * self.height]), np.array([0.0, 0.5 * self.height])
         side = tip - base

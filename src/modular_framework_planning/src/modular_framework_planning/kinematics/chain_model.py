@@ -56,18 +56,18 @@ def with_ball_joint(chain: Chain, joint: Array, width: int) -> Chain:
 
 
 class ChainModel:
-    """The way from the planning frame to the last link of a group."""
+    """The kinematic chain from the planning frame to the last link of a group."""
 
     def __init__(self, model: RobotModel, group: JointGroup, last_link: str) -> None:
         """Args: the robot, the group whose joints move the chain, the link at its end."""
         frame = model.pin_model.frames[model.frame_ids[last_link]]
         path = [int(number) for number in model.pin_model.supports[frame.parentJoint] if number > 0]
         self.positions = np.array([number - 1 for number in path], dtype=np.int64)  # indices in a position vector
-        column = {int(number): place for place, number in enumerate(group.indices)}
+        column = {int(number): index for index, number in enumerate(group.indices)}
         followers = {follower: (leader, gain, offset) for follower, leader, gain, offset in model.mimics}
         drivers, gains, offsets = [], [], []
-        for place in self.positions.tolist():
-            leader, gain, offset = followers.get(place, (place, 1.0, 0.0))
+        for index in self.positions.tolist():
+            leader, gain, offset = followers.get(index, (index, 1.0, 0.0))
             drivers.append(column.get(leader, -1))
             gains.append(gain)
             offsets.append(offset)

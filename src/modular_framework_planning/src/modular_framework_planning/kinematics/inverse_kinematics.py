@@ -54,7 +54,7 @@ class InverseKinematics:
         self.base_link = model.document.joint_parents[group.joints[0]]
         self._chain = ChainModel(model, group, self._last_link)
         self._turning = np.array([model.document.joint_kinds[name] != "prismatic" for name in group.joints])
-        self._endless = np.array([model.is_continuous(int(number)) for number in group.indices])
+        self._is_continuous = np.array([model.is_continuous(int(number)) for number in group.indices])
         self._closed = self._try_closed_form()
         self.reach = self._max_reach()
 
@@ -112,7 +112,7 @@ class InverseKinematics:
             target: pose of the link in the planning frame.
             seed: positions of the whole robot [rad or m]; joints outside the group stay there.
             timeout_s: time the search may take where there is no closed form; the group's by default. With
-                math.inf the clock is not looked at, and the numbers of tries alone bound the search.
+                math.inf only the numbers of tries bound the search.
             rng: source of restarts of the numeric search.
         """
         problem = self._problem(target * self.tip_offset(tip_link), seed, timeout_s)
@@ -147,14 +147,14 @@ class InverseKinematics:
         """Returns the bounds of the group's joints; those without ends get three turns around the seed."""
         values = seed[self.group.indices]
         lower, upper = self.model.lower[self.group.indices], self.model.upper[self.group.indices]
-        return (np.where(self._endless, values - 3.0 * np.pi, lower),
-                np.where(self._endless, values + 3.0 * np.pi, upper))
+        return (np.where(self._is_continuous, values - 3.0 * np.pi, lower),
+                np.where(self._is_continuous, values + 3.0 * np.pi, upper))
 
     def _from_closed_form(self, problem: _Problem) -> Array:
         """Returns the closed form's solutions within bounds, whole turns included, shape (k, joints)."""
         if self._closed is None:
             return np.empty((0, len(self.group.joints)))
-        base = self.model.link_transforms(problem.whole_seed)[self.base_link] if not self._chain.is_own else (
+        base = self.model.link_transforms(problem.full_seed)[self.base_link] if not self._chain.is_own else (
             self._fixed_base())
         in_base = base.actInv(problem.target)
         if self._closed.locked is None:
@@ -178,7 +178,7 @@ class InverseKinematics:
         assert self._closed is not None and self._closed.locked is not None
         number = self._closed.locked
         at, low, high = problem.seed[number], problem.lower[number], problem.upper[number]
-        if self._endless[number]:
+        if self._is_continuous[number]:
             low, high = at - np.pi, at + np.pi
         grid = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
         return np.append(grid, np.clip(at, low, high))
@@ -222,9 +222,9 @@ class InverseKinematics:
         rows = found[np.argsort(np.linalg.norm(found - problem.seed, axis=1), kind="stable")]
         if rows.shape[1] > 6:
             rows = self._approached(problem, rows)[:, :len(self.group.joints)]
-            ways = np.linalg.norm(rows - problem.seed[:rows.shape[1]], axis=1)
-            rows = rows[np.argsort(ways, kind="stable")]
-        result = np.tile(problem.whole_seed, (len(rows), 1))
+            distances = np.linalg.norm(rows - problem.seed[:rows.shape[1]], axis=1)
+            rows = rows[np.argsort(distances, kind="stable")]
+        result = np.tile(problem.full_seed, (len(rows), 1))
         result[:, self.group.indices] = rows
         for follower, leader, multiplier, offset in self.model.mimics:
             if leader in self._members:
@@ -263,7 +263,7 @@ class _Problem:
 
     chain: Chain
     target: Transform
-    whole_seed: Array
+    full_seed: Array
     seed: Array
     lower: Array
     upper: Array

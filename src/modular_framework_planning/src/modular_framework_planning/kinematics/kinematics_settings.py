@@ -54,14 +54,14 @@ def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSetti
                 float(entry.get("kinematics_solver_search_resolution", default.search_resolution)),
                 float(entry.get("kinematics_solver_timeout", default.timeout_s)),
                 int(entry.get("kinematics_solver_attempts", default.attempts)),
-                _yes(entry.get("position_only_ik", default.position_only)))
+                _bool(entry.get("position_only_ik", default.position_only)))
         except (TypeError, ValueError) as error:
             raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
                                 "needed, and for position_only_ik true or false") from error
     return result
 
 
-def _yes(value: object) -> bool:
+def _bool(value: object) -> bool:
     if not isinstance(value, bool):
         raise ValueError(f"position_only_ik is {value!r}")
     return value

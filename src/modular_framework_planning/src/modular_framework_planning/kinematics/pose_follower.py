@@ -22,7 +22,7 @@ POSE_TOLERANCE = 1.0e-9  # [m] and [rad] together
 ACCEPTED_ERROR = 1.0e-7  # where rounding keeps Newton's method from the tolerance above
 NEWTON_STEPS = 25
 MAX_JUMP = 0.3  # [rad or m] between a step's guess and its solution
-MAX_WAY = 1.5  # [rad or m] Newton's method may go before it is given up
+MAX_TRAVEL = 1.5  # [rad or m] Newton's method may go before it is given up
 BOUND_TOLERANCE = 1.0e-6
 
 
@@ -129,7 +129,7 @@ class PoseFollower:
                 return values
             damping = min(1.0e-4, size * size) * np.eye(6)
             values = values + jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
-            if float(np.abs(values - guess).max()) > MAX_WAY:
+            if float(np.abs(values - guess).max()) > MAX_TRAVEL:
                 return None
         return values if size < ACCEPTED_ERROR else None
 

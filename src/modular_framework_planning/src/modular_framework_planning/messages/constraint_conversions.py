@@ -74,13 +74,13 @@ def evaluated_one_by_one(scene: PlanningScene, message: Any, where: str,
     results, faults = [], []
     for kind in ("joint", "position", "orientation", "visibility"):
         for number, item in enumerate(getattr(message, f"{kind}_constraints")):
-            place = f"{where}.{kind}_constraints[{number}]"
+            source = f"{where}.{kind}_constraints[{number}]"
             try:
                 alone = constraints_from_message(scene, Constraints(**{f"{kind}_constraints": [item]}), where, tip=tip)
                 results += alone.evaluate(scene.positions)
             except PlanningError as error:
-                reason = error.reason.replace(f"{where}.{kind}_constraints[0]", place)
-                faults.append(reason if place in reason else f"{place}: {reason}")
+                reason = error.reason.replace(f"{where}.{kind}_constraints[0]", source)
+                faults.append(reason if source in reason else f"{source}: {reason}")
                 name = getattr(item, f"{'joint' if kind == 'joint' else 'link'}_name", "")
                 results.append(ConstraintResult(kind, name, False, np.inf, faults[-1]))
     return results, faults
@@ -177,8 +177,8 @@ class _Reader:
                 raise PlanningError(self._code, f"{where}: {len(shapes)} {kind} shapes and {len(poses)} poses; one "
                                     "pose a shape is needed")
             for number, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
-                place = f"{where} {kind} {number}"
-                regions.append((self._solid(shape, place), self._region_pose(shape, pose, place)))
+                source = f"{where} {kind} {number}"
+                regions.append((self._solid(shape, source), self._region_pose(shape, pose, source)))
         if not regions:
             raise PlanningError(self._code, f"{where} is empty; give at least one primitive or mesh with its pose")
         return tuple(regions)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns a planned trajectory into what single controllers are told: checked, cut by joints, at another speed."""
+"""Turns a planned trajectory into the goals of single controllers: checked, split by joints, at another speed."""
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence

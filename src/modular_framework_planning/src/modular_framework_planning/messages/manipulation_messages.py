@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the messages of pickup and place into manoeuvres; every fault of a message is an error with its place."""
+"""Reads the messages of pickup and place into manoeuvres; every fault of a message is an error that names the field."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -40,24 +40,25 @@ def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Tr
     """
     vector = message.direction.vector
     direction = np.array([vector.x, vector.y, vector.z], dtype=float)
-    wished, least = float(message.desired_distance), float(message.min_distance)
-    if not (np.isfinite(direction).all() and np.isfinite([wished, least]).all() and least >= 0.0 and wished >= 0.0):
+    desired, minimum = float(message.desired_distance), float(message.min_distance)
+    distances = np.array([desired, minimum])
+    if not (np.isfinite(direction).all() and np.isfinite(distances).all() and (distances >= 0.0).all()):
         raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: direction {direction.tolist()}, "
-                            f"desired_distance {wished}, min_distance {least}; finite numbers are needed, distances of "
-                            "at least 0")
-    wished = max(wished, least)
+                            f"desired_distance {desired}, min_distance {minimum}; finite numbers are needed, distances "
+                            "of at least 0")
+    desired = max(desired, minimum)
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
-        if wished > 0.0:
+        if desired > 0.0:
             raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: the direction is zero but "
-                                f"{wished} m are asked for; give a direction")
+                                f"{desired} m are asked for; give a direction")
         return Translation(np.array([0.0, 0.0, 1.0]), False, 0.0, 0.0)
     frame = message.direction.header.frame_id.removeprefix("/")
     turn = scene.frame_transform(frame).rotation
     in_link = scene.model.has_link(frame) and _rigid(scene, frame, link)
     if in_link:
         turn = scene.frame_transform(link).rotation.T @ turn
-    return Translation(turn @ direction / length, in_link, wished, least)
+    return Translation(turn @ direction / length, in_link, desired, minimum)
 
 
 def _rigid(scene: PlanningScene, first: str, second: str) -> bool:
@@ -77,9 +78,9 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
     if not message.joint_names:
         return {}
     known = hand.joints | hand.mimics.keys()
-    foreign = [name for name in message.joint_names if name not in known]
-    if foreign:
-        raise UnknownNameError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint of the end effector", foreign[0],
+    unknown = [name for name in message.joint_names if name not in known]
+    if unknown:
+        raise UnknownNameError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint of the end effector", unknown[0],
                                known)
     points = message.points
     values = list(points[-1].positions) if points else []

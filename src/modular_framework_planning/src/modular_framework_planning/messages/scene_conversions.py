@@ -66,9 +66,9 @@ def _shapes(message: Any, where: str) -> tuple[tuple[Shape, Transform], ...]:
         if len(poses) > len(items):
             raise GeometryError(f"{where}: {len(items)} {kind} shapes and {len(poses)} poses; one pose a shape")
         for number, item in enumerate(items):
-            place = f"{where} {kind} {number}"
-            pose = _transform(poses[number], place) if number < len(poses) else pin.SE3.Identity()
-            result.append((build(item, place), pose))
+            source = f"{where} {kind} {number}"
+            pose = _transform(poses[number], source) if number < len(poses) else pin.SE3.Identity()
+            result.append((build(item, source), pose))
     return tuple(result)
 
 
@@ -115,11 +115,11 @@ def _moved(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
     where = f"collision object '{message.id}'"
     scene.find_object(message.id)
     pose = _object_pose(scene, message, where)
-    places = [_transform(item, f"{where} shape {number}") for number, item in enumerate(
+    shape_poses = [_transform(item, f"{where} shape {number}") for number, item in enumerate(
         (*message.primitive_poses, *message.mesh_poses, *message.plane_poses))]
-    if len(places) == 1 and _is_unset(message.pose):  # as in ADD: the only shape says where the object is
-        pose, places = pose * places[0], [pin.SE3.Identity()]
-    return scene.with_object_moved(message.id, pose, places)
+    if len(shape_poses) == 1 and _is_unset(message.pose):  # as in ADD: the only shape says where the object is
+        pose, shape_poses = pose * shape_poses[0], [pin.SE3.Identity()]
+    return scene.with_object_moved(message.id, pose, shape_poses)
 
 
 def apply_attached_object(scene: PlanningScene, message: AttachedCollisionObject) -> PlanningScene:

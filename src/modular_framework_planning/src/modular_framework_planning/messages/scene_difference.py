@@ -19,7 +19,7 @@ from modular_framework_planning.messages.scene_conversions import (
 from modular_framework_planning.messages.scene_messages import scene_message, write_padding
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-STATE_CHANGE = 1.0e-4  # [rad or m]; smaller changes of a joint are not told
+STATE_CHANGE = 1.0e-4  # [rad or m]; smaller changes of a joint are not published
 
 
 def joints_moved(before: PlanningScene, after: PlanningScene) -> bool:
@@ -42,7 +42,7 @@ def difference_message(before: PlanningScene, after: PlanningScene) -> SceneMess
     message.robot_state.is_diff = empty.robot_state.is_diff = True
     if joints_moved(before, after):
         message.robot_state.joint_state = state_message(after, with_attached=False).joint_state
-    if any(before.fixed_frames.get(name) is not place for name, place in after.fixed_frames.items()):
+    if any(before.fixed_frames.get(name) is not transform for name, transform in after.fixed_frames.items()):
         message.fixed_frame_transforms = frames_to_message(after)
     if before.acm is not after.acm:
         write_matrix(after.acm, message.allowed_collision_matrix)

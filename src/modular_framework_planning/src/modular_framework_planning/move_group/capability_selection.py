@@ -40,13 +40,13 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[Callable[[MoveGroup
 
     An unknown name is a warning with the list of those that are known, as in MoveIt.
     """
-    wanted = [(rospy.resolve_name("~capabilities"), name) for name in _words(rospy.get_param("~capabilities", ""))]
+    wanted = [(rospy.resolve_name("~capabilities"), name) for name in _split(rospy.get_param("~capabilities", ""))]
     for pipeline, settings in (rospy.get_param(PIPELINES, {}) or {}).items():
         if isinstance(settings, dict):
             wanted += [(rospy.resolve_name(f"{PIPELINES}/{pipeline}/capabilities"), name)
-                       for name in _words(settings.get("capabilities", ""))]
+                       for name in _split(settings.get("capabilities", ""))]
     disabled = [(rospy.resolve_name("~disable_capabilities"), name)
-                for name in _words(rospy.get_param("~disable_capabilities", ""))]
+                for name in _split(rospy.get_param("~disable_capabilities", ""))]
     known = list(dict.fromkeys(item.name for item in table))
     for where, name in (*wanted, *disabled):
         if name not in known:
@@ -55,6 +55,6 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[Callable[[MoveGroup
     return [item.build for item in table if (item.default or item.name in added) and item.name not in dropped]
 
 
-def _words(value: object) -> list[str]:
+def _split(value: object) -> list[str]:
     """Splits a parameter; a list is taken as it is."""
     return [str(item) for item in value] if isinstance(value, list) else str(value or "").split()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Works on a goal of pickup or place: tries its ways in order, says why each failed, executes the first that goes."""
+"""Works on a goal of pickup or place: tries its grasps or locations in turn and executes the first that can be done."""
 from __future__ import annotations
 
 import threading
@@ -28,7 +28,7 @@ from modular_framework_planning.robot_model.robot_model import JointGroup
 
 DEFAULT_PLANNING_TIME_S = 5.0
 FINGER_SETTLE_S = 0.5
-REASONS_TOLD = 10
+MAX_REASONS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,10 +37,10 @@ class Task:
 
     Attributes:
         kind: of the report.
-        check: refuses goals that no way could save.
-        ways: numbers of the ways in the goal, best first.
-        read: returns the manoeuvre of a way.
-        accept: notes in the result which way was taken.
+        check: refuses goals of which no candidate can be done.
+        candidates: indices of the grasps or locations in the goal, best first.
+        read: returns the manoeuvre of a candidate.
+        accept: notes in the result which candidate was taken.
     """
 
     kind: str
@@ -48,24 +48,24 @@ class Task:
     group: str
     end_effector: str
     check: Callable[[PlanningScene], None]
-    ways: Sequence[int]
+    candidates: Sequence[int]
     read: Callable[[PlanningScene, int, Hand], Manoeuvre]
     accept: Callable[[int], None]
 
 
 @dataclass(slots=True)
 class _Attempts:
-    """Ways that failed so far."""
+    """Candidates that failed so far."""
 
     failures: list[tuple[str, PlanningError]] = field(default_factory=list)
 
     def error(self) -> PlanningError:
         """Joins the reasons; the code is that of all of them, or PLANNING_FAILED where they differ."""
         codes = {error.code for _, error in self.failures}
-        told = [error.reason for _, error in self.failures[:REASONS_TOLD]]
-        more = len(self.failures) - len(told)
+        reported = [error.reason for _, error in self.failures[:MAX_REASONS]]
+        more = len(self.failures) - len(reported)
         return PlanningError(codes.pop() if len(codes) == 1 else ErrorCode.PLANNING_FAILED,
-                             f"none of {len(self.failures)} ways can be done: " + " | ".join(told)
+                             f"none of {len(self.failures)} ways can be done: " + " | ".join(reported)
                              + (f" | and {more} more" if more else ""))
 
     def entries(self) -> list[dict[str, Any]]:
@@ -125,7 +125,7 @@ class Manipulation:
 
     # ---------------------------------------------------------------- planning
     def _planned(self, scene: PlanningScene, result: Any) -> tuple[Stage, ...]:
-        """Returns the stages of the first way that can be done; raises PlanningError with the reasons of all."""
+        """Returns the stages of the first candidate that can be done; raises PlanningError with the reasons of all."""
         task, begun = self._task, time.monotonic()
         model = self._context.model
         group, effector = choose_end_effector(model, task.group, task.end_effector)
@@ -133,19 +133,19 @@ class Manipulation:
         hand = Hand(effector.parent_link, hand_links(model, effector), fingers,
                     {name: mimic for name, mimic in model.document.mimics.items() if mimic.leader in fingers})
         task.check(scene)
-        ways = [(way, task.read(scene, way, hand)) for way in task.ways]
+        candidates = [(candidate, task.read(scene, candidate, hand)) for candidate in task.candidates]
         planner = self._planner(scene, group, hand)
-        for number, (way, manoeuvre) in enumerate(ways):
+        for number, (candidate, manoeuvre) in enumerate(candidates):
             if self._cancelled.is_set():
                 raise PlanningError(ErrorCode.PREEMPTED, "cancelled while planning")
             try:
-                stages = planner.plan(manoeuvre, planner.remaining_s / (len(ways) - number))
+                stages = planner.plan(manoeuvre, planner.remaining_s / (len(candidates) - number))
             except PlanningError as error:
                 if error.code == ErrorCode.PREEMPTED:
                     raise
                 self._attempts.failures.append((manoeuvre.name, error))
                 continue
-            task.accept(way)
+            task.accept(candidate)
             result.planning_time = time.monotonic() - begun
             return stages
         raise self._attempts.error()

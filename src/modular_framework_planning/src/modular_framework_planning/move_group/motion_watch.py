@@ -18,7 +18,7 @@ from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
 
-PERIOD_S = 0.05  # between two looks at the scene
+PERIOD_S = 0.05  # between two checks of the scene
 JOIN_TIMEOUT_S = 5.0
 
 
@@ -60,29 +60,29 @@ class WatchedMotion:
         """
         if self._watch is None:
             return
-        self._look()
-        self._refuse_blocked()
+        self._check_scene()
+        self._raise_if_blocked()
         self._begun = rospy.Time.now()
         self._record()
-        watcher = threading.Thread(target=self._accompany, args=(cancelled,), daemon=True)
+        watcher = threading.Thread(target=self._monitor, args=(cancelled,), daemon=True)
         watcher.start()
         try:
             self._context.execution.execute(self._trajectory, self._stop)
         except PlanningError as error:
             if error.code == ErrorCode.PREEMPTED and not cancelled.is_set():
-                self._refuse_blocked()
+                self._raise_if_blocked()
             raise
         finally:
             self._ended.set()
             watcher.join(JOIN_TIMEOUT_S)
             self._record()
 
-    def _refuse_blocked(self) -> None:
+    def _raise_if_blocked(self) -> None:
         if self._blocked:
             raise PlanningError(ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, "the scene changed and the "
                                 f"rest of the motion is blocked: {self._blocked}; plan again, or ask for replan")
 
-    def _accompany(self, cancelled: threading.Event) -> None:
+    def _monitor(self, cancelled: threading.Event) -> None:
         pause_s, due_s = min(PERIOD_S, self._period_s), time.monotonic() + self._period_s
         while not self._ended.is_set():
             if cancelled.is_set():
@@ -91,14 +91,14 @@ class WatchedMotion:
                 due_s = time.monotonic() + self._period_s
                 self._record()
             try:
-                self._look()
+                self._check_scene()
             except Exception as error:  # noqa: BLE001 - a motion nobody can watch any more must stop
                 self._blocked = f"watching it failed with {type(error).__name__}: {error}"
             if self._blocked:
                 self._stop.set()
             cancelled.wait(pause_s) if not cancelled.is_set() else self._ended.wait(pause_s)
 
-    def _look(self) -> None:
+    def _check_scene(self) -> None:
         """Checks what is left of the motion when the geometry of the scene changed."""
         scene = self._context.monitor.snapshot()
         self._watch.advance(scene.positions)

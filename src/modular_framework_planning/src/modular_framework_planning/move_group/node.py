@@ -80,7 +80,7 @@ def build_context() -> MoveGroupContext:
     settings = MotionSettings(given_settings("plan_execution", PlanExecutionSettings()),
                               given_settings("pick_place", PickPlaceSettings()))
     return MoveGroupContext(model, monitor, kinematics, pipelines, execution, MarkerPublisher(model.planning_frame),
-                            Reporter(tell_requests="--debug" in rospy.myargv()), settings)
+                            Reporter(publish_requests="--debug" in rospy.myargv()), settings)
 
 
 def advertise(context: MoveGroupContext) -> None:

@@ -13,10 +13,10 @@ class SceneMonitorSettings:
     """What is below ~planning_scene_monitor.
 
     Attributes:
-        publish_planning_scene: whether anything is told on ~monitored_planning_scene.
-        publish_planning_scene_hz: how often joints and frames are told while they change; objects are told at once.
+        publish_planning_scene: whether anything is published on ~monitored_planning_scene.
+        publish_planning_scene_hz: how often joints and frames are published while they change; objects are at once.
         publish_geometry_updates, publish_state_updates, publish_transforms_updates: whether changes of objects, of
-            joints and of frames outside the robot are told.
+            joints and of frames outside the robot are published.
     """
 
     publish_planning_scene: bool = True

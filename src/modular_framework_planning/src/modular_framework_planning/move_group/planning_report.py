@@ -18,15 +18,15 @@ from modular_framework_ros.publishing import publish
 class Reporter:
     """Publishes ~planning_report (std_msgs/String, JSON) and, if asked to, ~motion_plan_request (latched)."""
 
-    def __init__(self, tell_requests: bool = False) -> None:
-        """Args: whether requests for plans are told, as MoveIt does with the argument --debug."""
+    def __init__(self, publish_requests: bool = False) -> None:
+        """Args: whether requests for plans are published, as MoveIt does with the argument --debug."""
         self._ids = itertools.count(1)
         self._publisher = rospy.Publisher(names.REPORT_TOPIC, String, queue_size=100)
         self._requests = rospy.Publisher(names.REQUEST_TOPIC, MotionPlanRequest, queue_size=10,
-                                         latch=True) if tell_requests else None
+                                         latch=True) if publish_requests else None
 
     def request(self, message: MotionPlanRequest) -> None:
-        """Tells a request as it came."""
+        """Publishes a request as it came."""
         if self._requests is not None:
             publish(self._requests, message)
 

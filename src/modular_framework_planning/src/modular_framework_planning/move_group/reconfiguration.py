@@ -23,11 +23,11 @@ TABLES = {
         Adjustable("allowed_start_tolerance", 0.0, NO_LIMIT, "of a joint from the first point [rad or m]; 0: any"),
         Adjustable("wait_for_trajectory_completion", False, True, "wait until the joints stand still")),
     "planning_scene_monitor": (
-        Adjustable("publish_planning_scene", False, True, "tell changes of the scene"),
-        Adjustable("publish_planning_scene_hz", 0.1, 100.0, "how often joints and frames are told while they change"),
-        Adjustable("publish_geometry_updates", False, True, "tell changes of objects"),
-        Adjustable("publish_state_updates", False, True, "tell changes of joints"),
-        Adjustable("publish_transforms_updates", False, True, "tell changes of frames outside the robot")),
+        Adjustable("publish_planning_scene", False, True, "publish changes of the scene"),
+        Adjustable("publish_planning_scene_hz", 0.1, 100.0, "rate of joints and frames while they change"),
+        Adjustable("publish_geometry_updates", False, True, "publish changes of objects"),
+        Adjustable("publish_state_updates", False, True, "publish changes of joints"),
+        Adjustable("publish_transforms_updates", False, True, "publish changes of frames outside the robot")),
     "plan_execution": (
         Adjustable("max_replan_attempts", 0, 1000, "plans of a goal that asks for replanning and gives no number"),
         Adjustable("record_trajectory_state_frequency", 0.0, 1000.0, "of the executed trajectory [Hz]; 0: none")),

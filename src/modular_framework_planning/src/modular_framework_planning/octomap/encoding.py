@@ -51,12 +51,12 @@ class _Nodes:
                                           np.ones(len(keys), dtype=bool))]
         kept = [np.ones(len(keys), dtype=bool)]
         for _ in range(LEVELS):
-            numbers, values, bits, _, whole = layers[-1]
+            numbers, values, bits, _, is_leaf = layers[-1]
             parents, first = np.unique(numbers >> 3, return_index=True)
             owner = np.repeat(np.arange(len(parents)), np.diff(np.append(first, len(numbers))))
             child = (numbers & 7).astype(np.int64)
             highest = np.maximum.reduceat(values, first)
-            same = (np.bincount(owner) == 8) & np.logical_and.reduceat(whole, first)
+            same = (np.bincount(owner) == 8) & np.logical_and.reduceat(is_leaf, first)
             same &= np.minimum.reduceat(values, first) == highest
             kinds = np.where(bits > 0, INNER, np.where(values > 0.0, OCCUPIED, FREE))
             mask = np.bincount(owner, 1 << child).astype(np.uint8)
@@ -69,8 +69,9 @@ class _Nodes:
         for level, ((numbers, *rest, _), keep) in enumerate(zip(layers, kept, strict=True)):
             order.append(((numbers[keep] << (3 * level)) << 5) | (LEVELS - level))  # a parent before its first child
             parts.append([part[keep] for part in rest])
-        places = np.argsort(np.concatenate(order), kind="stable")
-        self.values, self.children, self.codes = (np.concatenate([part[i] for part in parts])[places] for i in range(3))
+        indices = np.argsort(np.concatenate(order), kind="stable")
+        self.values, self.children, self.codes = (np.concatenate([part[i] for part in parts])[indices]
+                                                  for i in range(3))
 
 
 def write_full(voxels: VoxelMap) -> bytes:
@@ -118,8 +119,8 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
         values = np.where(occupied, HIGHEST, LOWEST).astype(np.float32)
     else:
         nodes = np.frombuffer(data, FULL_NODE)
-        read, starts, depths, places = read_full(nodes["children"].copy(), LEVELS)
-        values = nodes["value"][places].astype(np.float32)
+        read, starts, depths, indices = read_full(nodes["children"].copy(), LEVELS)
+        values = nodes["value"][indices].astype(np.float32)
     count = len(data) // unit
     if read != count:
         raise _broken("a tree that ends early or is deeper than 16 levels" if read < 0 else

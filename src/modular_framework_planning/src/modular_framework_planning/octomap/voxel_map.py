@@ -95,11 +95,11 @@ class VoxelMap:
     def value_at(self, point: Array) -> float | None:
         """Returns the log odds of the voxel a point (3,) [m] lies in; None where nothing is known."""
         key = self.keys_of_points(np.atleast_2d(point))
-        place = int(np.searchsorted(self.keys, key[0])) if len(key) else len(self.keys)
-        return float(self.values[place]) if place < len(self.keys) and self.keys[place] == key[0] else None
+        index = int(np.searchsorted(self.keys, key[0])) if len(key) else len(self.keys)
+        return float(self.values[index]) if index < len(self.keys) and self.keys[index] == key[0] else None
 
     def updated(self, free: Keys, occupied: Keys, masked: Keys) -> VoxelMap:
-        """Returns the map after one look.
+        """Returns the map after one point cloud.
 
         Args:
             free: voxels that rays went through.
@@ -113,8 +113,8 @@ class VoxelMap:
         last = np.append(keys[1:] != keys[:-1], True)[:len(keys)]  # of several verdicts on a voxel the strongest
         return VoxelMap(self.resolution, *merged(self.keys, self.values, keys[last], steps[last], LOWEST, HIGHEST))
 
-    def with_look(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:
-        """Returns the map after a sensor looked: rays end at points and clear what they go through.
+    def with_point_cloud(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:
+        """Returns the map after a point cloud: rays end at points and clear what they go through.
 
         Args:
             origin: where the sensor is (3,) [m].

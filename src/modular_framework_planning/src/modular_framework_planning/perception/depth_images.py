@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns depth images and point clouds into points, told apart by whether their ray ended within range."""
+"""Turns depth images and point clouds into points, those whose ray ended within range apart from those beyond it."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -79,9 +79,9 @@ def points_of_depth(depth: Array, camera: Pinhole, near: float, far: float, skip
     ends = (inner >= near) & (inner <= far)
     beyond = inner > far
     z = inner[ends]
-    places = (rows[:, None] * depth.shape[1] + columns)[ends]
+    indices = (rows[:, None] * depth.shape[1] + columns)[ends]
     return SeenPoints(np.column_stack([x[ends] * z, y[ends] * z, z]),
-                      np.column_stack([x[beyond], y[beyond], np.ones(int(beyond.sum()))]) * far, places)
+                      np.column_stack([x[beyond], y[beyond], np.ones(int(beyond.sum()))]) * far, indices)
 
 
 def cloud_array(message: Any) -> Array:

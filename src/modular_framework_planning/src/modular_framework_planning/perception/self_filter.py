@@ -53,7 +53,7 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class SelfFilter:
-    """Regions at their places in one frame, padded and scaled.
+    """Regions of all bodies in one frame, padded and scaled.
 
     Attributes:
         balls: centre and radius of each region's ball (k, 4) [m].
@@ -150,7 +150,7 @@ def bodies_in_scene(scene: PlanningScene, positions: Array) -> list[tuple[Any, T
               for item in scene.model.link_geometries]
     things = [(links[held.link] * held.body.pose, held.body.shapes) for held in scene.attached.values()]
     things += [(body.pose, body.shapes) for body in scene.objects.values()]
-    return bodies + [(shape.geometry, pose * place) for pose, shapes in things for shape, place in shapes
+    return bodies + [(shape.geometry, pose * shape_pose) for pose, shapes in things for shape, shape_pose in shapes
                      if not isinstance(shape, Plane | Octree)]
 
 

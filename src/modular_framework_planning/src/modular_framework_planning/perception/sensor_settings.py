@@ -22,7 +22,7 @@ class PointCloudSettings:
         max_range: points further away only clear [m].
         point_subsample: every n-th point of every n-th row is used.
         padding_offset, padding_scale: how much larger the robot and the objects are taken [m and 1].
-        max_update_rate: looks a second at most [Hz]; 0 for all.
+        max_update_rate: messages processed a second at most [Hz]; 0 for all.
         filtered_cloud_topic: where the points that are left are published; empty for nowhere.
         ns: namespace of that topic within the node's.
     """
@@ -42,13 +42,13 @@ class DepthImageSettings:
     """A DepthImageOctomapUpdater; keys and defaults are MoveIt's.
 
     Attributes:
-        image_topic: sensor_msgs/Image; camera_info is looked for beside it.
+        image_topic: sensor_msgs/Image; camera_info is expected beside it.
         queue_size: images that may wait.
         near_clipping_plane_distance, far_clipping_plane_distance: readings outside are left out, or only clear [m].
         shadow_threshold: a reading this little behind the robot or an object belongs to it [m].
         padding_scale: how many times the camera's depth noise is added to the padding [1].
         padding_offset: padding of the robot and of objects [m].
-        max_update_rate: looks a second at most [Hz]; 0 for all.
+        max_update_rate: messages processed a second at most [Hz]; 0 for all.
         skip_vertical_pixels, skip_horizontal_pixels: border that is left out on each side [pixel].
         filtered_cloud_topic: where the depth image that is left is published (16UC1, mm); empty for nowhere.
         ns: namespace of that topic within the node's.

@@ -34,7 +34,7 @@ from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.line_timing import time_line
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-CHECK_STEP = 0.004  # [rad or m] between looked-at states
+CHECK_STEP = 0.004  # [rad or m] between checked states
 DISTANCE_SLACK_M = 1.0e-6
 
 SceneChange = Callable[[PlanningScene], PlanningScene]
@@ -56,13 +56,13 @@ class Translation:
 
     Attributes:
         direction: of unit length, shape (3,); in the tip's own frame if `in_tip`, else in the planning frame.
-        wished_m, least_m: how far it should go, and how far it has to.
+        desired_distance_m, min_distance_m: how far it should go, and how far it has to.
     """
 
     direction: Array
     in_tip: bool
-    wished_m: float
-    least_m: float
+    desired_distance_m: float
+    min_distance_m: float
 
     def ending_at(self, pose: Transform, distance_m: float) -> Transform:
         """Returns the pose this far along the direction; a negative distance is before it."""
@@ -164,8 +164,8 @@ class ManoeuvrePlanner:
                 if failure is None or error.share > failure[0]:
                     failure = (error.share, error)
                 continue
-            there = self._way_to(manoeuvre, approach[0], allowed_time_s)
-            return self._stages(manoeuvre, open_scene, there, approach, retreat)
+            to_approach = self._plan_to_approach(manoeuvre, approach[0], allowed_time_s)
+            return self._stages(manoeuvre, open_scene, to_approach, approach, retreat)
         assert failure is not None, "there is at least one posture, or _reachable has raised"
         raise failure[1]
 
@@ -216,17 +216,18 @@ class ManoeuvrePlanner:
         """Returns the rows of the approach and of the retreat; raises _LineTooShort."""
         arm, pose = self._arm, manoeuvre.tip_pose
         at_grasp = scene.with_positions(self._at(scene, values))
-        way, name = manoeuvre.approach, manoeuvre.name
-        back = self._line(at_grasp, way.ending_at(pose, -way.wished_m))
-        approach = _enough(f"{name}: approach (looked at from the grasp backwards)", back, way)[::-1]
+        translation, name = manoeuvre.approach, manoeuvre.name
+        back = self._line(at_grasp, translation.ending_at(pose, -translation.desired_distance_m))
+        approach = _enough(f"{name}: approach (looked at from the grasp backwards)", back, translation)[::-1]
         if manoeuvre.closing_in:
             untouched = self._with_fingers(self._template.scene, manoeuvre.fingers_before)
-            further = self._line(untouched.with_positions(at_grasp.positions), way.ending_at(pose, way.wished_m))
+            further = self._line(untouched.with_positions(at_grasp.positions),
+                                 translation.ending_at(pose, translation.desired_distance_m))
             approach = np.vstack([approach, further.rows[1:]])
             at_grasp = scene.with_positions(self._at(scene, approach[-1]))
             pose = at_grasp.frame_transform(arm.link)
         held = self._after(manoeuvre, at_grasp)
-        leave = self._line(held, manoeuvre.retreat.ending_at(pose, manoeuvre.retreat.wished_m))
+        leave = self._line(held, manoeuvre.retreat.ending_at(pose, manoeuvre.retreat.desired_distance_m))
         return approach, _enough(f"{name}: retreat", leave, manoeuvre.retreat)
 
     def _after(self, manoeuvre: Manoeuvre, at_grasp: PlanningScene) -> PlanningScene:
@@ -243,7 +244,7 @@ class ManoeuvrePlanner:
         return straight_line(self._arm.solver, self._arm.link, scene.positions, [end],
                              self._settings.cartesian_motion_step_size, objection=self._objection(scene))
 
-    def _way_to(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
+    def _plan_to_approach(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
         """Plans from where the robot is to the begin of the approach, with nothing allowed to touch."""
         group, template = self._arm.group, self._template
         allowed_s = min(self.remaining_s, allowed_time_s)
@@ -255,14 +256,14 @@ class ManoeuvrePlanner:
         except PlanningError as error:
             raise PlanningError(error.code, f"{manoeuvre.name}: way to the approach: {error.reason}") from error
 
-    def _stages(self, manoeuvre: Manoeuvre, open_scene: PlanningScene, there: Trajectory, approach: Array,
+    def _stages(self, manoeuvre: Manoeuvre, open_scene: PlanningScene, to_approach: Trajectory, approach: Array,
                 retreat: Array) -> tuple[Stage, ...]:
         """Times the lines and puts everything in order; a line without length is left out."""
         allow, before = manoeuvre.allow, manoeuvre.fingers_before
         ready = open_scene.with_positions(self._at(open_scene, approach[0]))
         at_grasp = open_scene.with_positions(self._at(open_scene, approach[-1]))
         held = self._after(manoeuvre, at_grasp)
-        stages = [Stage("plan", self._template.scene, _unchanged, there)]
+        stages = [Stage("plan", self._template.scene, _unchanged, to_approach)]
         if before:
             stages.append(Stage("pre_grasp", ready, allow, fingers=before))
         if _moves(approach):
@@ -295,10 +296,10 @@ class _LineTooShort(PlanningError):
         self.share = share
 
 
-def _enough(what: str, line: StraightLine, way: Translation) -> Array:
+def _enough(what: str, line: StraightLine, translation: Translation) -> Array:
     """Returns the rows of a line that went far enough; raises _LineTooShort."""
-    distance = line.fraction * way.wished_m
-    if distance < way.least_m - DISTANCE_SLACK_M:
-        raise _LineTooShort(f"{what}: only {distance:.3f} m of {way.wished_m:.3f} m, at least {way.least_m:.3f} m are "
-                            f"asked for; {line.stop}", line.fraction)
+    distance = line.fraction * translation.desired_distance_m
+    if distance < translation.min_distance_m - DISTANCE_SLACK_M:
+        raise _LineTooShort(f"{what}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m, at least "
+                            f"{translation.min_distance_m:.3f} m are asked for; {line.stop}", line.fraction)
     return line.rows

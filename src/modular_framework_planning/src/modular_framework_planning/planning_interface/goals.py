@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns the goals of a request into free joint vectors, or says why there is none.
 
-How long it looks is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
+The search is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
 """
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
 from modular_framework_planning.robot_model.robot_model import JointGroup
 
 MAX_GOAL_STATES = 8
-MOST_SAMPLES = 64  # states looked at within the tolerances of one goal
-MOST_POSES = 16  # poses looked at within the tolerances of one goal
+MOST_SAMPLES = 64  # states tried within the tolerances of one goal
+MOST_POSES = 16  # poses tried within the tolerances of one goal
 
 
 class GoalResolver:
@@ -39,8 +39,17 @@ class GoalResolver:
                  checker: CollisionChecker, motion: MotionChecker, rng: np.random.Generator,
                  path_constraints: KinematicConstraints | None = None,
                  interrupted: Callable[[], bool] = lambda: False) -> None:
-        """Args: the request; its group; solvers; collision checks; random numbers; what goal states must satisfy; when
-        to stop looking at further goals."""
+        """Stores the parts.
+
+        Args:
+            request: whose goals are resolved.
+            group: the joints to move.
+            kinematics: solvers of all groups.
+            checker, motion: collision checks.
+            rng: source of random numbers.
+            path_constraints: what goal states must satisfy.
+            interrupted: whether no further goal may be tried.
+        """
         self._interrupted = interrupted
         self._request, self._group, self._kinematics = request, group, kinematics
         self._checker, self._motion, self._rng = checker, motion, rng
@@ -52,7 +61,7 @@ class GoalResolver:
         """Returns free goal vectors of the group, nearest to the start first, shape (n, joints).
 
         Raises:
-            PlanningError: no goal was given, or none can be reached; the first goal's reason is told.
+            PlanningError: no goal was given, or none can be reached; the reason is that of the first goal.
         """
         if not self._request.goals:
             raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, "the request has no goal; give joint constraints "
@@ -85,13 +94,13 @@ class GoalResolver:
                 return self._region(goal.constraints)
         raise TypeError(f"{type(goal).__name__} is not a goal")
 
-    def _is_good(self, values: Array) -> bool:
+    def _is_valid(self, values: Array) -> bool:
         """Whether a state satisfies the path constraints and is free."""
         constraints = self._path_constraints
         return (constraints is None or constraints.satisfied(self._motion.full_positions(values))) and (
             self._motion.state_is_free(values))
 
-    def _why_not(self, values: Array, what: str) -> PlanningError:
+    def _rejection(self, values: Array, what: str) -> PlanningError:
         """Says what is wrong with the best candidate of a goal."""
         full, constraints = self._motion.full_positions(values), self._path_constraints
         if constraints is not None and not constraints.satisfied(full):
@@ -104,15 +113,15 @@ class GoalResolver:
     def _joint(self, goal: JointGoal) -> Array:
         """Returns the exact target; where that is not free, the first free state found within the tolerances."""
         target, low, high = self._joint_ranges(goal)
-        if self._is_good(target):
+        if self._is_valid(target):
             return target
         if (high > low).any():
             for number in range(MOST_SAMPLES):
                 share = (number + 1) / MOST_SAMPLES
                 values = target + share * (self._rng.uniform(low, high) - target)
-                if self._is_good(values):
+                if self._is_valid(values):
                     return values
-        raise self._why_not(target, "goal")
+        raise self._rejection(target, "goal")
 
     def _joint_ranges(self, goal: JointGoal) -> tuple[Array, Array, Array]:
         """Returns target, lowest and highest allowed values of the group's joints; a turn without ends is nearest."""
@@ -123,9 +132,9 @@ class GoalResolver:
             if name not in self._group.joints:
                 raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal: joint '{name}' is not in group "
                                     f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}")
-            number, place = self._model.index[name], self._group.joints.index(name)
+            number, column = self._model.index[name], self._group.joints.index(name)
             if self._model.is_continuous(number):
-                wanted += 2.0 * np.pi * np.round((values[place] - wanted) / (2.0 * np.pi))
+                wanted += 2.0 * np.pi * np.round((values[column] - wanted) / (2.0 * np.pi))
             least = max(self._model.lower[number], wanted - goal.below.get(name, 0.0))
             most = min(self._model.upper[number], wanted + goal.above.get(name, 0.0))
             if least > most + BEYOND_BOUND:
@@ -133,8 +142,8 @@ class GoalResolver:
                                     f"[{self._model.lower[number]:.6f}, {self._model.upper[number]:.6f}]; give a "
                                     f"position at most {BEYOND_BOUND} beyond a bound")
             bounds = self._model.lower[number], self._model.upper[number]
-            low[place], high[place] = np.clip((min(least, most), max(least, most)), *bounds)
-            values[place] = np.clip(wanted, low[place], high[place])
+            low[column], high[column] = np.clip((min(least, most), max(least, most)), *bounds)
+            values[column] = np.clip(wanted, low[column], high[column])
         return values, low, high
 
     def _pose(self, goal: PoseGoal) -> list[Array]:
@@ -148,19 +157,19 @@ class GoalResolver:
                 raise
             return self._region(allowed)  # no chain to that link: least squares instead of inverse kinematics
         candidates = [positions[self._group.indices] for positions in found]
-        free = first_free(candidates, self._is_good, MAX_GOAL_STATES)
+        free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
         if allowed is not None and allowed.is_loose:
             nearest = allowed.project(seed, self._group.indices)
-            if nearest is not None and self._is_good(nearest[self._group.indices]):
+            if nearest is not None and self._is_valid(nearest[self._group.indices]):
                 free.append(nearest[self._group.indices])
             if not free:
                 others = self._at_other_poses(goal, allowed, solver)
-                free, candidates = first_free(others, self._is_good, MAX_GOAL_STATES), candidates + others
+                free, candidates = first_free(others, self._is_valid, MAX_GOAL_STATES), candidates + others
         if free:
             return free
         if not candidates:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
-        raise self._why_not(candidates[0], f"goal: all {len(candidates)} inverse kinematics solutions for "
+        raise self._rejection(candidates[0], f"goal: all {len(candidates)} inverse kinematics solutions for "
                             f"'{goal.link}' collide; the nearest is" if self._path_constraints is None else
                             f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; "
                             "the nearest")
@@ -185,13 +194,13 @@ class GoalResolver:
             found = constraints.project(seed, indices) if number == 0 else (
                 constraints.sample(self._rng, seed, indices, 1))
             if found is not None:
-                (free if self._is_good(found[indices]) else rejected).append(found[indices])
+                (free if self._is_valid(found[indices]) else rejected).append(found[indices])
             if len(free) >= MAX_GOAL_STATES:
                 break
         if free:
             return free
         if rejected:
-            raise self._why_not(rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; "
+            raise self._rejection(rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; "
                                 "the nearest is")
         raise PlanningError(ErrorCode.GOAL_CONSTRAINTS_VIOLATED, "goal region was empty: no state of group "
                             f"'{self._group.name}' within its joint bounds satisfies all constraints; from the start, "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mends a path whose edges a search looked at too coarsely: each colliding edge is replaced by a way round it."""
+"""Repairs a path whose edges a search checked too coarsely: each colliding edge is replaced by a detour."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -15,19 +15,19 @@ Connect = Callable[[PlanningProblem, Array, Array], Array | None]
 
 
 class EdgeError(PlanningError):
-    """An edge of a path is not valid and there is no way round it nearby."""
+    """An edge of a path is not valid and no detour was found."""
 
 
 def repaired(problem: PlanningProblem, path: Array, connect: Connect) -> Array:
-    """Returns the path with every edge valid at the steps of the last check.
+    """Returns the path with every edge valid at the steps of the solution validator.
 
     Args:
         problem: what the path was searched for.
         path: vertices from start to goal, each of them valid, shape (n, joints).
-        connect: gives a valid way between two valid states, or None.
+        connect: gives a valid path between two valid states, or None.
 
     Raises:
-        EdgeError: an edge has no way round it; says what touches, and where.
+        EdgeError: an edge has no detour; says what touches, and where.
     """
     step = problem.settings.finest_step
     pieces = [path[:1]]
@@ -35,16 +35,16 @@ def repaired(problem: PlanningProblem, path: Array, connect: Connect) -> Array:
         if problem.edge_is_valid(first, second, step):
             pieces.append(second[None])
             continue
-        way = None if problem.cancelled() else connect(problem, first, second)
-        if way is None:
+        detour = None if problem.cancelled() else connect(problem, first, second)
+        if detour is None:
             raise EdgeError(ErrorCode.INVALID_MOTION_PLAN, f"edge {number} of {len(path) - 1} of the path found "
                             f"{edge_fault(problem, first, second)}, and no way round it was found")
-        pieces.append(way[1:])
+        pieces.append(detour[1:])
     return np.vstack(pieces)
 
 
 def edge_fault(problem: PlanningProblem, first: Array, second: Array) -> str:
-    """Says what is wrong on the straight way between two states, and in which state."""
+    """Says what is wrong with the straight motion between two states, and in which state."""
     step = problem.settings.finest_step
     hit = problem.motion.colliding_state(np.vstack([first, second]), step)
     if hit is not None:

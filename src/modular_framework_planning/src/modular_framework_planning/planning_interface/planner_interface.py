@@ -108,9 +108,9 @@ class PlanningProblem:
         return self._goals[0]
 
     def _goals_must_end(self) -> bool:
-        """Whether no further goal may be looked at: half the time is for the search.
+        """Whether no further goal may be tried: half the time is for the search.
 
-        Where the plan must be repeatable, all goals are looked at, or none is used.
+        Where the plan must be repeatable, all goals are tried, or none is used.
         """
         if self.repeatable and not self.interrupted():
             return False
@@ -122,9 +122,9 @@ class PlanningProblem:
             self.constraints is None or self.constraints.satisfied(self.motion.full_positions(values)))
 
     def edge_is_valid(self, first: Array, second: Array, step: float | None = None) -> bool:
-        """Whether the straight motion is free and satisfies the path constraints (its start is not looked at).
+        """Whether the straight motion is free and satisfies the path constraints (its start is not checked).
 
-        Constraints are looked at no more finely than the last check does.
+        Constraints are checked no more finely than the solution validator does.
         """
         step = step or self.step
         if not self.motion.edge_is_free(first, second, step):
@@ -187,8 +187,8 @@ class Planner(Protocol):
         auxiliary_constraints: names of path constraints that are input of the planner (such as the interim point of
             a circle), which then need not be kept by the motion.
         collision_code: the error code for a start or goal in collision, where it is not the one of that name.
-        repaired(problem, vertices): the path with every edge valid at the steps of the last check, or EdgeError. The
-            pipeline mends nothing by itself: a motion that fails the check counts as the planner's failure.
+        repaired(problem, vertices): the path with every edge valid at the steps of the solution validator, or
+            EdgeError. The pipeline repairs nothing by itself: a motion that fails the check is the planner's failure.
     """
 
     def plan(self, problem: PlanningProblem) -> PlannedPath | Trajectory:
@@ -205,16 +205,16 @@ def no_path(problem: PlanningProblem, what: str, states: int | None = None) -> P
     Args:
         problem: what was searched.
         what: name of the planner.
-        states: how many states were looked at, where that is known.
+        states: how many states were tried, where that is known.
     """
     spent = time.monotonic() - problem.begun_s
-    looked = "" if states is None else f" after {states} states"
+    tried = "" if states is None else f" after {states} states"
     if problem.cancelled():
-        return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s{looked}")
+        return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s{tried}")
     timed_out = time.monotonic() > problem.deadline_s
     return PlanningError(
         ErrorCode.TIMED_OUT if timed_out else ErrorCode.PLANNING_FAILED,
         f"{what} found no path in {spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s, the last "
         f"{problem.end_s - problem.deadline_s:.2f} s of them for the check of a motion)"
-        f"{': time ran out' if timed_out else ': nothing was left to try'}{looked}; start and goal are free, so the "
+        f"{': time ran out' if timed_out else ': nothing was left to try'}{tried}; start and goal are free, so the "
         "way between them is blocked or narrow: allow more time or choose another goal")

@@ -84,10 +84,10 @@ class PipelineSettings:
 
     Attributes:
         start_state_max_bounds_error: how far out of bounds a start is pulled back [rad or m].
-        jiggle_fraction: how far from a colliding start a free one is looked for (share of the joint's range).
+        jiggle_fraction: how far from a colliding start a free one is searched (share of the joint's range).
         start_state_collision_depth: a start that collides deeper than this is refused at once [m].
         start_state_contact_tolerance: depth of a held body's contact tolerated at the start [m].
-        motion_step: distance of checks along a motion [rad or m]; collisions of the returned one are looked for at
+        motion_step: distance of checks along a motion [rad or m]; collisions of the returned one are checked at
             `finest_step`.
         blend_deviation: most distance a rounded corner keeps from the corner [rad or m].
         start_state_max_dt: longest way back from a start out of bounds to the bounds [s].

@@ -62,7 +62,7 @@ def _require_start(problem: PlanningProblem) -> None:
 
 
 def _shortened(problem: PlanningProblem, path: Array) -> Array:
-    """Shortens a path; what it accepts was looked at as finely as the last check looks."""
+    """Shortens a path; what it accepts was checked as finely as the solution validator does."""
     now = time.monotonic()
     limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
     if problem.repeatable:

@@ -90,7 +90,7 @@ class PlanningPipeline:
         return tuple(name for name in names if not known or self._kind(name, group)[0] in known)
 
     def parameter_faults(self, name: str, group: str = "") -> list[str]:
-        """Returns what is wrong with the settings of a planner, one sentence each; nothing where it cannot tell."""
+        """Returns what is wrong with the settings of a planner, one sentence each; nothing without a check."""
         kind, parameters = self._kind(name, group)
         check = getattr(self._planner, "parameter_faults", None)
         return list(check(kind, parameters)) if check else []
@@ -125,7 +125,7 @@ class PlanningPipeline:
                 path = chain(adapters, search)(problem)
                 fault, answer = self._checked(problem, path, begun)
             except EdgeError as error:
-                fault, search = error.reason, PathSearch(self._planner)  # the next one looks at edges more finely
+                fault, search = error.reason, PathSearch(self._planner)  # the next one checks edges more finely
                 if problem.interrupted():
                     break
             except PlanningError as error:
@@ -169,20 +169,20 @@ class PlanningPipeline:
                                   time.monotonic() - begun)
 
     def checker(self, scene: PlanningScene, group: JointGroup, start: Array,
-                go_on: Callable[[], None] = lambda: None) -> CollisionChecker:
+                check_interrupt: Callable[[], None] = lambda: None) -> CollisionChecker:
         """Returns the collision world of a motion, with shallow contacts of held bodies tolerated.
 
         Args:
             scene: the world.
             group: the joints that will move.
             start: positions of the whole robot the motion begins at.
-            go_on: called now and then while the world is built; raises an exception to end that.
+            check_interrupt: called now and then while the world is built; raises an exception to stop that.
 
         Raises:
             PlanningError: bodies touch that the group cannot separate.
         """
         checker = CollisionChecker(scene, group.indices)
-        checker.build(go_on)
+        checker.build(check_interrupt)
         fixed = checker.fixed_contacts(start)
         if fixed:
             raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
@@ -223,9 +223,9 @@ class PlanningPipeline:
     def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner's name and settings; raises PlanningError with the names there are."""
         default, known = self.settings.default_planner(group), self.planner_ids
-        kind, parameters = self._kind(_bare(asked or default), group)
+        kind, parameters = self._kind(_without_group(asked or default), group)
         if asked and known and kind not in known and self._replaces_bad_values:
-            kind, parameters = self._kind(_bare(default), group)
+            kind, parameters = self._kind(_without_group(default), group)
             LOGGER.warning("planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
                            "for by the default planner '%s'", asked, self.name, ", ".join(known), group,
                            kind or known[0])
@@ -292,6 +292,6 @@ def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
                          f"{fault}; move the goal or the start away from contact")
 
 
-def _bare(planner_id: str) -> str:
-    """Takes the group off a name such as arm[RRTConnect]."""
+def _without_group(planner_id: str) -> str:
+    """Returns the planner in a name such as arm[RRTConnect]."""
     return planner_id.split("[")[-1].rstrip("]") if planner_id.endswith("]") and "[" in planner_id else planner_id

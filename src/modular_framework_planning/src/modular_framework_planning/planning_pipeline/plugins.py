@@ -90,5 +90,5 @@ def _class(path: str, where: str, known: str) -> Any:
         raise ModelError(f"{where} is not known ({error}); {known}") from error
     except PlanningError:
         raise
-    except Exception as error:  # noqa: BLE001 - a user's module may fail in any way; the cause must be told
+    except Exception as error:  # noqa: BLE001 - a user's module may fail in any way; the cause must be reported
         raise ModelError(f"{where}: its module fails with {type(error).__name__}: {error}; mend the module") from error

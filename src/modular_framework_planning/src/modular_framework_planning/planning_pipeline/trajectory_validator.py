@@ -13,14 +13,14 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.path_repair import describe_state
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
 
-SAMPLES_AT_ONCE = 200  # of a motion, between two looks at the clock
+SAMPLES_AT_ONCE = 200  # of a motion, between two checks of the time
 GRACE_S = 0.2  # after the allowed time, in which a check that has begun may end
 
 
 class TrajectoryValidator:
-    """Looks at a timed motion, at its curve and at the straight ways between its points.
+    """Checks the curve of a timed motion and the straight lines between its points.
 
-    A motion it has seen and passed is not looked at twice.
+    A motion that has passed is not checked twice.
     """
 
     def __init__(self) -> None:
@@ -45,16 +45,16 @@ class TrajectoryValidator:
         text = _not_in_order(path)
         if not text:
             curve = path.trajectory.curve(problem.settings.motion_step)
-            chords = path.trajectory.chords(_place(path.trajectory.positions, path, path.path_prefix))
+            chords = path.trajectory.chords(_sample_at(path.trajectory.positions, path, path.path_prefix))
             text = next(filter(None, (_collision(problem, line) for line in (
-                curve[_place(curve, path, path.path_prefix):], *chords))), "")
-            text = text or _violation(problem, curve[_place(curve, path, path.unconstrained):])
+                curve[_sample_at(curve, path, path.path_prefix):], *chords))), "")
+            text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained):])
         if not text:
             self._passed.add(key)
         return text
 
 
-def _place(samples: Array, path: PlannedPath, vertex: int) -> int:
+def _sample_at(samples: Array, path: PlannedPath, vertex: int) -> int:
     """Returns the number of the sample at a vertex of the path."""
     return int(np.argmin(np.linalg.norm(samples - path.vertices[vertex], axis=1))) if vertex else 0
 

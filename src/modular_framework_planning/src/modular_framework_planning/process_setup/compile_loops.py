@@ -58,7 +58,7 @@ def _robot() -> RobotModel:
 def _voxels() -> VoxelMap:
     """What a sensor saw, written and read again in both encodings."""
     point = np.array([[1.5, 0.0, 0.0]])
-    seen = empty_map(0.1).with_look(np.zeros(3), point, point + 0.5, point + 1.0)
+    seen = empty_map(0.1).with_point_cloud(np.zeros(3), point, point + 0.5, point + 1.0)
     return read_stream(write_binary(read_stream(write_full(seen), seen.resolution, False)), seen.resolution, True)
 
 
@@ -67,8 +67,8 @@ def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
     corners = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
-    def body(name: str, shape: Shape, *place: float) -> CollisionObject:
-        return CollisionObject(name, Transform(np.eye(3), np.array(place)), ((shape, Transform.Identity()),))
+    def body(name: str, shape: Shape, *position: float) -> CollisionObject:
+        return CollisionObject(name, Transform(np.eye(3), np.array(position)), ((shape, Transform.Identity()),))
 
     scene = empty_scene(model).with_octomap(Octree(voxels), Transform.Identity())
     for item in (body("box", Box(0.1, 0.1, 0.1), 0.7, 0.0, 0.3), body("ball", Sphere(0.05), -0.7, 0.0, 0.3),

@@ -128,7 +128,7 @@ def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> Any:
         return pipeline.plan(replace(request, seed=seed), repeatable=True)
     except PlanningError as error:
         return Failure(int(error.code), error.reason, error.contacts)
-    except Exception as error:  # noqa: BLE001 - the parent must be told whatever happened
+    except Exception as error:  # noqa: BLE001 - the parent must learn whatever happened
         traceback.print_exc()
         return Failure(int(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")
 
@@ -153,7 +153,7 @@ class _Straight:
     """Plans without OMPL, whose random generator must stay unused here."""
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the straight way."""
+        """Returns the straight motion."""
         problem.edge_is_valid(problem.start_values, problem.goal_states()[0])
         return PlannedPath(np.vstack([problem.start_values, problem.goal_states()[0]]))
 

@@ -52,7 +52,7 @@ class JointGroup:
 
     Attributes:
         joints: joints the planner may move, in the order of the kinematic tree.
-        indices: theirs in a position vector of the whole robot.
+        indices: of those joints in a position vector of the whole robot.
         links: links whose parent joint belongs to the group.
         base_link, tip_link: ends of the chain; empty where the group is not a chain.
     """
@@ -248,7 +248,7 @@ class RobotModel:
         return result
 
     def is_continuous(self, number: int) -> bool:
-        """Whether the joint at that place of a position vector turns without end."""
+        """Whether the joint at that index of a position vector turns without end."""
         return bool(self.upper[number] >= CONTINUOUS_BOUND)
 
     def bound_violations(self, positions: Array, indices: Iterable[int], tolerance: float = 1e-9) -> list[str]:

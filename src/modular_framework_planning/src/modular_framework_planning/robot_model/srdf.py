@@ -12,7 +12,7 @@ from modular_framework_urdf import xml_text
 
 @dataclass(frozen=True, slots=True)
 class GroupSpec:
-    """What a <group> lists, in the words of the file."""
+    """What a <group> lists, by the names in the file."""
 
     name: str
     joints: tuple[str, ...] = ()

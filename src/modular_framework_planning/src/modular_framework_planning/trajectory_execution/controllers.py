@@ -171,9 +171,9 @@ def _rank(option: Sequence[ControllerSpec]) -> tuple[int, int, int]:
 def _reason(wanted: set[str], known: Sequence[ControllerSpec], useful: Sequence[ControllerSpec]) -> str:
     listed = "; ".join(f"{spec.name}{'' if spec.is_active else ' (stopped)'} moves {', '.join(spec.joints)}"
                        for spec in known) or "none"
-    orphans = sorted(wanted - {joint for spec in known for joint in spec.joints})
-    if orphans:
-        return (f"no controller moves {', '.join(orphans)}; known controllers: {listed}. Add one to the config "
+    unmoved = sorted(wanted - {joint for spec in known for joint in spec.joints})
+    if unmoved:
+        return (f"no controller moves {', '.join(unmoved)}; known controllers: {listed}. Add one to the config "
                 "package's controllers file, or load one where ros_control is asked")
     stopped = sorted(wanted - {joint for spec in useful for joint in spec.joints})
     if stopped:

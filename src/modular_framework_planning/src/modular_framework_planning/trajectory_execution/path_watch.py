@@ -22,7 +22,7 @@ class PathWatch:
 
         Args:
             joint_names: joints of the motion; all of them are joints of the robot.
-            rows: positions on the way, in order, shape (n, joints) [rad or m].
+            rows: positions along the path, in order, shape (n, joints) [rad or m].
             planned_in: the scene in which the motion was found to be acceptable.
         """
         self._indices = np.array([planned_in.model.index[name] for name in joint_names], dtype=np.int64)
@@ -31,7 +31,7 @@ class PathWatch:
         self._reached = 0
 
     def advance(self, positions: Array) -> None:
-        """Notes where the robot is (positions of the whole robot); the place on the way never goes back."""
+        """Notes where the robot is (positions of the whole robot); the progress along the path never goes back."""
         gaps = np.linalg.norm(self._rows - positions[self._indices], axis=1)
         while self._reached + 1 < len(gaps) and gaps[self._reached + 1] <= gaps[self._reached]:
             self._reached += 1

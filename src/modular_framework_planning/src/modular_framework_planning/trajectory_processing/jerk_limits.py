@@ -32,7 +32,7 @@ def _largest_jerks(trajectory: Trajectory) -> Array:
 
 
 def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Array, jerk: Array) -> Trajectory:
-    """Returns the same curve, run evenly as much slower as its worst place needs."""
+    """Returns the same curve, slowed evenly by as much as its worst sample needs."""
     kept = 1.0 - MARGIN
     return trajectory.slowed(jerk_overrun(trajectory, velocity * kept, acceleration * kept, jerk * kept))
 

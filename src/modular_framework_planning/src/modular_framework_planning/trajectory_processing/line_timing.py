@@ -12,7 +12,7 @@ from modular_framework_planning.trajectory_processing.time_parameterization impo
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 SHARPEST_TURN = 0.3  # [rad] between two steps in joint space; at a sharper one the motion stops
-LOOK_STEP = 0.01  # [rad or m] between the looked-at states of the curve
+CHECK_STEP = 0.01  # [rad or m] between the checked states of the curve
 SAME_POSITION = 1.0e-7  # [rad or m]
 
 
@@ -32,7 +32,7 @@ def time_line(joints: tuple[str, ...], rows: Array, velocity: Array, acceleratio
     vertices = rows[np.concatenate([[True], np.abs(np.diff(rows, axis=0)).max(axis=1) > SAME_POSITION])]
     for sharpest in (SHARPEST_TURN, 0.0):
         trajectory = parameterize(joints, vertices, corner_distances(vertices, sharpest), velocity, acceleration)
-        if is_free(trajectory.curve(LOOK_STEP)):
+        if is_free(trajectory.curve(CHECK_STEP)):
             return trajectory
     raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "the timed motion along the lines touches something; keep the "
                         "lines further away from it")

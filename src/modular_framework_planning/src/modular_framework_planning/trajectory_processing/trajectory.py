@@ -87,7 +87,7 @@ class Trajectory:
         return np.vstack([self.positions_at(times), self.positions[-1:]])
 
     def chords(self, first: int = 0) -> list[Array]:
-        """Returns polylines of points, from number `first` on, between which the curve leaves the straight way.
+        """Returns polylines of points, from number `first` on, between which the curve leaves the straight line.
 
         A controller that does without velocities goes straight from point to point.
         """

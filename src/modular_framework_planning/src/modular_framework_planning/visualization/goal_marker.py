@@ -74,7 +74,7 @@ class GoalMarker:
         return tick
 
     def show(self, frame: str, pose: Pose, scale_m: float) -> None:
-        """Shows the marker, or shows it anew at another place."""
+        """Shows the marker, or shows it anew at another pose."""
         marker = InteractiveMarker(name=NAME, description="", pose=pose, scale=scale_m)
         marker.header.frame_id = frame
         ball = Marker(type=Marker.SPHERE)

@@ -29,8 +29,8 @@ from modular_framework_ros.publishing import publish
 VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
 START_COLOR = (0.2, 0.4, 0.9, 0.4)
 RANDOM_ATTEMPTS = 200
-WORDS_ABOVE_TIP_M = 0.45  # clear of the hand
-WORDS_WIDTH, WORDS_LINES = 60, 5
+TEXT_ABOVE_TIP_M = 0.45  # clear of the hand
+TEXT_WIDTH, TEXT_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
 JOB_END_S = 0.2  # a job says that it is done before it makes way for the next one
 DEFAULT_PLANNER = "move_group's default"
@@ -67,7 +67,7 @@ class InteractiveGoal:
         self._goal_color = VALID
         self._dragged: Pose | None = None
         self._solving = False
-        self._drag_came = threading.Condition()
+        self._drag_changed = threading.Condition()
         self._job = threading.Lock()
 
     def connect(self) -> None:
@@ -138,24 +138,24 @@ class InteractiveGoal:
         pipeline, _, planner = entry.rpartition(": ")
         self._options = replace(self._options, pipeline_id=pipeline,
                                 planner_id="" if entry == DEFAULT_PLANNER else planner)
-        self._tell(f"planner: {entry}")
+        self._set_status(f"planner: {entry}")
 
     def _choose_group(self, name: str) -> None:
         self._group, self._trajectory = self._model.group(name), None
         self._options = replace(self._options, pipeline_id="", planner_id="")
         self._guarded(self._fill_menu)
         self._marker.move(self._tip_pose())
-        self._tell(f"group: {name}")
+        self._set_status(f"group: {name}")
 
     # ---------------------------------------------------------------- jobs, one at a time
     def _begin(self, what: str, job: Callable[[], Any]) -> None:
         if not self._job.acquire(timeout=JOB_END_S):
-            self._tell(f"not {what}: busy; stop first")
+            self._set_status(f"not {what}: busy; stop first")
             return
 
         def work() -> None:
             try:
-                self._tell(f"{what} ...")
+                self._set_status(f"{what} ...")
                 self._guarded(job)
             finally:
                 self._job.release()
@@ -166,28 +166,28 @@ class InteractiveGoal:
         try:
             job()
         except PlanningError as error:
-            self._tell(error.reason)
+            self._set_status(error.reason)
         except (rospy.ServiceException, rospy.ROSException) as error:
-            self._tell(f"move_group does not answer: {error}")
+            self._set_status(f"move_group does not answer: {error}")
 
     def _plan(self) -> bool:
-        with self._drag_came:
-            self._drag_came.wait_for(lambda: self._dragged is None and not self._solving, DRAG_TIMEOUT_S)
+        with self._drag_changed:
+            self._drag_changed.wait_for(lambda: self._dragged is None and not self._solving, DRAG_TIMEOUT_S)
         goal = {name: float(self._goal[self._model.index[name]]) for name in self._group.joints}
         self._trajectory = None
         self._trajectory = self._client.plan(self._group.name, self._start or RobotState(is_diff=True), goal,
                                              self._options)
         points = self._trajectory.joint_trajectory.points
-        self._tell(f"planned: {points[-1].time_from_start.to_sec() if points else 0.0:.1f} s")
+        self._set_status(f"planned: {points[-1].time_from_start.to_sec() if points else 0.0:.1f} s")
         return True
 
     def _execute(self) -> None:
         if self._trajectory is None:
-            self._tell("nothing is planned yet; choose Plan first")
+            self._set_status("nothing is planned yet; choose Plan first")
             return
         trajectory, self._trajectory = self._trajectory, None
         self._client.execute(trajectory)
-        self._tell("executed")
+        self._set_status("executed")
 
     def _random_goal(self) -> None:
         indices = self._group.indices
@@ -202,27 +202,27 @@ class InteractiveGoal:
                 self._set_goal(positions, VALID, "random goal")
                 self._marker.move(self._tip_pose())
                 return
-        self._tell(f"none of {RANDOM_ATTEMPTS} random states is valid; is the robot in contact?")
+        self._set_status(f"none of {RANDOM_ATTEMPTS} random states is valid; is the robot in contact?")
 
     # ---------------------------------------------------------------- the goal
     def _on_drag(self, pose: Pose) -> None:
-        with self._drag_came:
+        with self._drag_changed:
             self._dragged = pose
-            self._drag_came.notify_all()
+            self._drag_changed.notify_all()
 
     def _follow_drags(self) -> None:
         """Solves for the newest dragged pose; those that came meanwhile are left out."""
         while not rospy.is_shutdown():
-            with self._drag_came:
+            with self._drag_changed:
                 if self._dragged is None:
-                    self._drag_came.wait(0.5)
+                    self._drag_changed.wait(0.5)
                 pose, self._dragged = self._dragged, None
                 self._solving = pose is not None
             if pose is not None:
                 self._guarded(lambda wanted=pose: self._solve(wanted))
-                with self._drag_came:
+                with self._drag_changed:
                     self._solving = False
-                    self._drag_came.notify_all()
+                    self._drag_changed.notify_all()
 
     def _solve(self, pose: Pose) -> None:
         target = PoseStamped(pose=pose)
@@ -255,9 +255,9 @@ class InteractiveGoal:
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
         self._goal, self._goal_color, self._trajectory = positions, color, None
-        self._tell(status)
+        self._set_status(status)
 
-    def _tell(self, status: str) -> None:
+    def _set_status(self, status: str) -> None:
         """Shows and logs what happened last."""
         if status != self._status:
             rospy.loginfo("interactive goal: %s", status)
@@ -268,9 +268,9 @@ class InteractiveGoal:
         markers = [Marker(action=Marker.DELETEALL),
                    *robot_markers(self._model, self._goal, "goal", self._goal_color)]
         text = Marker(type=Marker.TEXT_VIEW_FACING, ns="status",
-                      text="\n".join(textwrap.wrap(self._status, WORDS_WIDTH)[:WORDS_LINES]), pose=self._tip_pose())
+                      text="\n".join(textwrap.wrap(self._status, TEXT_WIDTH)[:TEXT_LINES]), pose=self._tip_pose())
         text.header.frame_id = self._model.planning_frame
-        text.pose.position.z += WORDS_ABOVE_TIP_M
+        text.pose.position.z += TEXT_ABOVE_TIP_M
         text.scale.z = 0.04
         text.color.r = text.color.g = text.color.b = text.color.a = 1.0
         publish(self._ghosts["goal"], _numbered([*markers, text] if text.text else markers))

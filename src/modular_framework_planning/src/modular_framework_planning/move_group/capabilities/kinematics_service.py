@@ -55,7 +55,7 @@ class _Wanted:
                                              timeout_s)
         return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
 
-    def why_none(self, solver: InverseKinematics, seed: Array) -> str:
+    def failure_reason(self, solver: InverseKinematics, seed: Array) -> str:
         """Says why there is no solution."""
         if solver.settings.position_only:
             where = np.array2string(self.target.translation, precision=3, separator=", ")
@@ -106,7 +106,7 @@ class KinematicsService:
         link = wanted.link
         found = wanted.solutions(solver, scene.positions, self._timeout(request))
         if not found:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, wanted.why_none(solver, scene.positions))
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, wanted.failure_reason(solver, scene.positions))
         kept = self._constrained(scene, request, found, link)
         if not request.avoid_collisions:
             return kept[0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action move_group: plans and, unless told otherwise, executes, watching the scene, and plans again if it must."""
+"""Action move_group: plans and, unless plan_only is set, executes, watching the scene, and plans again if it must."""
 from __future__ import annotations
 
 import copy

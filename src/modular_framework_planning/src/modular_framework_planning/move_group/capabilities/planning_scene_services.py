@@ -52,7 +52,7 @@ class ApplyPlanningSceneService:
 
 
 class ClearOctomapService:
-    """Offers clear_octomap (std_srvs/Empty): nothing is known of space afterwards, until a sensor looks again."""
+    """Offers clear_octomap (std_srvs/Empty): nothing is known of space until a sensor's next message."""
 
     def __init__(self, context: MoveGroupContext) -> None:
         self._context = context

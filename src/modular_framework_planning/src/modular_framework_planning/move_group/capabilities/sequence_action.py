@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action sequence_move_group: plans a sequence of motions as a whole and, unless told otherwise, executes it."""
+"""Action sequence_move_group: plans a sequence of motions together and, unless plan_only is set, executes it."""
 from __future__ import annotations
 
 import copy

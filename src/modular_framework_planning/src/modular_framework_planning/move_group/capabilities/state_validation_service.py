@@ -40,7 +40,7 @@ class StateValidationService:
 
         The response lists every contact and one result a constraint (joints, then positions, then orientations, then
         visibility); one that is refused is not satisfied, its distance is infinite, the log has the reason. Cost
-        sources stay empty: the scene has no costs, a place is either free or not.
+        sources stay empty: the scene has no costs, space is either free or not.
         """
         if not request.robot_state.joint_state.name or request.robot_state.is_diff:
             self._context.monitor.wait_for_state()

@@ -46,8 +46,8 @@ class TfPublisher:
     def _frame(self, parent: str, name: str, pose: Transform) -> TransformStamped:
         message = TransformStamped(child_frame_id=f"{self._prefix}/{name}" if self._prefix else name)
         message.header.frame_id, message.header.stamp = parent, rospy.Time.now()
-        place = pose_message(pose)
+        written = pose_message(pose)
         t = message.transform.translation
-        t.x, t.y, t.z = place.position.x, place.position.y, place.position.z
-        message.transform.rotation = place.orientation
+        t.x, t.y, t.z = written.position.x, written.position.y, written.position.z
+        message.transform.rotation = written.orientation
         return message

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers of a robot as the executor sees them: which there are, and how one is told to move."""
+"""Controllers of a robot as the executor sees them: which there are, and how one is commanded."""
 from __future__ import annotations
 
 import time

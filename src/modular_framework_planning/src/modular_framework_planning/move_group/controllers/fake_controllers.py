@@ -50,7 +50,7 @@ class FakeControllers:
     """Publishes ~fake_controller_joint_states (sensor_msgs/JointState, latched).
 
     Another node (joint_state_publisher with a source_list) makes joint_states of it. A motion counts as done when the
-    positions have come back that way.
+    positions have come back.
 
     Parameters: ~controller_list (name, joints, type, rate), ~initial (group, pose),
     ~fake_interpolating_controller_rate (10 Hz).

@@ -33,7 +33,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 DEFAULT_RESOLUTION = 0.1  # [m]
 ATTEMPTS = 3
-WAIT_S = 1.0  # for transforms and joint positions of the moment a sensor looked
+WAIT_S = 1.0  # for transforms and joint positions at the time of a sensor's message
 
 
 class OctomapMonitor:
@@ -104,7 +104,8 @@ class OctomapMonitor:
             known = make_filter(self._regions, bodies, sensor.translation)
             hidden = np.asarray(known.hides(ends, sensor.translation, shadow))
             hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
-            if self._replace(scene, self._map(scene, into_map).with_look(origin, hits, masked, clipped), into_map):
+            voxels = self._map(scene, into_map).with_point_cloud(origin, hits, masked, clipped)
+            if self._replace(scene, voxels, into_map):
                 return hidden
         raise PlanningError(ErrorCode.FAILURE, f"octomap: it changed during each of {ATTEMPTS} attempts to put a look "
                             "into it; change it less often, or use larger voxels (octomap_resolution)")
@@ -204,9 +205,9 @@ class OctomapMonitor:
 
 
 def _compile_loops() -> None:
-    """Looks once at nothing, so that the first look of a sensor need not wait for the compiler."""
+    """Inserts a point into an empty map, so that the first message of a sensor need not wait for the compiler."""
     here, point = np.zeros(3), np.ones((1, 3))
-    empty_map(DEFAULT_RESOLUTION).with_look(here, point, point, point)
+    empty_map(DEFAULT_RESOLUTION).with_point_cloud(here, point, point, point)
     SelfFilter(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, here)
 
 

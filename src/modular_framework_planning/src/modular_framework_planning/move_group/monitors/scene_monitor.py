@@ -32,8 +32,8 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 class SceneMonitor:
     """The one place that changes the scene; readers get immutable snapshots.
 
-    A thread of its own tells subscribers and listeners what changed, so that nobody waits for large messages; changes
-    that follow each other closely are told as one.
+    A thread of its own publishes what changed and calls the listeners, so that nobody waits for large messages; changes
+    that follow each other closely are published as one.
 
     Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object, tf.
     Publishes: ~monitored_planning_scene: to each new subscriber the whole scene, to all the changes, among them the
@@ -57,16 +57,17 @@ class SceneMonitor:
         self._needed = [number for number, name in enumerate(model.joint_names) if name not in followers]
         self.listeners: list[Callable[[PlanningScene], None]] = []
         self._publisher: Any = None
-        self._told = self._scene
-        self._was_silent = False
-        self._telling = threading.Lock()
-        self._news = threading.Event()
+        self._published_scene = self._scene
+        self._was_disabled = False
+        self._publish_lock = threading.Lock()
+        self._scene_changed = threading.Event()
 
     def connect(self) -> None:
         """Starts to listen and to publish."""
         self._frames.connect()
-        self._told = self.snapshot()
-        self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _Greeter(self), queue_size=100)
+        self._published_scene = self.snapshot()
+        self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _NewSubscriberListener(self),
+                                          queue_size=100)
         rospy.Subscriber(names.JOINT_STATES_TOPIC, JointState, self._on_joint_state, queue_size=5, tcp_nodelay=True)
         for topic, kind, change in (
                 (names.SCENE_TOPIC, SceneMessage, apply_scene),
@@ -74,20 +75,20 @@ class SceneMonitor:
                 (names.OBJECT_TOPIC, CollisionObject, apply_collision_object),
                 (names.ATTACHED_OBJECT_TOPIC, AttachedCollisionObject, apply_attached_object)):
             rospy.Subscriber(topic, kind, self._on_change, callback_args=(topic, change), queue_size=100)
-        threading.Thread(target=self._tell, name="planning scene", daemon=True).start()
+        threading.Thread(target=self._publish_changes, name="planning scene", daemon=True).start()
 
-    def greet(self, publish: Callable[[Any], None]) -> None:
-        """Hands the scene that the others know to a new subscriber; the lock keeps changes from coming in between."""
-        with self._telling:
+    def publish_to_new_subscriber(self, publish: Callable[[Any], None]) -> None:
+        """Publishes the scene that the others know to a new subscriber; under the lock, so that no change is lost."""
+        with self._publish_lock:
             if self.settings.publish_planning_scene:
-                publish(scene_message(self._told, 0))
+                publish(scene_message(self._published_scene, 0))
 
-    def _tell(self) -> None:
-        """Tells changes of the scene as they come, and of joints and frames as often as the settings say."""
+    def _publish_changes(self) -> None:
+        """Publishes changes of the scene as they come, and of joints and frames as often as the settings say."""
         while not rospy.is_shutdown():
             settings = self.settings
-            changed = self._news.wait(1.0 / settings.publish_planning_scene_hz)
-            self._news.clear()
+            changed = self._scene_changed.wait(1.0 / settings.publish_planning_scene_hz)
+            self._scene_changed.clear()
             if not (changed or settings.publish_state_updates or settings.publish_transforms_updates):
                 continue
             scene = self.snapshot()
@@ -96,25 +97,26 @@ class SceneMonitor:
                 for listener in self.listeners if changed else ():
                     listener(scene)
             except rospy.ROSException as error:  # the node is going down
-                rospy.logdebug("the change of the planning scene was not told: %s", error)
+                rospy.logdebug("the change of the planning scene was not published: %s", error)
             except Exception:  # what one change does to one listener must not keep the next ones from all
-                rospy.logerr("a change of the planning scene was not told:\n%s", traceback.format_exc())
+                rospy.logerr("a change of the planning scene was not published:\n%s", traceback.format_exc())
 
     def _publish(self, scene: PlanningScene, settings: SceneMonitorSettings) -> None:
-        """Tells subscribers the wanted parts of what changed, or everything where they heard nothing for a while."""
-        with self._telling:
-            heard = settings.publish_planning_scene and self._publisher.get_num_connections() > 0
-            if not heard:
-                self._told, self._was_silent = scene, not settings.publish_planning_scene
+        """Publishes the wanted parts of what changed, or everything where publishing was switched off before."""
+        with self._publish_lock:
+            has_subscribers = settings.publish_planning_scene and self._publisher.get_num_connections() > 0
+            if not has_subscribers:
+                self._published_scene, self._was_disabled = scene, not settings.publish_planning_scene
                 return
-            told = replace(
-                scene if settings.publish_geometry_updates else self._told,
-                positions=(scene if settings.publish_state_updates else self._told).positions,
-                fixed_frames=(scene if settings.publish_transforms_updates else self._told).fixed_frames)
-            message = scene_message(told, 0) if self._was_silent else difference_message(self._told, told)
+            visible = replace(
+                scene if settings.publish_geometry_updates else self._published_scene,
+                positions=(scene if settings.publish_state_updates else self._published_scene).positions,
+                fixed_frames=(scene if settings.publish_transforms_updates else self._published_scene).fixed_frames)
+            message = scene_message(visible, 0) if self._was_disabled else difference_message(
+                self._published_scene, visible)
             if message is not None:
                 self._publisher.publish(message)
-                self._told, self._was_silent = told, False
+                self._published_scene, self._was_disabled = visible, False
 
     def _on_change(self, message: Any, context: tuple[str, Callable[[PlanningScene, Any], PlanningScene]]) -> None:
         topic, change = context
@@ -131,7 +133,7 @@ class SceneMonitor:
         with self._lock:
             self._scene = change(self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames))
             scene = self._scene
-        self._news.set()
+        self._scene_changed.set()
         return scene
 
     def _on_joint_state(self, message: JointState) -> None:
@@ -153,7 +155,7 @@ class SceneMonitor:
         """Returns the joint positions [rad or m] at a time, waiting for them if they are still to come.
 
         Raises:
-            PlanningError: they were not heard of in time, or the time is too long ago.
+            PlanningError: they were not received in time, or the time is too long ago.
         """
         with self._arrived:
             self._arrived.wait_for(lambda: self._history.covers(stamp_s), timeout_s)
@@ -161,11 +163,11 @@ class SceneMonitor:
             return self._history.at(stamp_s)
 
     def missing_joints(self) -> list[str]:
-        """Returns joints never heard of on joint_states (mimic and passive ones are not needed)."""
+        """Returns joints never received on joint_states (mimic and passive ones are not needed)."""
         return [self.model.joint_names[number] for number in self._needed if number not in self._stamps]
 
     def wait_for_state(self, timeout_s: float = 3.0) -> None:
-        """Waits until every joint was heard of; raises PlanningError naming those that were not."""
+        """Waits until every joint was received; raises PlanningError naming those that were not."""
         deadline = time.monotonic() + timeout_s
         while self.missing_joints():
             remaining = deadline - time.monotonic()
@@ -200,8 +202,8 @@ class SceneMonitor:
         return message
 
 
-class _Greeter(rospy.SubscribeListener):
-    """Tells a new subscriber of the monitored scene what it missed."""
+class _NewSubscriberListener(rospy.SubscribeListener):
+    """Sends the scene to each new subscriber of the monitored scene."""
 
     def __init__(self, monitor: SceneMonitor) -> None:
         super().__init__()
@@ -209,4 +211,4 @@ class _Greeter(rospy.SubscribeListener):
 
     def peer_subscribe(self, _topic: str, _publish: Any, peer_publish: Callable[[Any], None]) -> None:
         """Called by rospy with a function that publishes to the new subscriber alone."""
-        self._monitor.greet(peer_publish)
+        self._monitor.publish_to_new_subscriber(peer_publish)

@@ -16,7 +16,7 @@ SAME = 1.0e-9  # [m] and of the rotation's entries; a frame that moves by less h
 
 
 class TfFrames:
-    """Listens to tf; a frame keeps its last known place. Threads may share it."""
+    """Listens to tf; a frame keeps its last known transform. Threads may share it."""
 
     def __init__(self, model: RobotModel) -> None:
         self._model = model
@@ -33,19 +33,19 @@ class TfFrames:
         """Returns where the frames are in the planning frame; one that did not move is the same object as before."""
         if self._buffer is None:
             return self._known
-        heard = set(self._buffer._getFrameStrings())  # tf2's Python interface has no other list of frames
+        names = set(self._buffer._getFrameStrings())  # tf2's Python interface has no other list of frames
         model, known = self._model, self._known
         fresh = {}
-        for name in heard - model.frame_ids.keys():
-            place, old = self._place(model.planning_frame, name), known.get(name)
-            if place is not None:
-                fresh[name] = old if old is not None and old.isApprox(place, SAME) else place
-        if any(known.get(name) is not place for name, place in fresh.items()):
+        for name in names - model.frame_ids.keys():
+            transform, old = self._lookup(model.planning_frame, name), known.get(name)
+            if transform is not None:
+                fresh[name] = old if old is not None and old.isApprox(transform, SAME) else transform
+        if any(known.get(name) is not transform for name, transform in fresh.items()):
             self._known = known = {**known, **fresh}
         return known
 
-    def _place(self, base: str, name: str) -> Transform | None:
-        """Returns the last known place of a frame; None where nothing joins it to the robot."""
+    def _lookup(self, base: str, name: str) -> Transform | None:
+        """Returns the last known transform of a frame; None where no chain of transforms leads to it."""
         try:
             found = self._buffer.lookup_transform_core(base, name, rospy.Time(0)).transform
             t, q = found.translation, found.rotation

@@ -82,7 +82,7 @@ class ConstrainedSearch:
             problem: with constraints.
             step: distance of collision checks along an edge [rad or m].
             goals: others than the problem's.
-            most_states: how many states to look at.
+            most_states: how many states to try.
         """
         self._problem, self._step, self._goals, self._most_states = problem, step, goals, most_states
         self._low, self._high = _search_bounds(problem)

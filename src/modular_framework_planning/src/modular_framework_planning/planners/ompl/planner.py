@@ -50,7 +50,7 @@ class OmplPlanner:
         return parameter_faults(planner_id, settings)
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the shortest of the paths that `attempts` searches find; the straight way where that is valid.
+        """Returns the shortest of the paths that `attempts` searches find; the straight motion where that is valid.
 
         Raises:
             PlanningError: no path was found, a setting is wrong, or the planner cannot do what is asked.
@@ -83,12 +83,12 @@ class OmplPlanner:
 
     @staticmethod
     def repaired(problem: PlanningProblem, vertices: Array) -> Array:
-        """Returns the path with every edge valid at the steps of the last check; raises EdgeError."""
+        """Returns the path with every edge valid at the steps of the solution validator; raises EdgeError."""
         return repaired(problem, vertices, connection)
 
 
 def connection(problem: PlanningProblem, first: Array, second: Array) -> Array | None:
-    """Returns a way between two free states, its edges looked at as finely as the last check looks; None for none.
+    """Returns a path between two free states, its edges checked as finely as the solution validator does, or None.
 
     The search ends after a number of iterations or states, so that a seed repeats it, or with the allowed time.
     """

@@ -11,55 +11,55 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 
 DEFAULT_RANGE = 0.5  # [rad or m]; a fifth of the space, OMPL's own choice, makes edges so long that few are free
 # RRTConnect without a range of its own first takes long steps, which cross open space in a few; where that does not
-# lead to a path soon, steps of the default range find narrow ways.
+# lead to a path soon, steps of the default range find narrow passages.
 LONG_RANGE, LONG_RANGE_ITERATIONS = 1.0, 150
 
 
-def _flag(value: object) -> bool:
+def _bool(value: object) -> bool:
     text = str(value).strip().lower()
     if text not in ("0", "1", "true", "false", "0.0", "1.0"):
         raise ValueError("a flag: 0, 1, true or false")
     return text in ("1", "true", "1.0")
 
 
-def _real(value: object) -> float:
+def _float(value: object) -> float:
     return float(str(value))
 
 
-def _whole(value: object) -> int:
+def _int(value: object) -> int:
     return int(float(str(value)))
 
 
 Setting = tuple[str, Callable[[object], Any]]
-_RANGE: dict[str, Setting] = {"range": ("setRange", _real)}
-_BIAS: dict[str, Setting] = {"goal_bias": ("setGoalBias", _real)}
-_INTERMEDIATE: dict[str, Setting] = {"intermediate_states": ("setIntermediateStates", _flag)}
-_CELLS: dict[str, Setting] = {"border_fraction": ("setBorderFraction", _real),
-                              "min_valid_path_fraction": ("setMinValidPathFraction", _real)}
-_FAILED: dict[str, Setting] = {"failed_expansion_score_factor": ("setFailedExpansionCellScoreFactor", _real)}
+_RANGE: dict[str, Setting] = {"range": ("setRange", _float)}
+_BIAS: dict[str, Setting] = {"goal_bias": ("setGoalBias", _float)}
+_INTERMEDIATE: dict[str, Setting] = {"intermediate_states": ("setIntermediateStates", _bool)}
+_CELLS: dict[str, Setting] = {"border_fraction": ("setBorderFraction", _float),
+                              "min_valid_path_fraction": ("setMinValidPathFraction", _float)}
+_FAILED: dict[str, Setting] = {"failed_expansion_score_factor": ("setFailedExpansionCellScoreFactor", _float)}
 _STAR: dict[str, Setting] = {
-    "delay_collision_checking": ("setDelayCC", _flag), "focus_search": ("setFocusSearch", _flag),
-    "informed_sampling": ("setInformedSampling", _flag), "new_state_rejection": ("setNewStateRejection", _flag),
-    "number_sampling_attempts": ("setNumSamplingAttempts", _whole), "ordered_sampling": ("setOrderedSampling", _flag),
-    "ordering_batch_size": ("setBatchSize", _whole), "prune_threshold": ("setPruneThreshold", _real),
-    "pruned_measure": ("setPrunedMeasure", _flag), "rewire_factor": ("setRewireFactor", _real),
-    "sample_rejection": ("setSampleRejection", _flag), "tree_pruning": ("setTreePruning", _flag),
-    "use_admissible_heuristic": ("setAdmissibleCostToCome", _flag), "use_k_nearest": ("setKNearest", _flag)}
+    "delay_collision_checking": ("setDelayCC", _bool), "focus_search": ("setFocusSearch", _bool),
+    "informed_sampling": ("setInformedSampling", _bool), "new_state_rejection": ("setNewStateRejection", _bool),
+    "number_sampling_attempts": ("setNumSamplingAttempts", _int), "ordered_sampling": ("setOrderedSampling", _bool),
+    "ordering_batch_size": ("setBatchSize", _int), "prune_threshold": ("setPruneThreshold", _float),
+    "pruned_measure": ("setPrunedMeasure", _bool), "rewire_factor": ("setRewireFactor", _float),
+    "sample_rejection": ("setSampleRejection", _bool), "tree_pruning": ("setTreePruning", _bool),
+    "use_admissible_heuristic": ("setAdmissibleCostToCome", _bool), "use_k_nearest": ("setKNearest", _bool)}
 _MARCHING: dict[str, Setting] = {
-    "cache_cc": ("setCacheCC", _flag), "extended_fmt": ("setExtendedFMT", _flag),
-    "free_space_volume": ("setFreeSpaceVolume", _real), "heuristics": ("setHeuristics", _flag),
-    "nearest_k": ("setNearestK", _flag), "num_samples": ("setNumSamples", _whole),
-    "radius_multiplier": ("setRadiusMultiplier", _real)}
+    "cache_cc": ("setCacheCC", _bool), "extended_fmt": ("setExtendedFMT", _bool),
+    "free_space_volume": ("setFreeSpaceVolume", _float), "heuristics": ("setHeuristics", _bool),
+    "nearest_k": ("setNearestK", _bool), "num_samples": ("setNumSamples", _int),
+    "radius_multiplier": ("setRadiusMultiplier", _float)}
 _BATCHES: dict[str, Setting] = {
-    "delay_rewiring_to_first_solution": ("setDelayRewiringUntilInitialSolution", _flag),
-    "drop_unconnected_samples_on_prune": ("setDropSamplesOnPrune", _flag),
-    "find_approximate_solutions": ("setConsiderApproximateSolutions", _flag),
-    "prune_threshold_as_fractional_cost_change": ("setPruneThresholdFraction", _real),
-    "rewire_factor": ("setRewireFactor", _real), "samples_per_batch": ("setSamplesPerBatch", _whole),
-    "stop_on_each_solution_improvement": ("setStopOnSolnImprovement", _flag),
-    "use_graph_pruning": ("setPruning", _flag), "use_just_in_time_sampling": ("setJustInTimeSampling", _flag),
-    "use_k_nearest": ("setUseKNearest", _flag), "use_strict_queue_ordering": ("setStrictQueueOrdering", _flag)}
-_ROADMAP: dict[str, Setting] = {"max_nearest_neighbors": ("setMaxNearestNeighbors", _whole)}
+    "delay_rewiring_to_first_solution": ("setDelayRewiringUntilInitialSolution", _bool),
+    "drop_unconnected_samples_on_prune": ("setDropSamplesOnPrune", _bool),
+    "find_approximate_solutions": ("setConsiderApproximateSolutions", _bool),
+    "prune_threshold_as_fractional_cost_change": ("setPruneThresholdFraction", _float),
+    "rewire_factor": ("setRewireFactor", _float), "samples_per_batch": ("setSamplesPerBatch", _int),
+    "stop_on_each_solution_improvement": ("setStopOnSolnImprovement", _bool),
+    "use_graph_pruning": ("setPruning", _bool), "use_just_in_time_sampling": ("setJustInTimeSampling", _bool),
+    "use_k_nearest": ("setUseKNearest", _bool), "use_strict_queue_ordering": ("setStrictQueueOrdering", _bool)}
+_ROADMAP: dict[str, Setting] = {"max_nearest_neighbors": ("setMaxNearestNeighbors", _int)}
 
 PLANNERS: dict[str, tuple[type, dict[str, Setting]]] = {
     "RRTConnect": (og.RRTConnect, {**_RANGE, **_INTERMEDIATE}),
@@ -79,7 +79,7 @@ PLANNERS: dict[str, tuple[type, dict[str, Setting]]] = {
 }
 # Planners that look for solutions in a thread of their own: it must not need the interpreter, whose lock solve() holds.
 THREADED = frozenset({"PRM", "PRMstar"})
-# Planners that go on to improve what they found until they are told to stop.
+# Planners that go on to improve what they found until they are stopped.
 ANYTIME = frozenset({"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"})
 PATH_LENGTH = "PathLengthOptimizationObjective"
 # Keys of ompl_planning.yaml that are read elsewhere, and those whose other values this OMPL has nothing for.

@@ -17,9 +17,9 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 class _LinkPosition(ob.ProjectionEvaluator):
     """Projects to where a link is; `release` breaks the tie to the robot model afterwards."""
 
-    def __init__(self, space: Any, place: Callable[[Array], Array], count: int) -> None:
+    def __init__(self, space: Any, position: Callable[[Array], Array], count: int) -> None:
         super().__init__(space)
-        self._place: Callable[[Array], Array] | None = place
+        self._position: Callable[[Array], Array] | None = position
         self._count = count
 
     def getDimension(self) -> int:  # noqa: N802 - OMPL calls it by this name
@@ -28,12 +28,12 @@ class _LinkPosition(ob.ProjectionEvaluator):
 
     def project(self, state: Any, projection: Any) -> None:
         """Writes the position [m] of the link at a state."""
-        if self._place is not None:
-            projection[:] = self._place(np.array(state[0:self._count]))
+        if self._position is not None:
+            projection[:] = self._position(np.array(state[0:self._count]))
 
     def release(self) -> None:
         """Lets go of the robot model."""
-        self._place = None
+        self._position = None
 
 
 def projection_evaluator(text: str, problem: PlanningProblem, space: Any) -> Any:
@@ -63,7 +63,7 @@ def projection_evaluator(text: str, problem: PlanningProblem, space: Any) -> Any
         raise PlanningError(ErrorCode.INVALID_LINK_NAME, f"projection_evaluator '{text}': the robot has no such link; "
                             f"known: {', '.join(problem.model.frame_ids)}")
 
-    def place(values: Array) -> Array:
+    def position(values: Array) -> Array:
         return problem.model.link_transforms(problem.motion.full_positions(values))[names[0]].translation
 
-    return _LinkPosition(space, place, len(joints))
+    return _LinkPosition(space, position, len(joints))

@@ -69,10 +69,10 @@ class Transition:
         """Returns the mean of the joints, for a redundant arm to keep near to."""
         one, other = state_at(self.first, time_s + self.first_from), state_at(self.second, time_s + self.second_from)
         weight, rate, change = self.weight(time_s)
-        way, speed = other.positions - one.positions, other.velocities - one.velocities
-        return JointState(one.positions + weight * way, one.velocities + weight * speed + rate * way,
+        offset, speed = other.positions - one.positions, other.velocities - one.velocities
+        return JointState(one.positions + weight * offset, one.velocities + weight * speed + rate * offset,
                           one.accelerations + weight * (other.accelerations - one.accelerations)
-                          + 2.0 * rate * speed + change * way)
+                          + 2.0 * rate * speed + change * offset)
 
 
 def _crossing(outside: Callable[[float], bool], times: Array) -> float | None:

@@ -102,9 +102,9 @@ def link_motion(motion: PoseMotion, time_s: float) -> LinkMotion:
     before, now, after = (motion.pose(time_s + shift) for shift in (-step, 0.0, step))
     turn_before = now.rotation @ pin.log3(before.rotation.T @ now.rotation)
     turn_after = now.rotation @ pin.log3(now.rotation.T @ after.rotation)
-    way_before, way_after = now.translation - before.translation, after.translation - now.translation
-    velocity = np.concatenate([way_before + way_after, turn_before + turn_after]) / (2.0 * step)
-    return LinkMotion(velocity, np.concatenate([way_after - way_before, turn_after - turn_before]) / step**2)
+    step_before, step_after = now.translation - before.translation, after.translation - now.translation
+    velocity = np.concatenate([step_before + step_after, turn_before + turn_after]) / (2.0 * step)
+    return LinkMotion(velocity, np.concatenate([step_after - step_before, turn_after - turn_before]) / step**2)
 
 
 def follow(motion: PoseMotion, follower: PoseFollower, period_s: float, start: JointState,

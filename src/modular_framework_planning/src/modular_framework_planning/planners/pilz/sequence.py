@@ -109,7 +109,7 @@ class SequenceJoiner:
             kinematics: inverse kinematics of the groups.
             checkers: gives the collision world of a motion from its scene, group and start.
             period_s: between two points of a blended piece.
-            step: between two looked-at states of a blended piece [rad or m].
+            step: between two checked states of a blended piece [rad or m].
         """
         self._kinematics, self._checkers = kinematics, checkers
         self._period_s, self._step = period_s, step

@@ -16,8 +16,8 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-BOW = 1.0  # [rad or m]; standard deviation of the bow that later attempts begin with
-CALMING = 0.93  # of the noise after an iteration without progress
+BOW_STDDEV = 1.0  # [rad or m]; standard deviation of the bow that later attempts begin with
+NOISE_DECAY = 0.93  # of the noise after an iteration without progress
 SCALES = (1.0, 0.5, 0.25)  # of the noise of neighbouring copies
 
 
@@ -82,7 +82,7 @@ class _Attempt:
         self._costs = StateCosts(problem)
         self._optimiser = Optimiser(settings, *problem.bounds, problem.rng)
         line = self._optimiser.line(problem.start_values, goal)
-        self.motion = self._on_constraints(self._optimiser.disturbed(line, BOW)[0] if is_bowed else line)
+        self.motion = self._on_constraints(self._optimiser.disturbed(line, BOW_STDDEV)[0] if is_bowed else line)
 
     def run(self) -> bool:
         """Whether `motion` became valid."""
@@ -103,7 +103,7 @@ class _Attempt:
             costs = np.concatenate([self._optimiser.costs(fresh, self._costs), costs[kept]])
             stepped, cost = self._step(copies, costs, cost)
             if not stepped:
-                stddev *= CALMING
+                stddev *= NOISE_DECAY
             if self._is_valid():
                 valid = self.motion.copy()
             cost = self._cost(self.motion)
@@ -115,12 +115,12 @@ class _Attempt:
         """Takes the cheaper one of the weighted average and the best copy, where it is cheaper than the motion."""
         candidates = [self._on_constraints(item) for item in (
             self._optimiser.update(self.motion, copies, costs), copies[int(np.argmin(costs.sum(axis=1)))])]
-        prices = [self._cost(item) for item in candidates]
-        best = int(np.argmin(prices))
-        if prices[best] >= cost:
+        candidate_costs = [self._cost(item) for item in candidates]
+        best = int(np.argmin(candidate_costs))
+        if candidate_costs[best] >= cost:
             return False, cost
         self.motion = candidates[best]
-        return True, prices[best]
+        return True, candidate_costs[best]
 
     def _cost(self, motion: Array) -> float:
         return float(self._optimiser.costs(motion[None], self._costs).sum())

@@ -13,7 +13,7 @@ NEGLIGIBLE = 1.0e-6  # [rad or m]; a start this near to its bounds is taken as b
 
 
 class FixStartStateBounds(RequestAdapter):
-    """Parameter `start_state_max_bounds_error` [rad or m]: how far beyond a bound is mended."""
+    """Parameter `start_state_max_bounds_error` [rad or m]: how far beyond a bound a start is corrected."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
         """Plans from the nearest state within bounds; the motion begins where the robot is."""

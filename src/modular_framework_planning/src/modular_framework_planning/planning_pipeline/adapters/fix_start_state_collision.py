@@ -16,7 +16,7 @@ class FixStartStateCollision(RequestAdapter):
     """Parameters `jiggle_fraction`, `max_sampling_attempts` and `start_state_collision_depth` [m]."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans from a free state near a colliding start and puts the way there in front."""
+        """Plans from a free state near a colliding start and puts the motion to it in front."""
         if problem.motion.state_is_free(problem.start_values):
             return plan_next(problem)
         free = self._free_state(problem)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts a prefix in front of a path: from the real start to the mended one it was planned from."""
+"""Puts a prefix in front of a path: from the real start to the corrected one it was planned from."""
 from __future__ import annotations
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool
 
     Args:
         problem: its start is where the robot is.
-        path: planned from a start that was mended.
+        path: planned from a start that was corrected.
         collides: the prefix may collide.
 
     Raises:
@@ -33,12 +33,13 @@ def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool
 
 
 def _joined(problem: PlanningProblem, start: Array, rest: Trajectory) -> Trajectory:
-    way = parameterize(problem.group.joints, np.vstack([start, rest.positions[0]]), np.zeros(0),
+    prefix = parameterize(problem.group.joints, np.vstack([start, rest.positions[0]]), np.zeros(0),
                        problem.max_velocity, problem.max_acceleration)
     longest = problem.settings.start_state_max_dt
-    if way.duration_s > longest:
+    if prefix.duration_s > longest:
         raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: the way to the first state of the motion "
-                            f"takes {way.duration_s:.2f} s; start_state_max_dt allows {longest} s")
-    return Trajectory(rest.joint_names, np.concatenate([way.times, way.duration_s + rest.times[1:]]),
-                      np.vstack([way.positions, rest.positions[1:]]), np.vstack([way.velocities, rest.velocities[1:]]),
-                      np.vstack([way.accelerations, rest.accelerations[1:]]))
+                            f"takes {prefix.duration_s:.2f} s; start_state_max_dt allows {longest} s")
+    return Trajectory(rest.joint_names, np.concatenate([prefix.times, prefix.duration_s + rest.times[1:]]),
+                      np.vstack([prefix.positions, rest.positions[1:]]),
+                      np.vstack([prefix.velocities, rest.velocities[1:]]),
+                      np.vstack([prefix.accelerations, rest.accelerations[1:]]))
