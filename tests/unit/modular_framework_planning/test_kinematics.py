@@ -13,9 +13,9 @@ from independent_arms import (
     seven_joint_flange,
     ur5_tool,
 )
+from pose_difference import pose_difference
 
 from modular_framework_planning.errors import PlanningError
-from modular_framework_planning.geometry.spatial import pose_difference
 from modular_framework_planning.kinematics import compiled_kinematics
 from modular_framework_planning.kinematics.chain_model import tree_of
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements, rotation_vector

@@ -10,12 +10,12 @@ import pinocchio as pin
 import pytest
 from independent_checker import IndependentChecker
 from independent_checker import box as solid_box
+from pose_difference import pose_difference
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
-from modular_framework_planning.geometry.spatial import pose_difference
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,

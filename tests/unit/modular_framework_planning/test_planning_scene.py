@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from pose_difference import pose_difference
 
 from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.errors import GeometryError, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.shapes import Box, Cylinder, Mesh, Plane, Sphere
-from modular_framework_planning.geometry.spatial import make_transform, pose_difference
+from modular_framework_planning.geometry.spatial import make_transform
 from modular_framework_planning.planning_interface.motion_problems import read_scene
 from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix, matrix_from_rows
 from modular_framework_planning.planning_scene.planning_scene import (

@@ -269,7 +269,10 @@ def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
 @lru_cache(maxsize=KEPT_GROUPINGS)
 def _tables(model: RobotModel, groups: Grouping,
             keys: tuple[tuple[int, ...], ...]) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
-    """Tables (all unknown at first) of pairs of links, kept as long as the robot: they hold in every scene."""
+    """Tables (all unknown at first) of pairs of links.
+
+    They hold in every scene: `model` and `groups` only say for which robot and bodies they are kept.
+    """
     joints = np.array([(*key[2:], -1)[:2] for key in keys], dtype=np.int64).reshape(-1, 2)
     return np.full((len(keys), CELLS, CELLS), UNKNOWN, dtype=np.int8), joints
 

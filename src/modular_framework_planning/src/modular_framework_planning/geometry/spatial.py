@@ -55,10 +55,3 @@ def quaternion_or_identity(quaternion_xyzw: Sequence[float], where: str) -> Sequ
 def pose_of(transform: Transform) -> tuple[Array, Array]:
     """Returns position [m] and xyzw quaternion of a transform."""
     return np.array(transform.translation), np.array(pin.Quaternion(transform.rotation).coeffs())
-
-
-def pose_difference(first: Transform, second: Transform) -> tuple[float, float]:
-    """Returns the distance [m] and the angle [rad] between two poses given in one frame."""
-    distance = float(np.linalg.norm(first.translation - second.translation))
-    angle = float(np.linalg.norm(pin.log3(first.rotation.T @ second.rotation)))
-    return distance, angle

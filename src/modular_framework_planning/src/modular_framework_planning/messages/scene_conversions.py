@@ -194,7 +194,7 @@ def fixed_frames_from(scene: PlanningScene, transforms: Sequence[Any]) -> dict[s
     return frames
 
 
-def object_to_message(scene: PlanningScene, body: core.CollisionObject, frame: str,
+def object_to_message(body: core.CollisionObject, frame: str,
                       with_geometry: bool = True) -> CollisionObject:
     """Writes an object whose pose is given in `frame`."""
     message = CollisionObject(id=body.name, operation=CollisionObject.ADD)
@@ -238,7 +238,7 @@ def attached_to_message(scene: PlanningScene, item: core.AttachedObject,
                         with_geometry: bool = True) -> AttachedCollisionObject:
     """Writes an attached object in the frame of its link."""
     message = AttachedCollisionObject(link_name=item.link, touch_links=sorted(item.touch_links))
-    message.object = object_to_message(scene, item.body, item.link, with_geometry)
+    message.object = object_to_message(item.body, item.link, with_geometry)
     return message
 
 

@@ -82,5 +82,5 @@ def _world_changes(before: PlanningScene, after: PlanningScene) -> list[Collisio
             move.header.frame_id = frame
             changes.append(move)
         else:
-            changes.append(object_to_message(after, body, frame))
+            changes.append(object_to_message(body, frame))
     return changes

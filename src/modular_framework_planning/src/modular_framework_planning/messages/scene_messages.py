@@ -70,7 +70,7 @@ def scene_message(scene: PlanningScene, components: int) -> SceneMessage:
         message.robot_state = state_message(scene, None, bool(wanted & Parts.ROBOT_STATE_ATTACHED_OBJECTS))
     geometry = bool(wanted & Parts.WORLD_OBJECT_GEOMETRY)
     if geometry or wanted & Parts.WORLD_OBJECT_NAMES:
-        message.world.collision_objects = [object_to_message(scene, body, scene.model.planning_frame, geometry)
+        message.world.collision_objects = [object_to_message(body, scene.model.planning_frame, geometry)
                                            for body in scene.objects.values()]
     if wanted & Parts.OCTOMAP:
         message.world.octomap = octomap_message(scene)

@@ -28,25 +28,12 @@ HIT, MISS, LOWEST, HIGHEST = (float(np.float32(np.log(chance / (1.0 - chance))))
 MAX_VOXELS = 16_000_000
 
 
-def spread_bits(values: Keys) -> Keys:
-    """Moves bit i of 16-bit numbers to bit 3i."""
-    spread = values & 0xFFFF
-    for shift, mask in ((16, 0x0000FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249)):
-        spread = (spread | (spread << shift)) & mask
-    return spread
-
-
 def gather_bits(values: Keys) -> Keys:
     """Moves bit 3i back to bit i; other bits are dropped."""
     packed = values & 0x249249249249
     for shift, mask in ((2, 0x0C30C30C30C3), (4, 0x00F00F00F00F), (8, 0x0000FF0000FF), (16, 0xFFFF)):
         packed = (packed | (packed >> shift)) & mask
     return packed
-
-
-def keys_of_cells(cells: Keys) -> Keys:
-    """Returns the Morton codes of voxels given by their three 16-bit numbers (n, 3)."""
-    return spread_bits(cells[:, 0]) | (spread_bits(cells[:, 1]) << 1) | (spread_bits(cells[:, 2]) << 2)
 
 
 def cells_of_keys(keys: Keys) -> Keys:
@@ -91,12 +78,6 @@ class VoxelMap:
     def keys_of_points(self, points: Array) -> Keys:
         """Returns the codes of the voxels that points (n, 3) [m] lie in; points beyond the tree are left out."""
         return cells_of_points(np.asarray(points, dtype=float).reshape(-1, 3), self.resolution, AXIS_CENTER)
-
-    def value_at(self, point: Array) -> float | None:
-        """Returns the log odds of the voxel a point (3,) [m] lies in; None where nothing is known."""
-        key = self.keys_of_points(np.atleast_2d(point))
-        index = int(np.searchsorted(self.keys, key[0])) if len(key) else len(self.keys)
-        return float(self.values[index]) if index < len(self.keys) and self.keys[index] == key[0] else None
 
     def updated(self, free: Keys, occupied: Keys, masked: Keys) -> VoxelMap:
         """Returns the map after one point cloud.

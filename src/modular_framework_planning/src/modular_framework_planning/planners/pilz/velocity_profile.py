@@ -27,7 +27,6 @@ class TrapezoidalProfile:
     Attributes:
         distance: length of the path, above 0.
         rise_s, cruise_s, fall_s: lengths of the trapezoid's phases.
-        peak_velocity: highest speed [1/s].
         knots, positions, velocities, accelerations: the chain of cubics, one entry where the acceleration changes
             its slope.
     """
@@ -36,7 +35,6 @@ class TrapezoidalProfile:
     rise_s: float
     cruise_s: float
     fall_s: float
-    peak_velocity: float
     knots: Array
     positions: Array
     velocities: Array
@@ -82,7 +80,7 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
     positions = np.concatenate([[0.0], np.cumsum(steps)])
     scale = distance / positions[-1]
     velocities[-1] = 0.0
-    return TrapezoidalProfile(distance, rise, cruise, fall, peak, knots, positions * scale, velocities * scale,
+    return TrapezoidalProfile(distance, rise, cruise, fall, knots, positions * scale, velocities * scale,
                               accelerations * scale)
 
 
