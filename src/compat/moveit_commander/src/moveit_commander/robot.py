@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The whole robot: its joints, links, groups and present state: RobotCommander."""
+"""RobotCommander: the joints, links, groups and current state of the robot."""
 from __future__ import annotations
 
 from typing import Any
@@ -8,7 +8,6 @@ from geometry_msgs.msg import PoseStamped
 from moveit_msgs.msg import RobotState
 from visualization_msgs.msg import MarkerArray
 
-from moveit_commander import robot_parts
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_connection import forward_kinematics
 from moveit_commander.move_group import MoveGroupCommander
@@ -17,11 +16,76 @@ from moveit_commander.robot_state import current_state
 from moveit_commander.servers import Servers
 
 
+class Joint:
+    """A joint with its bounds and its present value [rad or m]; a fixed joint has neither."""
+
+    def __init__(self, robot: RobotCommander, name: str) -> None:
+        self._robot = robot
+        self._name = name
+
+    def name(self) -> str:
+        """Answers its name."""
+        return self._name
+
+    def variable_count(self) -> int:
+        """Answers how many numbers describe its position."""
+        return int(self._robot._model.joints[self._name].movable)
+
+    def bounds(self) -> list[float]:
+        """Answers [lower, upper]; [] of a fixed joint."""
+        joint = self._robot._model.joints[self._name]
+        return [joint.lower, joint.upper] if joint.movable else []
+
+    def min_bound(self) -> float | list[float]:
+        """Answers the lower bound; [] of a fixed joint."""
+        return next(iter(self.bounds()), [])
+
+    def max_bound(self) -> float | list[float]:
+        """Answers the upper bound; [] of a fixed joint."""
+        return next(iter(self.bounds()[1:]), [])
+
+    def value(self) -> float | list[float]:
+        """Answers where it is now; [] of a fixed joint."""
+        if not self.variable_count():
+            return []
+        return self._robot._state.positions([self._name])[self._name]
+
+    def move(self, position: float, wait: bool = True) -> bool:
+        """Moves it, by the smallest group that has it; the group's other joints stay. Answers as go does.
+
+        Raises:
+            MoveItCommanderException: no group has it, or the position is out of bounds.
+        """
+        group = self._robot.get_default_owner_group(self._name)
+        if group is None:
+            raise MoveItCommanderException(f"There is no known group containing joint {self._name}. Cannot move.")
+        commander = self._robot.get_group(group)
+        commander.set_joint_value_target(commander.get_current_joint_values())
+        commander.set_joint_value_target(self._name, position)
+        return commander.go(wait)
+
+
+class Link:
+    """A link with its present pose."""
+
+    def __init__(self, robot: RobotCommander, name: str) -> None:
+        self._robot = robot
+        self._name = name
+
+    def name(self) -> str:
+        """Answers its name."""
+        return self._name
+
+    def pose(self) -> PoseStamped:
+        """Answers where it is now, in the planning frame."""
+        return self._robot._link_pose(self._name)
+
+
 class RobotCommander:
     """Answers questions about a robot; groups, joints and links are attributes too (robot.arm, robot.elbow_joint)."""
 
-    Joint = robot_parts.Joint
-    Link = robot_parts.Link
+    Joint = Joint
+    Link = Link
 
     def __init__(self, robot_description: str = "robot_description", ns: str = "") -> None:
         """Reads the robot's description.
@@ -82,17 +146,17 @@ class RobotCommander:
         """Answers the present joint positions by name [rad or m]."""
         return self._state.positions()
 
-    def get_joint(self, name: str) -> robot_parts.Joint:
+    def get_joint(self, name: str) -> Joint:
         """Answers a joint; raises MoveItCommanderException if there is none of that name."""
         if name not in self._model.joints:
             raise MoveItCommanderException(f"There is no joint named {name}; get_joint_names lists those there are")
-        return self.Joint(self, name)
+        return Joint(self, name)
 
-    def get_link(self, name: str) -> robot_parts.Link:
+    def get_link(self, name: str) -> Link:
         """Answers a link; raises MoveItCommanderException if there is none of that name."""
         if name not in self._model.links:
             raise MoveItCommanderException(f"There is no link named {name}; get_link_names lists those there are")
-        return self.Link(self, name)
+        return Link(self, name)
 
     def get_group(self, name: str) -> MoveGroupCommander:
         """Answers the commander of a group, the same one each time."""
