@@ -1,28 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Hierarchical state machines: the public interface of smach 2.5.2, written anew."""
-# The logging functions and the errors come first: the other modules look them up in the package at call time.
-from smach.log import logdebug, logerr, loginfo, logwarn, set_loggers  # isort: skip
-from smach.exceptions import (  # isort: skip
+from smach.concurrence import Concurrence
+from smach.container import Container
+from smach.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
     InvalidUserCodeError,
     SmachError,
 )
-from smach.util import (  # isort: skip
+from smach.iterator import Iterator
+from smach.log import logdebug, logerr, loginfo, logwarn, set_loggers
+from smach.sequence import Sequence
+from smach.state import CBState, State
+from smach.state_machine import StateMachine
+from smach.user_data import Remapper, UserData
+from smach.util import (
     CBInterface,
     cb_interface,
     has_smach_interface,
     is_shutdown,
     set_shutdown_check,
 )
-from smach.user_data import Remapper, UserData  # isort: skip
-from smach.state import CBState, State  # isort: skip
-from smach.container import Container  # isort: skip
-from smach.state_machine import StateMachine  # isort: skip
-from smach.concurrence import Concurrence  # isort: skip
-from smach.sequence import Sequence  # isort: skip
-from smach.iterator import Iterator  # isort: skip
 
 __all__ = [
     "CBInterface",

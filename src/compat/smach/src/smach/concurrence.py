@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import smach
+from smach import log
 from smach.container import Container
+from smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError, SmachError
 from smach.state import State
 from smach.user_data import UserData
+from smach.util import is_shutdown
 
 __all__ = ["Concurrence"]
 
@@ -56,7 +58,7 @@ class Concurrence(Container):
         self._child_termination_cb = child_termination_cb
         self._child_outcomes: dict[str, str | None] = {}
         self._active: list[str] = []
-        self._errors: list[smach.SmachError] = []
+        self._errors: list[SmachError] = []
         self._running = False
         self._lock = threading.RLock()
         self._ended = threading.Condition(self._lock)
@@ -79,9 +81,9 @@ class Concurrence(Container):
         """
         concurrence: Concurrence = Concurrence._currently_opened_container()
         if label in concurrence._states:
-            raise smach.InvalidStateError(f"the concurrence already has a state with the label '{label}'")
+            raise InvalidStateError(f"the concurrence already has a state with the label '{label}'")
         if not isinstance(state, State):
-            raise smach.InvalidStateError(f"'{label}' is a {type(state).__name__}, not a smach.State")
+            raise InvalidStateError(f"'{label}' is a {type(state).__name__}, not a smach.State")
         concurrence._states[label] = state
         concurrence._remappings[label] = dict(remapping or {})
         return state
@@ -89,7 +91,7 @@ class Concurrence(Container):
     def check_consistency(self) -> None:
         """Raise when there is no state, or when the outcome map names outcomes or states that are not there."""
         if not self._states:
-            raise smach.InvalidStateError("the concurrence has no states")
+            raise InvalidStateError("the concurrence has no states")
         faults = []
         if self._default_outcome not in self._outcomes:
             faults.append(f"default outcome '{self._default_outcome}' is not among the outcomes")
@@ -103,7 +105,7 @@ class Concurrence(Container):
                     known = list(self._states[label].get_registered_outcomes())
                     faults.append(f"the outcome map names '{child_outcome}' of '{label}', which gives {known}")
         if faults:
-            raise smach.InvalidStateError(f"{'; '.join(faults)}; outcomes: {list(self._outcomes)}")
+            raise InvalidStateError(f"{'; '.join(faults)}; outcomes: {list(self._outcomes)}")
 
     # ---- looking in ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
@@ -124,7 +126,7 @@ class Concurrence(Container):
         if userdata is not None:
             self.userdata.update(userdata)
         if initial_states and set(initial_states) != set(self._states):
-            smach.logwarn(f"a concurrence starts all its states; the choice {list(initial_states)} is ignored")
+            log.warn(f"a concurrence starts all its states; the choice {list(initial_states)} is ignored")
 
     def get_active_states(self) -> list[str]:
         """Return the labels of the states that are still running."""
@@ -156,7 +158,7 @@ class Concurrence(Container):
         """
         self.check_consistency()
         self._copy_input_keys(parent_ud)
-        smach.loginfo(f"concurrence starts {list(self._states)}")
+        log.info(f"concurrence starts {list(self._states)}")
         threads = [
             threading.Thread(target=self._run_child, args=(label,), name=f"smach-{label}", daemon=True)
             for label in self._states
@@ -185,30 +187,30 @@ class Concurrence(Container):
         self._settle_preempt()
         self._copy_output_keys(parent_ud)
         self.call_termination_cbs(list(self._states), outcome)
-        smach.loginfo(f"concurrence ends with '{outcome}': {outcomes}")
+        log.info(f"concurrence ends with '{outcome}': {outcomes}")
         return outcome
 
     def _run_child(self, label: str) -> None:
         """Thread body: run one child and note how it ended."""
         state = self._states[label]
         outcome: str | None = None
-        error: smach.SmachError | None = smach.InvalidUserCodeError(f"state '{label}' ended its thread")
+        error: SmachError | None = InvalidUserCodeError(f"state '{label}' ended its thread")
         try:
             outcome = self._execute_child(label, state, self._remappings[label])
             error = None
-            if outcome not in state.get_registered_outcomes() and not smach.is_shutdown():
-                error = smach.InvalidTransitionError(
+            if outcome not in state.get_registered_outcomes() and not is_shutdown():
+                error = InvalidTransitionError(
                     f"state '{label}' of type {type(state).__name__} returned {outcome!r}, but its outcomes are "
                     f"{list(state.get_registered_outcomes())}"
                 )
-        except smach.SmachError as raised:
+        except SmachError as raised:
             error = raised
         finally:  # also when the state left by SystemExit: the concurrence must not wait for it for ever
             with self._ended:
                 self._child_outcomes[label] = outcome
                 self._active.remove(label)
                 if error is not None:
-                    smach.logerr(f"concurrent state '{label}' failed: {error}")
+                    log.error(f"concurrent state '{label}' failed: {error}")
                     self._errors.append(error)
                 self._ended.notify_all()
 
@@ -234,7 +236,7 @@ class Concurrence(Container):
         try:
             answer = self._child_termination_cb(outcomes)
         except Exception as raised:
-            error = smach.InvalidUserCodeError(f"child termination callback raised {type(raised).__name__}: {raised}")
+            error = InvalidUserCodeError(f"child termination callback raised {type(raised).__name__}: {raised}")
             error.__cause__ = raised
             with self._lock:
                 self._errors.append(error)
@@ -255,7 +257,7 @@ class Concurrence(Container):
 
     def _decide(self, outcomes: dict[str, str | None]) -> str:
         """Return the outcome of the concurrence, given those of its children."""
-        if smach.is_shutdown() and not all(
+        if is_shutdown() and not all(
             outcome in self._states[label].get_registered_outcomes() for label, outcome in outcomes.items()
         ):
             return "preempted"
@@ -264,7 +266,7 @@ class Concurrence(Container):
             try:
                 chosen = self._outcome_cb(dict(outcomes))
             except Exception as raised:
-                raise smach.InvalidUserCodeError(
+                raise InvalidUserCodeError(
                     f"outcome callback raised {type(raised).__name__}: {raised}"
                 ) from raised
         if chosen is None:
@@ -277,7 +279,7 @@ class Concurrence(Container):
                 self._default_outcome,
             )
         if chosen not in self._outcomes:
-            raise smach.InvalidStateError(
+            raise InvalidStateError(
                 f"the concurrence chose the outcome {chosen!r}; its outcomes are {list(self._outcomes)}"
             )
         return chosen
@@ -291,7 +293,7 @@ class Concurrence(Container):
     def _recall_leftovers(self) -> list[str]:
         leftovers = [label for label, state in self._states.items() if state.preempt_requested()]
         for label in leftovers:
-            smach.logdebug(f"state '{label}' ended without acknowledging the request to stop")
+            log.debug(f"state '{label}' ended without acknowledging the request to stop")
             self._states[label].recall_preempt()
         return leftovers
 

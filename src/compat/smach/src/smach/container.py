@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-import smach
+from smach import log
+from smach.exceptions import InvalidConstructionError, InvalidStateError, InvalidUserCodeError
 from smach.state import State
 from smach.user_data import Remapper, UserData
 
@@ -71,8 +72,8 @@ class Container(State):
         """Tell whether the container is executing."""
         return False
 
-    def _unsupported(self, method: str) -> smach.InvalidConstructionError:
-        return smach.InvalidConstructionError(f"{type(self).__name__} does not define {method}")
+    def _unsupported(self, method: str) -> InvalidConstructionError:
+        return InvalidConstructionError(f"{type(self).__name__} does not define {method}")
 
     # ---- construction --------------------------------------------------------------------------------------
     def open(self) -> None:
@@ -87,7 +88,7 @@ class Container(State):
         """
         stack = self._construction.stack
         if not stack or stack[-1] is not self:
-            raise smach.InvalidStateError("cannot close a container that is not the one opened last")
+            raise InvalidStateError("cannot close a container that is not the one opened last")
         stack.pop()
 
     def is_opened(self) -> bool:
@@ -97,7 +98,7 @@ class Container(State):
     def assert_opened(self, msg: str = "the container is not open; use 'with container:'") -> None:
         """Raise ``InvalidConstructionError`` with a message unless the container is open."""
         if not self.is_opened():
-            raise smach.InvalidConstructionError(msg)
+            raise InvalidConstructionError(msg)
 
     @contextmanager
     def opened(self) -> Iterator[Container]:
@@ -124,11 +125,11 @@ class Container(State):
         """Return the container being built; raise ``InvalidConstructionError`` when there is none of this kind."""
         stack = cls._construction.stack
         if not stack:
-            raise smach.InvalidConstructionError(
+            raise InvalidConstructionError(
                 f"no container is open; call {cls.__name__}.add inside 'with container:'"
             )
         if not isinstance(stack[-1], cls):
-            raise smach.InvalidConstructionError(
+            raise InvalidConstructionError(
                 f"{cls.__name__}.add was called while a {type(stack[-1]).__name__} is open; use its own add"
             )
         return stack[-1]
@@ -139,7 +140,7 @@ class Container(State):
             if parent_ud is not None and key in parent_ud:
                 self.userdata[key] = parent_ud[key]
             elif parent_ud is not None and key not in self.userdata:
-                smach.logwarn(f"{type(self).__name__}: input key '{key}' has no value in the parent's userdata")
+                log.warn(f"{type(self).__name__}: input key '{key}' has no value in the parent's userdata")
 
     def _copy_output_keys(self, parent_ud: Any) -> None:
         if parent_ud is None:
@@ -155,11 +156,11 @@ class Container(State):
         )
         try:
             return state.execute(view)
-        except smach.InvalidUserCodeError:
-            smach.logerr(f"state '{label}' of type {type(state).__name__} could not be executed")
+        except InvalidUserCodeError:
+            log.error(f"state '{label}' of type {type(state).__name__} could not be executed")
             raise
         except Exception as error:
-            raise smach.InvalidUserCodeError(
+            raise InvalidUserCodeError(
                 f"state '{label}' of type {type(state).__name__} raised {type(error).__name__}: {error}\n"
                 f"{traceback.format_exc()}"
             ) from error
@@ -194,4 +195,4 @@ class Container(State):
             try:
                 callback(self.userdata, *args, *extra)
             except Exception:  # a callback observes: it must not change what it observes
-                smach.logerr(f"{kind} callback {callback!r} raised:\n{traceback.format_exc()}")
+                log.error(f"{kind} callback {callback!r} raised:\n{traceback.format_exc()}")

@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import smach
+from smach import log
 from smach.container import Container
+from smach.exceptions import InvalidStateError, InvalidTransitionError
 from smach.state import State
 from smach.user_data import UserData
+from smach.util import is_shutdown
 
 __all__ = ["Iterator"]
 
@@ -83,20 +85,20 @@ class Iterator(Container):
     def check_consistency(self) -> None:
         """Raise when there is no state, or when an outcome that ends the iteration is none of the iterator's."""
         if not isinstance(self._state, State):
-            raise smach.InvalidStateError("the iterator has no contained state; call Iterator.set_contained_state")
+            raise InvalidStateError("the iterator has no contained state; call Iterator.set_contained_state")
         registered = self._state.get_registered_outcomes()
         both = sorted(set(self._loop_outcomes) & set(self._break_outcomes))
         if both:
-            raise smach.InvalidTransitionError(f"{both} are loop outcomes and break outcomes at once")
+            raise InvalidTransitionError(f"{both} are loop outcomes and break outcomes at once")
         named = [*self._loop_outcomes, *self._break_outcomes, *self._final_outcome_map]
         unknown = [name for name in named if name not in registered]
         if unknown:
-            raise smach.InvalidTransitionError(
+            raise InvalidTransitionError(
                 f"{unknown} are not outcomes of '{self._state_label}', which gives {list(registered)}"
             )
         lost = [name for name in registered if self._breaks(name) and self._final(name) not in self._outcomes]
         if lost:
-            raise smach.InvalidTransitionError(
+            raise InvalidTransitionError(
                 f"{lost} of '{self._state_label}' end the iteration as {[self._final(name) for name in lost]}, but "
                 f"the iterator's outcomes are {list(self._outcomes)}"
             )
@@ -121,7 +123,7 @@ class Iterator(Container):
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
         """Put values in the local userdata; there is only one state to start with."""
         if initial_states and list(initial_states) != self.get_initial_states():
-            smach.logwarn(f"an iterator starts with its contained state; {list(initial_states)} is ignored")
+            log.warn(f"an iterator starts with its contained state; {list(initial_states)} is ignored")
         if userdata is not None:
             self.userdata.update(userdata)
 
@@ -174,7 +176,7 @@ class Iterator(Container):
 
     def _run_over(self, items: Iterable[Any]) -> str:
         for item in items:
-            if smach.is_shutdown():
+            if is_shutdown():
                 self.service_preempt()
                 return "preempted"
             if self._preempt_requested and "preempted" in self._outcomes:
@@ -200,8 +202,8 @@ class Iterator(Container):
                 self.service_preempt()
             elif state.preempt_requested():
                 state.recall_preempt()
-        if outcome not in state.get_registered_outcomes() and not smach.is_shutdown():
-            raise smach.InvalidTransitionError(
+        if outcome not in state.get_registered_outcomes() and not is_shutdown():
+            raise InvalidTransitionError(
                 f"state '{self._state_label}' of type {type(state).__name__} returned {outcome!r}, but its outcomes "
                 f"are {list(state.get_registered_outcomes())}"
             )

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where log lines go: to Python's logging, until ``set_loggers`` puts other functions (rospy's, say) in place.
 
-The four functions are attributes of the package and are looked up at each call (``smach.loginfo(...)``), so a
-replacement takes effect everywhere at once.
+``smach.loginfo``, ``logwarn``, ``logdebug`` and ``logerr`` are attributes of the package. Its own modules log by
+``log.info`` and its like, which look them up at each call, so a replacement takes effect everywhere at once.
 """
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Callable
-
-import smach
 
 __all__ = ["logdebug", "logerr", "loginfo", "logwarn", "set_loggers"]
 
@@ -47,4 +46,24 @@ def set_loggers(info: LogFunction, warn: LogFunction, debug: LogFunction, error:
         error: takes the place of ``smach.logerr``.
     """
     for name, function in (("loginfo", info), ("logwarn", warn), ("logdebug", debug), ("logerr", error)):
-        setattr(smach, name, function)
+        setattr(sys.modules[__package__], name, function)
+
+
+def info(msg: str) -> None:
+    """Log by what is now ``smach.loginfo``."""
+    sys.modules[__package__].loginfo(msg)
+
+
+def warn(msg: str) -> None:
+    """Log by what is now ``smach.logwarn``."""
+    sys.modules[__package__].logwarn(msg)
+
+
+def debug(msg: str) -> None:
+    """Log by what is now ``smach.logdebug``."""
+    sys.modules[__package__].logdebug(msg)
+
+
+def error(msg: str) -> None:
+    """Log by what is now ``smach.logerr``."""
+    sys.modules[__package__].logerr(msg)

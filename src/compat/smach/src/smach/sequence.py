@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import smach
+from smach.exceptions import InvalidStateError
 from smach.state import State
 from smach.state_machine import StateMachine
 
@@ -53,5 +53,5 @@ class Sequence(StateMachine):
         """
         sequence: Sequence = Sequence._currently_opened_container()
         if not isinstance(state, State):
-            raise smach.InvalidStateError(f"'{label}' is a {type(state).__name__}, not a smach.State")
+            raise InvalidStateError(f"'{label}' is a {type(state).__name__}, not a smach.State")
         return StateMachine.add_auto(label, state, [sequence._connector_outcome], transitions, remapping)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import smach
+from smach.exceptions import InvalidUserCodeError
+from smach.util import CBInterface, has_smach_interface
 
 __all__ = ["CBState", "State"]
 
@@ -43,7 +44,7 @@ class State:
         Raises:
             smach.InvalidUserCodeError: when a subclass did not override it.
         """
-        raise smach.InvalidUserCodeError(f"{type(self).__name__} does not define execute(self, userdata)")
+        raise InvalidUserCodeError(f"{type(self).__name__} does not define execute(self, userdata)")
 
     # ---- interface -----------------------------------------------------------------------------------------
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
@@ -122,7 +123,7 @@ class CBState(State):
         self._cb = cb
         self._cb_args = tuple(cb_args)
         self._cb_kwargs = dict(cb_kwargs or {})
-        if isinstance(cb, smach.CBInterface) or smach.has_smach_interface(cb):
+        if isinstance(cb, CBInterface) or has_smach_interface(cb):
             declared: Any = cb
             self.register_outcomes(declared.get_registered_outcomes())
             self.register_input_keys(declared.get_registered_input_keys())

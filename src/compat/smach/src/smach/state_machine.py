@@ -7,10 +7,12 @@ import threading
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import smach
+from smach import log
 from smach.container import Container
+from smach.exceptions import InvalidStateError, InvalidTransitionError
 from smach.state import State
 from smach.user_data import UserData
+from smach.util import is_shutdown
 
 __all__ = ["StateMachine"]
 
@@ -89,7 +91,7 @@ class StateMachine(Container):
         connectors = [outcome for outcome in connector_outcomes if outcome not in (transitions or {})]
         for outcome in connectors:
             if outcome not in state.get_registered_outcomes():
-                raise smach.InvalidTransitionError(
+                raise InvalidTransitionError(
                     f"state '{label}': connector outcome '{outcome}' is not an outcome of the state; "
                     f"its outcomes are {list(state.get_registered_outcomes())}"
                 )
@@ -106,16 +108,16 @@ class StateMachine(Container):
     def check_state_spec(self, label: str, state: State, transitions: Mapping[str, str]) -> None:
         """Raise when a state cannot be added under a label with these transitions."""
         if label in self._states:
-            raise smach.InvalidStateError(f"the machine already has a state with the label '{label}'")
+            raise InvalidStateError(f"the machine already has a state with the label '{label}'")
         if label in self._outcomes:
-            raise smach.InvalidStateError(f"'{label}' is an outcome of the machine and cannot also be a label")
+            raise InvalidStateError(f"'{label}' is an outcome of the machine and cannot also be a label")
         if not isinstance(state, State):
-            raise smach.InvalidStateError(
+            raise InvalidStateError(
                 f"'{label}' is a {type(state).__name__}, not a smach.State (was the class given, not an object?)"
             )
         unknown = [outcome for outcome in transitions if outcome not in state.get_registered_outcomes()]
         if unknown:
-            raise smach.InvalidTransitionError(
+            raise InvalidTransitionError(
                 f"state '{label}' has transitions from {unknown}, but its outcomes are "
                 f"{list(state.get_registered_outcomes())}"
             )
@@ -123,9 +125,9 @@ class StateMachine(Container):
     def check_consistency(self) -> None:
         """Raise when the machine has no state or a transition leads nowhere, naming every such transition."""
         if not self._states:
-            raise smach.InvalidStateError("the state machine has no states")
+            raise InvalidStateError("the state machine has no states")
         if self._initial_label is not None and self._initial_label not in self._states:
-            raise smach.InvalidStateError(
+            raise InvalidStateError(
                 f"the initial state '{self._initial_label}' is not in the machine; it has {list(self._states)}"
             )
         known = {*self._states, *self._outcomes}
@@ -135,7 +137,7 @@ class StateMachine(Container):
             if target not in known
         ]
         if faults:
-            raise smach.InvalidTransitionError(
+            raise InvalidTransitionError(
                 f"{'; '.join(faults)}: neither a state ({list(self._states)}) nor an outcome "
                 f"({list(self._outcomes)}) of the machine"
             )
@@ -162,7 +164,7 @@ class StateMachine(Container):
             smach.InvalidStateError: when not exactly one label is given.
         """
         if len(initial_states) != 1:
-            raise smach.InvalidStateError(f"a state machine starts with one state, got {list(initial_states)}")
+            raise InvalidStateError(f"a state machine starts with one state, got {list(initial_states)}")
         if userdata is not None:
             self.userdata.update(userdata)
         with self._lock:
@@ -202,7 +204,7 @@ class StateMachine(Container):
         self.check_consistency()
         self._copy_input_keys(parent_ud)
         label = self.get_initial_states()[0]
-        smach.loginfo(f"state machine starts in state '{label}' with userdata {sorted(self.userdata.keys())}")
+        log.info(f"state machine starts in state '{label}' with userdata {sorted(self.userdata.keys())}")
         self._running = True
         self._preempted_label = None
         try:
@@ -220,18 +222,18 @@ class StateMachine(Container):
 
     def _run_from(self, label: str) -> str:
         while True:
-            if smach.is_shutdown():
+            if is_shutdown():
                 return self._shut_down()
             state = self._states[label]
             outcome = self._execute_child(label, state, self._remappings[label])
             self._settle_preempt(label, state)
-            if smach.is_shutdown():
+            if is_shutdown():
                 return self._shut_down()
             target = self._target(label, state, outcome)
             if target in self._outcomes:
-                smach.loginfo(f"state machine ends: '{label}' gave '{outcome}', outcome '{target}'")
+                log.info(f"state machine ends: '{label}' gave '{outcome}', outcome '{target}'")
                 return target
-            smach.loginfo(f"state machine goes from '{label}' by '{outcome}' to '{target}'")
+            log.info(f"state machine goes from '{label}' by '{outcome}' to '{target}'")
             label = target
             self._enter(label)
             self.call_transition_cbs()
@@ -250,7 +252,7 @@ class StateMachine(Container):
             if self._preempted_label != label:
                 return
             if state.preempt_requested():
-                smach.logdebug(f"state '{label}' ended without acknowledging the request to stop")
+                log.debug(f"state '{label}' ended without acknowledging the request to stop")
                 state.recall_preempt()
             else:
                 self.service_preempt()
@@ -258,7 +260,7 @@ class StateMachine(Container):
 
     def _target(self, label: str, state: State, outcome: Any) -> str:
         if outcome not in state.get_registered_outcomes():
-            raise smach.InvalidTransitionError(
+            raise InvalidTransitionError(
                 f"state '{label}' of type {type(state).__name__} returned {outcome!r}, but its outcomes are "
                 f"{list(state.get_registered_outcomes())}"
             )
@@ -266,11 +268,11 @@ class StateMachine(Container):
         target = self._transitions[label].get(name)
         target = name if target is None else target
         if target not in self._states and target not in self._outcomes:
-            raise smach.InvalidTransitionError(f"'{name}' of state '{label}' leads to '{target}', which is nowhere")
+            raise InvalidTransitionError(f"'{name}' of state '{label}' leads to '{target}', which is nowhere")
         return target
 
     def _shut_down(self) -> str:
-        smach.loginfo("state machine stops: the process is going down")
+        log.info("state machine stops: the process is going down")
         self.service_preempt()
         return "preempted"
 

@@ -7,7 +7,8 @@ import threading
 from collections.abc import Iterable, KeysView, Mapping
 from typing import Any
 
-import smach
+from smach import log
+from smach.exceptions import InvalidUserCodeError
 
 __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
@@ -33,7 +34,7 @@ class UserData:
         """
         renamed = {here: there for there, here in remapping.items()}
         if len(renamed) != len(remapping):
-            smach.logerr(f"userdata remapping {dict(remapping)} gives two names to one key; one of them is dropped")
+            log.error(f"userdata remapping {dict(remapping)} gives two names to one key; one of them is dropped")
         result = UserData()
         for key in keys:
             result[renamed.get(key, key)] = copy.copy(self[key])
@@ -162,7 +163,7 @@ class Remapper:
 
     def __getitem__(self, key: str) -> Any:
         if key not in self._input_keys:
-            raise smach.InvalidUserCodeError(
+            raise InvalidUserCodeError(
                 f"userdata key '{key}' was read, but the state declares as input only: {list(self._input_keys)}; "
                 "add it to input_keys or io_keys"
             )
@@ -171,7 +172,7 @@ class Remapper:
 
     def __setitem__(self, key: str, value: Any) -> None:
         if key not in self._output_keys:
-            raise smach.InvalidUserCodeError(
+            raise InvalidUserCodeError(
                 f"userdata key '{key}' was written, but the state declares as output only: "
                 f"{list(self._output_keys)}; add it to output_keys or io_keys"
             )
