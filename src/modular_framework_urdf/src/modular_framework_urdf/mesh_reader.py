@@ -22,10 +22,10 @@ class MeshError(Exception):
     """A mesh file cannot be used.
 
     Args:
-        path: the file; found: what is wrong with it; allowed: what would do, and what to do about it.
+        path: the file, or the URI that names it; found: what is wrong with it; allowed: what would do, and what to do about it.
     """
 
-    def __init__(self, path: Path, found: str, allowed: str) -> None:
+    def __init__(self, path: Path | str, found: str, allowed: str) -> None:
         super().__init__(f"mesh file {path}: {found}; {allowed}")
         self.path, self.found, self.allowed = path, found, allowed
 

@@ -12,8 +12,7 @@ import numpy.typing as npt
 import rospkg
 from scipy.spatial import ConvexHull, QhullError
 
-from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.models.robot_description import mesh_path
+from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 
 Array = npt.NDArray[np.float64]
@@ -137,6 +136,6 @@ def _mesh_vertices(shape: ElementTree.Element) -> Array:
     except ValueError as error:
         raise ShapeError(f"is the mesh '{uri}' with the scale '{text}', allowed are three numbers") from error
     try:
-        return read_mesh(mesh_path("a finger", uri, rospkg.RosPack().get_path), (x, y, z)).vertices
-    except (DescriptionError, MeshError) as error:
+        return read_mesh(mesh_path(uri, rospkg.RosPack().get_path), (x, y, z)).vertices
+    except MeshError as error:
         raise ShapeError(f"is the mesh '{uri}', which cannot be used: {error}") from error

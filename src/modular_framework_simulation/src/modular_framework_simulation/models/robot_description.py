@@ -14,10 +14,11 @@ from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_simulation.models.sdf_resources import PackageFinder
 from modular_framework_simulation.models.sdf_specs import Mesh
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
+from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.mimics import Mimic, resolved
 
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
@@ -183,7 +184,7 @@ def _rewrite_meshes(
             if mesh is None:
                 _require_sizes(link.get("name", ""), shape)
                 continue
-            path = mesh_path(link.get("name", ""), mesh.get("filename", ""), find_package)
+            path = _mesh_path(link.get("name", ""), mesh.get("filename", ""), find_package)
             if shape.tag == "visual":
                 mesh.set("filename", str(path))
                 continue
@@ -215,26 +216,8 @@ def _give_frames_no_weight(root: ElementTree.Element) -> None:
             ElementTree.SubElement(inertial, "inertia", moments)
 
 
-def mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:
-    """Returns the file of a mesh of a link.
-
-    Raises:
-        DescriptionError: The URI has another scheme, or leads nowhere.
-    """
-    where = f"robot_description: mesh of link '{link}'"
-    scheme, separator, rest = uri.partition("://")
-    if separator and scheme == "package":
-        package, _, relative = rest.partition("/")
-        try:
-            path = Path(find_package(package)) / relative
-        except Exception as error:  # the finder is the caller's: whatever it raises means "not there"
-            raise DescriptionError(where, f"package '{package}' is not found ({error})", "install it") from error
-    elif separator and scheme == "file":
-        path = Path(rest)
-    elif separator:
-        raise DescriptionError(where, f"got '{uri}'", "allowed: package://, file:// or an absolute path")
-    else:
-        path = Path(uri)
-    if not path.is_file():
-        raise DescriptionError(where, f"'{path}' does not exist", "check the name, and that its package is installed")
-    return path
+def _mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:
+    try:
+        return mesh_path(uri, find_package)
+    except MeshError as error:
+        raise DescriptionError(f"robot_description: mesh of link '{link}'", error.found, error.allowed) from error

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
-
-PackageFinder = Callable[[str], str]
-"""Returns the folder of a ROS package; raises an exception naming the package when it is not there."""
+from modular_framework_urdf.mesh_paths import PackageFinder
 
 
 def no_packages(name: str) -> str:
