@@ -22,7 +22,9 @@ class MeshError(Exception):
     """A mesh file cannot be used.
 
     Args:
-        path: the file, or the URI that names it; found: what is wrong with it; allowed: what would do, and what to do about it.
+        path: the file, or the URI that names it.
+        found: what is wrong with it.
+        allowed: what would do, and what to do about it.
     """
 
     def __init__(self, path: Path | str, found: str, allowed: str) -> None:
