@@ -55,6 +55,15 @@ def test_files_that_a_page_names_exist(document: Path) -> None:
     assert not missing
 
 
+def test_every_usual_change_touches_at_most_three_files() -> None:
+    sections = re.split(r"^## (.+)$", (ROOT / "docs/contributing.md").read_text(), flags=re.MULTILINE)[1:]
+    changes = dict(zip(sections[::2], sections[1::2], strict=True))
+    del changes["Before a change"]
+    assert len(changes) == 10
+    assert all(PATH.search(text) for text in changes.values())
+    assert not [name for name, text in changes.items() if re.search(r"^4\.", text, re.MULTILINE)]
+
+
 def test_the_task_of_the_first_lesson_is_in_order() -> None:
     block = re.search(r"```yaml\n(.*?)```", (ROOT / "docs/first_task.md").read_text(), re.DOTALL)
     assert block is not None
