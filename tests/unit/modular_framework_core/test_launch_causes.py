@@ -2,13 +2,15 @@
 """Why a node ended is found in its log file, and a wrong launch argument is refused before anything starts."""
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 import roslaunch.core
 
+from modular_framework_core.launch_arguments import check_arguments
 from modular_framework_core.launch_causes import cause_of_death
-from modular_framework_core.launch_runner import EndWatcher, _check_arguments, _verdict
+from modular_framework_core.launch_runner import EndWatcher, _verdict
 
 LAUNCH = """<launch><arg name="simulation" default="true"/><arg name="gui" default="$(eval 1 == 2)"/>
 <arg name="world_file" default="a.world"/></launch>"""
@@ -36,8 +38,36 @@ def test_the_last_fatal_message_is_the_cause_with_all_its_lines(tmp_path: Path) 
 def test_a_wrong_argument_is_refused_with_what_is_allowed(tmp_path: Path, argument: str, hint: str) -> None:
     (tmp_path / "a.launch").write_text(LAUNCH)
     with pytest.raises(roslaunch.core.RLException, match=hint):
-        _check_arguments(str(tmp_path / "a.launch"), [argument])
-    _check_arguments(str(tmp_path / "a.launch"), ["simulation:=False", "gui:=1", "world_file:=true.world"])
+        check_arguments(str(tmp_path / "a.launch"), [argument])
+    check_arguments(str(tmp_path / "a.launch"), ["simulation:=False", "gui:=1", "world_file:=true.world"])
+
+
+METHOD = """<launch><arg name="method_launch_file" default=""/><arg name="config_directory" default=""/></launch>"""
+
+
+@pytest.mark.parametrize(("argument", "hint"), [
+    ("method_launch_file:=top_down_grasp/a.launch",
+     "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; did you mean 'top_down_grasps'; allowed "
+     "is PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /; correct it"),
+    ("method_launch_file:=top_down_grasps/top_down.launch",
+     "and the package has no such file; did you mean 'top_down_grasps/top_down_grasps.launch'; allowed are "
+     "top_down_grasps/top_down_grasps.launch; correct it"),
+    ("method_launch_file:=modular_framework_msgs", "which is no launch file; allowed is PACKAGE/FILE"),
+    ("method_launch_file:=/nowhere/a.launch", "and there is no such file; allowed is PACKAGE/FILE"),
+    ("config_directory:=/nowhere", "argument 'config_directory' is '/nowhere', allowed is the path of a folder from /"),
+    ("config_directory:=config", "argument 'config_directory' is 'config', allowed is the path of a folder from /")])
+def test_a_method_or_a_configuration_that_is_not_there_is_refused(tmp_path: Path, argument: str, hint: str) -> None:
+    (tmp_path / "a.launch").write_text(METHOD)
+    with pytest.raises(roslaunch.core.RLException, match=re.escape(hint)):
+        check_arguments(str(tmp_path / "a.launch"), [argument])
+    for file in ("", "top_down_grasps/top_down_grasps.launch", tmp_path / "a.launch"):
+        check_arguments(str(tmp_path / "a.launch"), [f"method_launch_file:={file}", f"config_directory:={tmp_path}"])
+
+
+def test_a_wrong_default_is_refused_like_a_wrong_argument(tmp_path: Path) -> None:
+    (tmp_path / "a.launch").write_text(METHOD.replace('default=""', 'default="nothing/a.launch"', 1))
+    with pytest.raises(roslaunch.core.RLException, match="there is no package 'nothing'"):
+        check_arguments(str(tmp_path / "a.launch"), [])
 
 
 @pytest.mark.parametrize(("died", "code", "last"), [

@@ -68,7 +68,7 @@ def _core_groups(text: str, _folder: Path) -> None:
 
 
 def _core_gripper(text: str, _folder: Path) -> None:
-    from modular_framework_core.grasp_generation.gripper_geometry import measure_gripper
+    from top_down_grasps.gripper_geometry import measure_gripper
 
     measure_gripper(text, "palm", "finger")
 

@@ -6,31 +6,26 @@ node when a node died instead.
 """
 from __future__ import annotations
 
-import difflib
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import rosgraph
 import roslaunch
-import roslaunch.arg_dump
-import roslaunch.config
 import roslaunch.core
 import roslaunch.loader
 import roslaunch.parent
 import roslaunch.pmon
 import roslaunch.rlutil
-import roslaunch.xmlloader
 import rospkg
 
+from modular_framework_core.launch_arguments import argument_values, check_arguments
 from modular_framework_core.launch_causes import cause_of_death
 
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
 ENDINGS = {0: "the task succeeded", 1: "the task did not succeed", 2: "the task could not be run"}
 """By exit code of the task."""
-BOOLEANS = ("true", "false", "1", "0")
-"""What roslaunch takes for a bool, in any case."""
 
 
 @dataclass
@@ -92,8 +87,9 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
     """
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([package, launch_file])[0]
-        _check_arguments(path, arguments)
-        watcher = EndWatcher(task_name, _ends_with_task(path, arguments))
+        check_arguments(path, arguments)
+        ends_with_task = argument_values(path, arguments)["end_with_task"]
+        watcher = EndWatcher(task_name, bool(roslaunch.loader.convert_value(ends_with_task, "bool")))
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
         roslaunch.configure_logging(uuid)
         # The task is not a required node here: the watcher ends the launch, without roslaunch's banner of a death.
@@ -109,37 +105,6 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         return EXIT_BAD_LAUNCH
     log_file = Path(rospkg.get_log_dir()) / uuid / f"{watcher.last_process}.log"
     return _verdict(watcher, cause_of_death(log_file))
-
-
-def _ends_with_task(path: str, arguments: list[str]) -> bool:
-    """Returns the value that `end_with_task` has with these arguments, its default included."""
-    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False, args_only=True)
-    roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False,
-                                         assign_machines=False)
-    value = loader.root_context.resolve_dict["arg"]["end_with_task"]
-    return bool(roslaunch.loader.convert_value(value, "bool"))
-
-
-def _check_arguments(path: str, arguments: list[str]) -> None:
-    """Refuses what roslaunch would silently ignore: an argument that the launch file does not have.
-
-    Raises:
-        roslaunch.core.RLException: it names every wrong argument and what was probably meant.
-    """
-    known = roslaunch.arg_dump.get_args([path])
-    faults = []
-    for argument in arguments:
-        name, assignment, value = argument.partition(":=")
-        if not assignment:
-            faults.append(f"argument '{argument}' is not of the form name:=value")
-        elif name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"; did you mean '{near[0]}'" if near else ""
-            faults.append(f"unknown argument '{name}'{hint}; allowed: {', '.join(sorted(known))}")
-        elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
-            faults.append(f"argument '{name}' is '{value}', allowed are true and false; correct it")
-    if faults:
-        raise roslaunch.core.RLException(f"{path}: " + "; ".join(faults))
 
 
 def _master_port() -> int | None:

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
-from modular_framework_core.grasp_generation.surface_points import Surface
+from top_down_grasps.gripper_geometry import GripperGeometry
+from top_down_grasps.surface_points import Surface
 
 Array = npt.NDArray[np.float64]
 

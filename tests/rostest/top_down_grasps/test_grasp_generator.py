@@ -13,14 +13,14 @@ from std_srvs.srv import Trigger
 
 from modular_framework_core import srv
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "modular_framework_core"))
 from fake_move_group import FakeMoveGroup  # noqa: E402
 
 LAUNCH = """<launch>
   <param name="arm_group_name" value="arm"/>
   <rosparam ns="top_down_grasp_generator">{gripper_joint: f, scene_timeout: 1.0, max_grasps: 3}</rosparam>
   <node name="managers" pkg="modular_framework_core" type="managers" required="true" output="screen"/>
-  <node name="top_down_grasp_generator" pkg="modular_framework_core" type="top_down_grasp_generator" required="true"
+  <node name="top_down_grasp_generator" pkg="top_down_grasps" type="top_down_grasp_generator" required="true"
         output="screen"/></launch>"""
 
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from modular_framework_core.grasp_generation.convex_bodies import (
+from modular_framework_urdf import xml_text
+from top_down_grasps.convex_bodies import (
     ConvexBody,
     ShapeError,
     collision_body,
     column_fronts,
 )
-from modular_framework_urdf import xml_text
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modular_framework_core.grasp_generation import ros_top_down_node as node
-from modular_framework_core.grasp_generation import surface_points
-from modular_framework_core.grasp_generation.patience import Patience
-from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 from modular_framework_ros.calls import CallError
+from top_down_grasps import ros_top_down_node as node
+from top_down_grasps import surface_points
+from top_down_grasps.patience import Patience
+from top_down_grasps.planning_scene_objects import SceneObject
 
 LIMIT_S = 20.0
 EMPTY = node.NoObjectError("no object of the planning scene is in the crop box")

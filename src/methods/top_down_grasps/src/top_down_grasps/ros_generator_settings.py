@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import rospy
 
-from modular_framework_core.grasp_generation.planning_scene_objects import CropBox
-from modular_framework_core.grasp_generation.top_down import TopDownSettings
+from top_down_grasps.planning_scene_objects import CropBox
+from top_down_grasps.top_down import TopDownSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class GeneratorSettings:
         frame: Frame of the crop box and of the grasps (``origin_frame_name``).
         crop: Where objects are looked for (``min_x_crop`` ... ``max_z_crop``).
         arm_group: Planning group whose tip is the grasp frame (``arm_group_name``).
-        gripper_joint: Actuated joint of the gripper (``~gripper_joint``).
+        gripper_joint: Actuated joint of the gripper (``~gripper_joint``); it has no default.
         object_name: Object to grasp; empty for all in the crop box (``~object_name``).
         name_prefix: Grasps are stored as <prefix>1, <prefix>2, ...; empty stores them anonymously (``~name_prefix``).
         hand_id: Written into the grasps (``manipulator_group_name``).
@@ -66,7 +66,7 @@ def read_settings() -> GeneratorSettings:
         frame=str(rospy.get_param("origin_frame_name", "world")),
         crop=CropBox((low[0], low[1], low[2]), (high[0], high[1], high[2])),
         arm_group=str(rospy.get_param("arm_group_name", "arm_and_manipulator")),
-        gripper_joint=str(rospy.get_param("~gripper_joint", "ezgripper_knuckle_palm_L1_1")),
+        gripper_joint=str(rospy.get_param("~gripper_joint", "")),
         object_name=str(rospy.get_param("~object_name", "")),
         name_prefix=str(rospy.get_param("~name_prefix", "")),
         hand_id=str(rospy.get_param("manipulator_group_name", "")),

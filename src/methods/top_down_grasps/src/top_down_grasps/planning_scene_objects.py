@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from modular_framework_core.grasp_generation import surface_points
-from modular_framework_core.grasp_generation.surface_points import Surface
+from top_down_grasps import surface_points
+from top_down_grasps.surface_points import Surface
 
 BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
 

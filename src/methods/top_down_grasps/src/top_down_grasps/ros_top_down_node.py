@@ -12,23 +12,23 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core.arm_commander import ArmCommander, CommanderError
-from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
-from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
-from modular_framework_core.grasp_generation.patience import Patience
-from modular_framework_core.grasp_generation.planning_scene_objects import (
+from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.msg import StandardisedGrasp
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.start_up import start_timeout
+from top_down_grasps.generated_objects import GeneratedObjects, at_rest
+from top_down_grasps.gripper_geometry import GripperGeometryError, measure_gripper
+from top_down_grasps.patience import Patience
+from top_down_grasps.planning_scene_objects import (
     CropBox,
     SceneObject,
     SceneObjectError,
     is_named,
     scene_object,
 )
-from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings, read_settings
-from modular_framework_core.grasp_generation.ros_stored_grasps import StoredGrasps
-from modular_framework_core.grasp_generation.top_down import TopDownGrasp, top_down_grasps
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
-from modular_framework_core.msg import StandardisedGrasp
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
-from modular_framework_ros.start_up import start_timeout
+from top_down_grasps.ros_generator_settings import GeneratorSettings, read_settings
+from top_down_grasps.ros_stored_grasps import StoredGrasps
+from top_down_grasps.top_down import TopDownGrasp, top_down_grasps
 
 SIGNAL_TOPIC = "grasp_generated"
 SERVICE_TIMEOUT_S = 10.0
@@ -77,6 +77,9 @@ class TopDownGraspGenerator:
         self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
         self._scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
         settings = read_settings()
+        if not settings.gripper_joint:
+            raise NoGraspError(f"parameter '{rospy.resolve_name('~gripper_joint')}' is not set; it has to name the "
+                               "actuated joint of the fingers; set it in generative_methods_config.yaml")
         self._commander = ArmCommander(settings.arm_group)
         try:
             self._commander.connect()

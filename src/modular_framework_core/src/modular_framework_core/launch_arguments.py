@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks the arguments of a launch file before anything is started; roslaunch ignores an unknown one silently."""
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+import roslaunch.arg_dump
+import roslaunch.config
+import roslaunch.core
+import roslaunch.xmlloader
+import rospkg
+
+BOOLEANS = ("true", "false", "1", "0")
+"""What roslaunch takes for a bool, in any case."""
+METHOD, CONFIGURATION = "method_launch_file", "config_directory"
+
+
+def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
+    """Returns the values that the arguments of a launch file have, defaults included.
+
+    Args:
+        path: Launch file.
+        arguments: What is given, `name:=value`.
+    """
+    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False, args_only=True)
+    roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False,
+                                         assign_machines=False)
+    return {name: str(value) for name, value in loader.root_context.resolve_dict["arg"].items()}
+
+
+def check_arguments(path: str, arguments: list[str]) -> None:
+    """Refuses arguments that the launch file does not have, and values that lead nowhere.
+
+    Args:
+        path: Launch file.
+        arguments: What is given, `name:=value`.
+
+    Raises:
+        roslaunch.core.RLException: it names every wrong argument and what was probably meant.
+    """
+    known = roslaunch.arg_dump.get_args([path])
+    faults = []
+    for argument in arguments:
+        name, assignment, value = argument.partition(":=")
+        if not assignment:
+            faults.append(f"argument '{argument}' is not of the form name:=value")
+        elif name not in known:
+            faults.append(f"unknown argument '{name}'{_hint(name, known)}; allowed: {', '.join(sorted(known))}")
+        elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
+            faults.append(f"argument '{name}' is '{value}', allowed are true and false; correct it")
+    if not faults:
+        values = argument_values(path, arguments)
+        faults = [fault for fault in (_method_fault(values.get(METHOD, "")), _folder_fault(values)) if fault]
+    if faults:
+        raise roslaunch.core.RLException(f"{path}: " + "; ".join(faults))
+
+
+def _method_fault(value: str) -> str:
+    """Says what is wrong with the launch file of a method; nothing if it is there."""
+    if not value or Path(value).is_absolute() and Path(value).is_file():
+        return ""
+    allowed = "PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /"
+    fault, package, file = f"argument '{METHOD}' is '{value}', ", *value.partition("/")[::2]
+    if Path(value).is_absolute() or not file:
+        reason = "and there is no such file" if file else "which is no launch file"
+        return f"{fault}{reason}; allowed is {allowed}; correct it"
+    finder = rospkg.RosPack()
+    try:
+        folder = Path(finder.get_path(package)) / "launch"
+    except rospkg.ResourceNotFound:
+        return (f"{fault}and there is no package '{package}'{_hint(package, finder.list())}; allowed is {allowed}; "
+                "correct it, or build and source the workspace with the package")
+    if (folder / file).is_file():
+        return ""
+    files = sorted(f"{package}/{found.name}" for found in folder.glob("*.launch"))
+    return (f"{fault}and the package has no such file{_hint(value, files)}; allowed are "
+            f"{', '.join(files) or 'files in its folder launch, which is empty'}; correct it")
+
+
+def _folder_fault(values: dict[str, str]) -> str:
+    """Says what is wrong with the folder of the configuration files; nothing if it is there."""
+    value = values.get(CONFIGURATION, "")
+    if not value or Path(value).is_absolute() and Path(value).is_dir():
+        return ""
+    return (f"argument '{CONFIGURATION}' is '{value}', allowed is the path of a folder from /, such as a copy of the "
+            "folder config of modular_framework_api; correct it")
+
+
+def _hint(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean '{near[0]}'" if near else ""
