@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Literal
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Positive
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Positive
 
 
 class MyState(FrameworkState):

@@ -4,4 +4,4 @@
 from modular_framework_ros.node_start import run_node
 
 if __name__ == "__main__":
-    run_node("modular_framework_core.ros_external_controllers")
+    run_node("modular_framework_core.launching.ros_external_controllers")

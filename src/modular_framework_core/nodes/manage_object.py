@@ -3,7 +3,7 @@
 """Spawns or deletes an object of the simulation."""
 import sys
 
-from modular_framework_core.ros_manage_object import main
+from modular_framework_core.scene.ros_manage_object import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -12,8 +12,8 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 
-from modular_framework_core.arm_commander import ArmCommander, CommanderError
-from modular_framework_core.grasp_messages import generate_pose_stamped_message
+from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fake_move_group import FakeMoveGroup  # noqa: E402

@@ -13,7 +13,7 @@ from control_msgs.msg import GripperCommandAction, GripperCommandGoal, GripperCo
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal, StandardisedGrasp
 
 ROBOT = """<launch>

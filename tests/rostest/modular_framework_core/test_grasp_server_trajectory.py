@@ -12,7 +12,7 @@ from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from sensor_msgs.msg import JointState
 
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal
 
 JOINT = """&lt;joint name="{name}" type="revolute"&gt;&lt;parent link="palm"/&gt;&lt;child link="{name}_link"/&gt;

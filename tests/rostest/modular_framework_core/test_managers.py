@@ -32,9 +32,9 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_core import srv
+from modular_framework_core.files import default_folders
 from modular_framework_core.msg import ManagerChange, StandardisedGrasp
 from modular_framework_core.srv import GetModifiedACMRequest, UpdateACMEntryRequest
-from modular_framework_core.task_constructor import default_folders
 
 JOINT_STATES = """
 up: {a: 1.5707963268, b: 0.1}

@@ -15,7 +15,7 @@ from ros_session import free_port, until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal, StandardisedGrasp
 from modular_framework_drivers.emulators.command_port import send_command
 

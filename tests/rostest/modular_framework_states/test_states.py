@@ -19,7 +19,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 import smach
 from modular_framework_core import srv
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspResult, StandardisedGrasp
 from modular_framework_states.states import wait_for_signal
 from modular_framework_states.states.allow_manipulator_collisions import AllowManipulatorCollisions

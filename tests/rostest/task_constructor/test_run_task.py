@@ -21,7 +21,7 @@ STOPPED_WITHIN_S = 1.0
 
 STATES = {
     "give.py": """
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Give(FrameworkState):
@@ -34,7 +34,7 @@ class Give(FrameworkState):
         return self.succeed() if self._answer else self.fail(self._why)
 """,
     "stay.py": """
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Stay(FrameworkState):
@@ -49,7 +49,7 @@ class Stay(FrameworkState):
     "nap.py": """
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Nap(FrameworkState):

@@ -19,7 +19,7 @@ from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 STAY = """
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Stay(FrameworkState):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_core.task_constructor.faults import FaultList
-from modular_framework_core.task_constructor.located_yaml import loads
+from modular_framework_core.files.faults import FaultList
+from modular_framework_core.files.located_yaml import loads
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_core import ros_external_controllers
-from modular_framework_core.external_controllers import PACKAGE_KEY
+from modular_framework_core.launching import ros_external_controllers
+from modular_framework_core.launching.external_controllers import PACKAGE_KEY
 
 
 def test_without_a_node_to_start_the_spawner_stays_until_ros_shuts_down(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_core.grasp_server import (
+from modular_framework_core.commander.robot_groups import RobotModelError, read_group, read_joints
+from modular_framework_core.grasping.grasp_server import (
     GraspCommandError,
     Outcome,
     Stage,
@@ -16,8 +17,7 @@ from modular_framework_core.grasp_server import (
     torque_intensities,
     torque_share,
 )
-from modular_framework_core.robot_groups import RobotModelError, read_group, read_joints
-from modular_framework_core.stall_evidence import Attempt, StallEvidence
+from modular_framework_core.grasping.stall_evidence import Attempt, StallEvidence
 
 URDF = """<robot name="r"><link name="base"/><link name="l1"/><link name="l2"/>
 <link name="palm"/><link name="f1"/><link name="f2"/>

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import roslaunch.core
 
-from modular_framework_core.launch_arguments import check_arguments
-from modular_framework_core.launch_causes import cause_of_death
-from modular_framework_core.launch_runner import EndWatcher, _verdict
+from modular_framework_core.launching.launch_arguments import check_arguments
+from modular_framework_core.launching.launch_causes import cause_of_death
+from modular_framework_core.launching.launch_runner import EndWatcher, _verdict
 
 LAUNCH = """<launch><arg name="simulation" default="true"/><arg name="gui" default="$(eval 1 == 2)"/>
 <arg name="world_file" default="a.world"/></launch>"""

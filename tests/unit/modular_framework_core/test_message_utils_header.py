@@ -10,7 +10,7 @@ import genpy
 import pytest
 import rospy
 
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import StandardisedGrasp
 
 ROOT = Path(__file__).parents[3]

@@ -6,7 +6,7 @@ import pytest
 from moveit_msgs.msg import RobotState
 from sensor_msgs.msg import JointState
 
-from modular_framework_core.moveit_requests import robot_state
+from modular_framework_core.commander.moveit_requests import robot_state
 
 
 @pytest.mark.parametrize("state", [

@@ -6,9 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_core.external_controllers import ControllerNode, ExternalControllerError, controller_node
-from modular_framework_core.manage_object import ObjectRequestError, parse_request
+from modular_framework_core.launching.external_controllers import (
+    ControllerNode,
+    ExternalControllerError,
+    controller_node,
+)
 from modular_framework_core.managers.object_types import ObjectTypeError, ObjectTypes
+from modular_framework_core.scene.manage_object import ObjectRequestError, parse_request
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_core.robot_controllers_spawner import (
+from modular_framework_core.launching.robot_controllers_spawner import (
     ControllerFileError,
     SpawnPlan,
     plan_spawn,

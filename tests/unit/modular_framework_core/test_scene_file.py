@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_core.scene_file import (
+from modular_framework_core.scene.scene_file import (
     Scene,
     SceneFileError,
     SceneObject,

@@ -12,15 +12,15 @@ import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_core import shallow_yaml
-from modular_framework_core.managers import message_files, yaml_entries
+from modular_framework_core.files import shallow_yaml, yaml_entries
+from modular_framework_core.files.whole_files import read_whole, write_whole
+from modular_framework_core.managers import message_files
 from modular_framework_core.managers.message_files import MessageFileError
 from modular_framework_core.managers.message_numbers import unusable_position
 from modular_framework_core.managers.named_joint_states import load_joint_states
 from modular_framework_core.srv import AddMoveitPlanRequest, AddStandardisedGraspRequest
 from modular_framework_core.task_constructor import generator
-from modular_framework_core.task_record import StateRecord, write_record
-from modular_framework_core.whole_files import read_whole, write_whole
+from modular_framework_core.task_runner.record import StateRecord, write_record
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_urdf.mesh_reader import TriangleMesh

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from modular_framework_core.grasp_server import GraspCommandError
-from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
+from modular_framework_core.grasping.grasp_server import GraspCommandError
+from modular_framework_core.grasping.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.grip import Motion
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_checks import declared_types
+from modular_framework_core.state_api.option_types import AnyOf, Anything, ListOf, MappingOf, OptionType, Plain
 from modular_framework_core.task_constructor.explanation import explain, option_meanings
 from modular_framework_core.task_constructor.loading import load_state_class
-from modular_framework_core.task_constructor.option_checks import declared_types
-from modular_framework_core.task_constructor.option_types import AnyOf, Anything, ListOf, MappingOf, OptionType, Plain
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 
 ROOT = Path(__file__).parents[3]

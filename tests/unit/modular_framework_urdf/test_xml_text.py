@@ -62,7 +62,7 @@ def _core_bounds(text: str, _folder: Path) -> None:
 
 
 def _core_groups(text: str, _folder: Path) -> None:
-    from modular_framework_core.robot_groups import read_joints
+    from modular_framework_core.commander.robot_groups import read_joints
 
     read_joints(text)
 

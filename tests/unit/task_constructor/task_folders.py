@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from modular_framework_core.task_constructor import generator, located_yaml
-from modular_framework_core.task_constructor.faults import FaultList, TaskFault
+from modular_framework_core.files import located_yaml
+from modular_framework_core.files.faults import FaultList, TaskFault
+from modular_framework_core.task_constructor import generator
 from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder
@@ -19,7 +20,7 @@ STATE_FILES = {
     "plan": '''
 from typing import Literal
 
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 Kind = Literal["pose", "joint_state"]
 
@@ -37,7 +38,7 @@ class Plan(FrameworkState):
         return self.fail("no way") if self.target == "nowhere" else self.succeed()
 ''',
     "move": '''
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Move(FrameworkState):
@@ -45,7 +46,7 @@ class Move(FrameworkState):
         return self.succeed()
 ''',
     "use_arm": '''
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class UseArm(FrameworkState):
@@ -58,8 +59,8 @@ class UseArm(FrameworkState):
     "choose": '''
 from typing import Annotated, Literal
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_uses import Key, Named
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Key, Named
 
 
 class Choose(FrameworkState):
@@ -71,8 +72,8 @@ class Choose(FrameworkState):
     "go": '''
 from typing import Annotated
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_uses import Named
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Named
 
 
 class Go(FrameworkState):
@@ -86,8 +87,8 @@ class Go(FrameworkState):
     "ask": '''
 from typing import Annotated, Any
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_uses import Fields, OutcomeNames, OutputKeys
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Fields, OutcomeNames, OutputKeys
 
 
 class Ask(FrameworkState):

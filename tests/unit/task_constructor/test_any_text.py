@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from task_folders import GOOD_TASK, World
 
+from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor import generator
-from modular_framework_core.task_constructor.faults import TaskFault
 
 RICH = GOOD_TASK.replace("states:", "params: {place: home, list: [a, b]}\nstates:") + """\
   - C:

@@ -141,7 +141,7 @@ states:
 
 def test_a_key_that_a_state_asks_for_before_it_reads_it_may_be_left_out(tmp_path: Path) -> None:
     state = """\
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Search(FrameworkState):

@@ -62,7 +62,7 @@ def test_states_of_ones_own_are_found_beside_the_frameworks_and_a_folder_without
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "open_door.py").write_text(
-        "from modular_framework_core.framework_state import FrameworkState\n\n\n"
+        "from modular_framework_core.state_api.framework_state import FrameworkState\n\n\n"
         'class OpenDoor(FrameworkState):\n    """Opens the door."""\n\n    def execute(self, userdata):\n'
         "        return self.succeed()\n")
     assert main(["--explain", "open_door", str(tmp_path)]) == 0

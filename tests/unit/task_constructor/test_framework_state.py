@@ -8,7 +8,7 @@ import time
 import pytest
 
 import smach
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_ros.calls import CallError, call_service
 from modular_framework_ros.stop_requests import stop_requested
 

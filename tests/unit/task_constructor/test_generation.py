@@ -16,8 +16,8 @@ import smach
 from modular_framework_core.task_constructor import loading
 from modular_framework_core.task_constructor.generator import GenerationError, default_output_directory, literal
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
-from modular_framework_core.task_record import TaskRecorder
-from modular_framework_core.task_runner import TaskRun
+from modular_framework_core.task_runner.record import TaskRecorder
+from modular_framework_core.task_runner.task_runner import TaskRun
 
 HEADER = "name: t\nsource: state_machine\noutcomes: [success, fail]\nstates:\n"
 

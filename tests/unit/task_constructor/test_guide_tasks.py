@@ -8,8 +8,9 @@ from xml.etree import ElementTree
 import pytest
 from task_folders import TEMPLATES
 
-from modular_framework_core.task_constructor import loading, located_yaml, task_graph
-from modular_framework_core.task_constructor.faults import FaultList, TaskFault
+from modular_framework_core.files import located_yaml
+from modular_framework_core.files.faults import FaultList, TaskFault
+from modular_framework_core.task_constructor import loading, task_graph
 from modular_framework_core.task_constructor.pipeline import check_task, construct_task
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder

@@ -17,13 +17,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from task_folders import TEMPLATES
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Finite, Length, Limits, Positive, Share, Vector
-from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.files.faults import TaskFault
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_annotations import from_annotation, from_hint
+from modular_framework_core.state_api.option_limits import Finite, Length, Limits, Positive, Share, Vector
+from modular_framework_core.state_api.option_types import Plain
 from modular_framework_core.task_constructor.json_schema import task_schema
 from modular_framework_core.task_constructor.loading import load_state_class
-from modular_framework_core.task_constructor.option_annotations import from_annotation, from_hint
-from modular_framework_core.task_constructor.option_types import Plain
 from modular_framework_core.task_constructor.pipeline import check_task, main
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
@@ -36,8 +36,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Length, Limits, NotNegative, Positive, Share, Vector
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Length, Limits, NotNegative, Positive, Share, Vector
 
 MOST = 5
 Few = Annotated[int, Limits(at_least=1, at_most=MOST)]

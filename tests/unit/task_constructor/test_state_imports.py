@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from task_folders import TEMPLATES
 
-from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor.loading import LoadingError, load_module
 from modular_framework_core.task_constructor.pipeline import check_task
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 import smach
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.task_record import StateRecord, TaskRecorder
-from modular_framework_core.task_runner import TaskResult, TaskRun
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.task_runner.record import StateRecord, TaskRecorder
+from modular_framework_core.task_runner.task_runner import TaskResult, TaskRun
 
 
 class Try(FrameworkState):

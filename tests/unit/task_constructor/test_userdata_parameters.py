@@ -6,7 +6,11 @@ from typing import Any
 
 import pytest
 
-from modular_framework_core.userdata_parameters import UserdataParameterError, manipulator_links, read_parameters
+from modular_framework_core.task_runner.userdata_parameters import (
+    UserdataParameterError,
+    manipulator_links,
+    read_parameters,
+)
 
 GOOD: dict[str, Any] = {
     "planner_name": "RRTConnect",

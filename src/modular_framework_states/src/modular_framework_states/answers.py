@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_uses import Fields, OutcomeNames, OutputKeys
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Fields, OutcomeNames, OutputKeys
 from modular_framework_states.message_filling import FillingError, field_at
 
 MessageFields = Annotated[Mapping[str, Any], Fields()]

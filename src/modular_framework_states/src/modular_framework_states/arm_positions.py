@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 SETTLE_TIME_S = 2.0
 

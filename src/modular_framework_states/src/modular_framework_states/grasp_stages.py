@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from modular_framework_core.option_uses import GRASP_STAGES
+from modular_framework_core.state_api.option_uses import GRASP_STAGES
 
 
 class StageError(RuntimeError):

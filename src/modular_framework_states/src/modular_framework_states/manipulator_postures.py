@@ -7,8 +7,8 @@ from typing import Any
 
 import rospy
 
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
-from modular_framework_core.robot_groups import RobotModelError, read_group
+from modular_framework_core.commander.robot_groups import RobotModelError, read_group
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 
 
 def posture_positions(posture: str) -> dict[str, float]:

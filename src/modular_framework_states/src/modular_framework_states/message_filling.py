@@ -8,7 +8,7 @@ from typing import Any
 import genpy
 import genpy.message
 
-from modular_framework_core.option_uses import USERDATA_PREFIX
+from modular_framework_core.state_api.option_uses import USERDATA_PREFIX
 
 
 class FillingError(ValueError):

@@ -11,8 +11,8 @@ from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
-from modular_framework_core.arm_commander import ArmCommander, CommanderError
-from modular_framework_core.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import StandardisedGrasp
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_ros.start_up import start_timeout

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
 
-from modular_framework_core.task_constructor.faults import nearest
+from modular_framework_core.files.faults import nearest
 from modular_framework_urdf import xml_text
 
 Bounds = tuple[float, float]

@@ -20,8 +20,8 @@ import genpy.message
 import orjson
 import yaml
 
-from modular_framework_core import shallow_yaml
-from modular_framework_core.whole_files import read_whole, write_whole
+from modular_framework_core.files import shallow_yaml
+from modular_framework_core.files.whole_files import read_whole, write_whole
 
 SUFFIXES = (".yaml", ".yml")
 

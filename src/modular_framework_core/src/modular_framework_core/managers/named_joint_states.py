@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
 from modular_framework_core.managers.joint_bounds import Bounds, fault_of
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
 
 
 @dataclass(frozen=True, slots=True)

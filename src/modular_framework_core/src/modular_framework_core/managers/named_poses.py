@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.rotations import quaternion_from_rpy
 
 POSITION_KEYS = ("x", "y", "z")
 RPY_KEYS = ("r", "p", "y")
@@ -44,15 +45,6 @@ class NamedPose:
     def is_robot_pose(self) -> bool:
         """Whether it says where end effectors are, by the names of their links."""
         return "" not in self.placements
-
-
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Converts fixed-axis roll, pitch, yaw [rad] (REP 103) to a unit quaternion xyzw."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
 
 
 def parse_placement(entry: Entry) -> Placement:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
 
 WAYPOINT_KEYS = ("name", "interpolate_time", "pause_time")
 

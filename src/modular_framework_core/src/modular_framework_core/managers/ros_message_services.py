@@ -11,12 +11,12 @@ import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core import srv
+from modular_framework_core.files import default_folders
+from modular_framework_core.files.yaml_entries import EntryError
 from modular_framework_core.managers import message_files
 from modular_framework_core.managers.message_numbers import unusable_position
 from modular_framework_core.managers.message_store import Change, MessageNotFoundError, MessageStore
-from modular_framework_core.managers.yaml_entries import EntryError
 from modular_framework_core.msg import ManagerChange
-from modular_framework_core.task_constructor import default_folders
 
 OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes tells of every one
 

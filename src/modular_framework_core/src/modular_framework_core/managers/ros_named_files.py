@@ -12,12 +12,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_core.files.yaml_entries import EntryError
 from modular_framework_core.managers.joint_bounds import Bounds, bounds_from_urdf
 from modular_framework_core.managers.named_joint_states import NamedJointState, load_joint_states
 from modular_framework_core.managers.named_poses import NamedPose, Placement, load_poses
 from modular_framework_core.managers.named_trajectories import JointLookup, TimedTrajectory, load_trajectories
 from modular_framework_core.managers.ros_message_services import MessageServices
-from modular_framework_core.managers.yaml_entries import EntryError
 from modular_framework_core.msg import RobotPose
 from modular_framework_core.srv import GetJointState
 from modular_framework_ros.calls import CallError, wait_for_service

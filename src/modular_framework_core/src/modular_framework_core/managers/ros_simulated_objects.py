@@ -9,7 +9,7 @@ from gazebo_msgs.srv import GetModelProperties, GetModelPropertiesRequest
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
-from modular_framework_core.acm import LINK_SEPARATOR
+from modular_framework_core.managers.acm import LINK_SEPARATOR
 from modular_framework_ros.calls import call_service, wait_for_service
 
 SIMULATION_PARAMETER = "simulation"

@@ -6,7 +6,7 @@ import inspect
 import re
 import textwrap
 
-from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.task_constructor.generator import GenerationError, literal
 from modular_framework_core.task_constructor.machine_keys import MachineKey, machine_keys
 from modular_framework_core.task_constructor.state_catalogue import StateOption, StateSource

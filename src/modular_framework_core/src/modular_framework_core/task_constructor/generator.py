@@ -11,10 +11,10 @@ from typing import Any
 
 import jinja2
 
-from modular_framework_core.task_constructor import default_folders
+from modular_framework_core.files import default_folders
+from modular_framework_core.files.whole_files import write_whole
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.task_spec import MachineSpec, TaskSpec
-from modular_framework_core.whole_files import write_whole
 
 _HEADER = '''\
 #!/usr/bin/env python3
@@ -39,7 +39,7 @@ def create_state_machine():
 if __name__ == "__main__":
     import sys
 
-    from modular_framework_core.ros_task_runner import run_as_node
+    from modular_framework_core.task_runner.ros_task_runner import run_as_node
 
     sys.exit(run_as_node(NODE_NAME, TASK_NAME, create_state_machine))
 '''

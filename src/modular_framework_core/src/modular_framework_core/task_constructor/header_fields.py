@@ -5,8 +5,8 @@ from __future__ import annotations
 import keyword
 import re
 
-from modular_framework_core.task_constructor.faults import FaultList, Place
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+from modular_framework_core.files.faults import FaultList, Place
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _NODE_NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")

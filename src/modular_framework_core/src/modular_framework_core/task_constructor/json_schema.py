@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.option_types import or_reference
 from modular_framework_core.task_constructor.explanation import option_meanings
 from modular_framework_core.task_constructor.machine_keys import NAME_MAP, NAMES, OUTCOMES, machine_keys
-from modular_framework_core.task_constructor.option_types import or_reference
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSource, StateSourceError
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
 

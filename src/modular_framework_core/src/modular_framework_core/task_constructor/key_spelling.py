@@ -9,8 +9,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Iterable
 
-from modular_framework_core.task_constructor.faults import FaultList
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node
+from modular_framework_core.files.faults import FaultList
+from modular_framework_core.files.located_yaml import Mapping, Node
 
 SIMILAR = 0.75
 """A key stands for one that is not given when it is this similar to it (0 to 1)."""

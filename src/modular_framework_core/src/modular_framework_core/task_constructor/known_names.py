@@ -9,9 +9,8 @@ from typing import Any
 
 import yaml
 
-from modular_framework_core import shallow_yaml
-from modular_framework_core.task_constructor import default_folders
-from modular_framework_core.whole_files import read_whole
+from modular_framework_core.files import default_folders, shallow_yaml
+from modular_framework_core.files.whole_files import read_whole
 from modular_framework_urdf import xml_text
 
 _FILES = {"joint_state": "named_joint_states.yaml", "trajectory": "named_trajectories.yaml", "pose": "named_poses.yaml"}

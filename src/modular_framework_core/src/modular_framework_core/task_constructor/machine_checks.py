@@ -6,8 +6,8 @@ from collections.abc import Container, Iterable
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 
-from modular_framework_core.task_constructor.faults import FaultList, Place, closest
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
+from modular_framework_core.files.faults import FaultList, Place, closest
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,10 @@
 """Reads the fields of a machine's header; notes what is wrong with them."""
 from __future__ import annotations
 
+from modular_framework_core.files.faults import FaultList, Place, listing
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks
-from modular_framework_core.task_constructor.faults import FaultList, Place, listing
 from modular_framework_core.task_constructor.key_spelling import spelt_as_meant, value_of
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_keys import SHARED_USERDATA, machine_keys, required_keys
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from modular_framework_core.task_constructor.option_types import or_reference
+from modular_framework_core.state_api.option_types import or_reference
 from modular_framework_core.task_constructor.template_catalogue import TemplateSource
 
 SHARED_USERDATA = "self.userdata"

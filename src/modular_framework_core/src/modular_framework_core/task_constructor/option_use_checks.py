@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from modular_framework_core.option_uses import (
+from modular_framework_core.files.faults import FaultList, Place, listing, nearest
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
+from modular_framework_core.state_api.option_types import complaint
+from modular_framework_core.state_api.option_uses import (
     FROM_USERDATA,
     USERDATA_PREFIX,
     Fields,
@@ -15,10 +18,7 @@ from modular_framework_core.option_uses import (
     OutputKeys,
     kind_of,
 )
-from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
 from modular_framework_core.task_constructor.known_names import KnownNames
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence
-from modular_framework_core.task_constructor.option_types import complaint
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import difflib
 
-from modular_framework_core.task_constructor.faults import FaultList, Place, listing, nearest
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+from modular_framework_core.files.faults import FaultList, Place, listing, nearest
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 PREFIX = "params."
 MISSPELT = 0.75

@@ -8,9 +8,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from modular_framework_core.task_constructor import default_folders, generator, task_graph
+from modular_framework_core.files import default_folders
+from modular_framework_core.files.faults import TaskFault, nearest
+from modular_framework_core.task_constructor import generator, task_graph
 from modular_framework_core.task_constructor.explanation import explain, explain_template
-from modular_framework_core.task_constructor.faults import TaskFault, nearest
 from modular_framework_core.task_constructor.generator import GenerationError
 from modular_framework_core.task_constructor.json_schema import task_schema
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_installation

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from modular_framework_core.files.faults import FaultList, Place
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.option_types import complaint
 from modular_framework_core.task_constructor import header_fields
-from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
-from modular_framework_core.task_constructor.faults import FaultList, Place
 from modular_framework_core.task_constructor.key_spelling import meant_key, spelt_as_meant, value_of
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar
-from modular_framework_core.task_constructor.option_types import complaint
 from modular_framework_core.task_constructor.params_scope import ParamsScope
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSource, StateSourceError
 from modular_framework_core.task_constructor.task_spec import StateSpec

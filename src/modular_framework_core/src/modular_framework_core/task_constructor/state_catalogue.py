@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from modular_framework_core.option_uses import Use
-from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS, own_keys
-from modular_framework_core.task_constructor.option_annotations import from_annotation, uses_in
-from modular_framework_core.task_constructor.option_types import Anything, OptionType
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS, own_keys
+from modular_framework_core.state_api.option_annotations import from_annotation, uses_in
+from modular_framework_core.state_api.option_types import Anything, OptionType
+from modular_framework_core.state_api.option_uses import Use
 from modular_framework_core.task_constructor.state_imports import missing_imports
 from modular_framework_core.task_constructor.userdata_reads import UserdataReads, reads_of
 

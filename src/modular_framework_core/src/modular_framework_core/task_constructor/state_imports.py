@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
-from modular_framework_core.task_constructor.faults import nearest
+from modular_framework_core.files.faults import nearest
 
 _CHANGES_THE_SEARCH = ("sys.path", "sys.modules", "sys.meta_path", "addsitedir", "__path__")
 """Words of a file that may change what is found, which cannot be told without running it."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import builtins
 from pathlib import Path
 
-from modular_framework_core.task_constructor import header_fields, located_yaml, machine_checks, userdata_checks
-from modular_framework_core.task_constructor.faults import FaultList, Place
+from modular_framework_core.files import located_yaml
+from modular_framework_core.files.faults import FaultList, Place
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+from modular_framework_core.task_constructor import header_fields, machine_checks, userdata_checks
 from modular_framework_core.task_constructor.key_spelling import meant_key, value_of
 from modular_framework_core.task_constructor.known_names import KnownNames
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_header import HeaderReader
 from modular_framework_core.task_constructor.machine_keys import UNREAD, root_keys

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Union
 
-from modular_framework_core.task_constructor.faults import Place
-from modular_framework_core.task_constructor.located_yaml import Node
+from modular_framework_core.files.faults import Place
+from modular_framework_core.files.located_yaml import Node
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.template_catalogue import TemplateSource
 

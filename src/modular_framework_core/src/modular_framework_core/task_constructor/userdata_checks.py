@@ -6,9 +6,9 @@ import difflib
 from collections import Counter
 from collections.abc import Iterable
 
+from modular_framework_core.files.faults import FaultList, listing, nearest
+from modular_framework_core.files.located_yaml import Mapping, Node
 from modular_framework_core.task_constructor import header_fields
-from modular_framework_core.task_constructor.faults import FaultList, listing, nearest
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node
 from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, StateSpec
 
 MISSPELT = 0.75

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 import rospy
 from sensor_msgs.msg import JointState
 
-from modular_framework_core.grasp_server import GraspCommandError, Outcome, refuse_no_effort
-from modular_framework_core.robot_groups import Group, Joint
-from modular_framework_core.ros_grasp_server import GraspServer
-from modular_framework_core.ros_manipulator_drivers import Motion as WantedMotion
+from modular_framework_core.commander.robot_groups import Group, Joint
+from modular_framework_core.grasping.grasp_server import GraspCommandError, Outcome, refuse_no_effort
+from modular_framework_core.grasping.ros_grasp_server import GraspServer
+from modular_framework_core.grasping.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT
 from modular_framework_drivers.ezgripper.grip import Motion, Standing

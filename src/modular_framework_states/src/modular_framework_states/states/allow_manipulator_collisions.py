@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
 from modular_framework_core.managers.ros_acm_services import apply_matrix
-from modular_framework_core.option_uses import FROM_USERDATA, Key
 from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest, ModifyACM, ModifyACMRequest
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.manager_clients import ManagerError
 

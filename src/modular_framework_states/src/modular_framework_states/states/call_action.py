@@ -11,8 +11,8 @@ import rospy
 import rostopic
 from actionlib_msgs.msg import GoalStatus
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import NotNegative
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result, wait_until
 from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata

@@ -8,8 +8,8 @@ from typing import Any
 import rospy
 import rosservice
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import NotNegative
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, call_service, wait_until
 from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata

@@ -11,10 +11,10 @@ from geometry_msgs.msg import Pose, PoseStamped
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest, GetPositionFK, GetPositionFKRequest
 from scipy.spatial.transform import Rotation
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.moveit_requests import error_name, robot_state
-from modular_framework_core.option_limits import Limits, Share, Vector
-from modular_framework_core.option_uses import Named
+from modular_framework_core.commander.moveit_requests import error_name, robot_state
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Limits, Share, Vector
+from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.manager_clients import ManagerError, fetch
 

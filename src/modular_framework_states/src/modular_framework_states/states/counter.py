@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Limits
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Limits
 
 
 class Counter(FrameworkState):

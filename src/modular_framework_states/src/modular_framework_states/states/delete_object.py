@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.manage_object import request_to_delete
-from modular_framework_core.ros_manage_object import RefusedError, delete
+from modular_framework_core.scene.manage_object import request_to_delete
+from modular_framework_core.scene.ros_manage_object import RefusedError, delete
+from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class DeleteObject(FrameworkState):

@@ -12,10 +12,10 @@ from moveit_msgs.msg import RobotTrajectory
 from moveit_msgs.srv import GetStateValidity, GetStateValidityRequest
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.moveit_requests import robot_state
-from modular_framework_core.option_limits import NotNegative, Positive
-from modular_framework_core.option_uses import Named
+from modular_framework_core.commander.moveit_requests import robot_state
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import NotNegative, Positive
+from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.arm_positions import run_to_end
 from modular_framework_states.manager_clients import ManagerError, fetch

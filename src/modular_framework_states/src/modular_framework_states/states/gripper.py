@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Finite, Positive, Share
-from modular_framework_core.option_uses import Named
-from modular_framework_core.robot_groups import RobotModelError
+from modular_framework_core.commander.robot_groups import RobotModelError
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Finite, Positive, Share
+from modular_framework_core.state_api.option_uses import Named
 from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
 from modular_framework_states.manipulator_postures import posture_grasp, posture_positions
 

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 import rospy
 from std_msgs.msg import String
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Finite
-from modular_framework_core.option_uses import Key
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Finite
+from modular_framework_core.state_api.option_uses import Key
 
 TOPIC = "task_metrics"
 

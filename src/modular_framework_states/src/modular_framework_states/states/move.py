@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import NotNegative
-from modular_framework_core.option_uses import Named
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import NotNegative
+from modular_framework_core.state_api.option_uses import Named
 from modular_framework_states.arm_positions import run_to_end, worst_joint
 from modular_framework_states.manager_clients import ManagerError, fetch
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from modular_framework_core.arm_commander import CommanderError
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_uses import FROM_USERDATA, Named, kind_of
+from modular_framework_core.commander.arm_commander import CommanderError
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import FROM_USERDATA, Named, kind_of
 from modular_framework_states.grasp_stages import (
     StageError,
     arrival_fingers,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from modular_framework_core.framework_state import FrameworkState
+from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_states.manager_clients import Kind, ManagerError, all_kinds, file_request
 
 

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Positive
-from modular_framework_core.option_uses import Named
-from modular_framework_core.robot_groups import RobotModelError
+from modular_framework_core.commander.robot_groups import RobotModelError
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Positive
+from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError, wait_until
 from modular_framework_states.grasp_goals import GraspGoalError, send
 from modular_framework_states.held_objects import detach, held_objects

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_uses import Key, Named, kind_of
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Key, Named, kind_of
 from modular_framework_states.manager_clients import ManagerError, fetch
 
 MessageType = Annotated[Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"],

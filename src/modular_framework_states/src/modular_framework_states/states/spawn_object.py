@@ -7,10 +7,10 @@ from typing import Any
 
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.manage_object import ObjectRequestError, request_to_spawn
-from modular_framework_core.option_limits import Vector
-from modular_framework_core.ros_manage_object import RefusedError, spawn
+from modular_framework_core.scene.manage_object import ObjectRequestError, request_to_spawn
+from modular_framework_core.scene.ros_manage_object import RefusedError, spawn
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Vector
 
 
 class SpawnObject(FrameworkState):

@@ -7,8 +7,8 @@ from typing import Any
 
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import NotNegative, Positive
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import NotNegative, Positive
 
 
 class Wait(FrameworkState):

@@ -9,8 +9,8 @@ from typing import Any
 import roslib.message
 import rospy
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Positive
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Positive
 from modular_framework_states.answers import MessageFields
 from modular_framework_states.message_filling import FillingError, difference, with_userdata
 

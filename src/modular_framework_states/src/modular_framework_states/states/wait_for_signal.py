@@ -9,8 +9,8 @@ from typing import Any
 import rospy
 from std_msgs.msg import Bool, String
 
-from modular_framework_core.framework_state import FrameworkState
-from modular_framework_core.option_limits import Positive
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_limits import Positive
 
 REASON_WAIT_S = 0.5
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import yaml
 
-from modular_framework_core.managers.named_poses import NamedPose, frame_name, parse_pose, quaternion_from_rpy
-from modular_framework_core.managers.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.managers.named_poses import NamedPose, frame_name, parse_pose
+from modular_framework_core.rotations import quaternion_from_rpy
 
 FRAME_KEYS = ("frame_id", "origin_frame_id", "frame_x", "frame_y", "frame_z", "frame_roll", "frame_pitch", "frame_yaw")
 

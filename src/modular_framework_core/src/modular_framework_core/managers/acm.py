@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from modular_framework_core.task_constructor.faults import nearest
+from modular_framework_core.files.faults import nearest
 
 LINK_SEPARATOR = "__"
 DEFAULT_LINK = "link"

@@ -10,7 +10,7 @@ import roslib.packages
 import rospkg
 import rospy
 
-from modular_framework_core.external_controllers import (
+from modular_framework_core.launching.external_controllers import (
     NAME_KEY,
     PACKAGE_KEY,
     TYPE_KEY,

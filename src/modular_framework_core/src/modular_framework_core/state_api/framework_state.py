@@ -26,8 +26,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import smach
-from modular_framework_core.task_constructor.constructor_keys import STATE_KEYS
-from modular_framework_core.task_constructor.option_checks import checks_options
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.option_checks import checks_options
 from modular_framework_ros.stop_requests import stoppable
 
 DEFAULT_OUTCOMES = ("success", "fail")

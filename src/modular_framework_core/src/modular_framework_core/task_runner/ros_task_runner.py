@@ -37,13 +37,14 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 import smach
-from modular_framework_core.ros_task_introspection import shown
-from modular_framework_core.task_constructor import default_folders, generator, loading, pipeline
-from modular_framework_core.task_constructor.faults import TaskFault
+from modular_framework_core.files import default_folders
+from modular_framework_core.files.faults import TaskFault
+from modular_framework_core.task_constructor import generator, loading, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
-from modular_framework_core.task_record import RunningState, StateRecord, TaskRecorder, write_record
-from modular_framework_core.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
+from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
+from modular_framework_core.task_runner.ros_introspection import shown
+from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
 
 STOP_GRACE_S = 0.6
 """How long running states have to stop [s] before the node gives up on them."""

@@ -14,8 +14,8 @@ from gazebo_msgs.srv import DeleteModel, DeleteModelRequest, SpawnModel, SpawnMo
 from geometry_msgs.msg import Point, Pose, Quaternion
 
 from modular_framework_core import srv
-from modular_framework_core.manage_object import ObjectRequest, ObjectRequestError, parse_request
-from modular_framework_core.sensor_frames import quaternion_from_rpy
+from modular_framework_core.rotations import quaternion_from_rpy
+from modular_framework_core.scene.manage_object import ObjectRequest, ObjectRequestError, parse_request
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 
 SERVICE_TIMEOUT_S = 15.0

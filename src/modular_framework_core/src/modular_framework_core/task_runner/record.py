@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import smach
-from modular_framework_core.whole_files import write_whole
+from modular_framework_core.files.whole_files import write_whole
 
 
 @dataclass(frozen=True, slots=True)

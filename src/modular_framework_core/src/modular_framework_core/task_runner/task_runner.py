@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import smach
-from modular_framework_core.task_record import FailureSummary, TaskRecorder
+from modular_framework_core.task_runner.record import FailureSummary, TaskRecorder
 from modular_framework_ros.stop_requests import stoppable
 
 EXIT_SUCCEEDED = 0

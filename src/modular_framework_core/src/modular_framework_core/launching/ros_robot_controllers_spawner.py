@@ -19,7 +19,7 @@ from controller_manager_msgs.srv import (
 )
 from std_msgs.msg import Bool
 
-from modular_framework_core.robot_controllers_spawner import (
+from modular_framework_core.launching.robot_controllers_spawner import (
     JOINT_STATES_NAME,
     JOINT_STATES_RATE_HZ,
     JOINT_STATES_TYPE,

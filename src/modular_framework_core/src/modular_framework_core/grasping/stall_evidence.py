@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from modular_framework_core.grasp_server import Outcome
+from modular_framework_core.grasping.grasp_server import Outcome
 
 MOVED_SHARE = 0.2
 """Fingers have moved when they came farther than this share of the tolerance."""

@@ -21,7 +21,7 @@ from control_msgs.msg import (
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_core.grasp_server import GraspCommandError, Outcome, refuse_no_effort
+from modular_framework_core.grasping.grasp_server import GraspCommandError, Outcome, refuse_no_effort
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_for_action, wait_for_result, wait_until
 

@@ -18,7 +18,8 @@ from moveit_msgs.srv import (
 )
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
-from modular_framework_core.scene_file import (
+from modular_framework_core.files.whole_files import write_whole
+from modular_framework_core.scene.scene_file import (
     NO_COLOR,
     Scene,
     SceneFileError,
@@ -28,7 +29,6 @@ from modular_framework_core.scene_file import (
     read_scene_file,
     scene_text,
 )
-from modular_framework_core.whole_files import write_whole
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_ros.start_up import start_timeout
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from modular_framework_core.robot_groups import Group, RobotModelError
+from modular_framework_core.commander.robot_groups import Group, RobotModelError
 
 CLOSED_STATE = "closed"
 

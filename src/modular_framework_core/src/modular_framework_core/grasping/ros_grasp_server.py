@@ -7,7 +7,8 @@ from typing import Any
 
 import rospy
 
-from modular_framework_core.grasp_server import (
+from modular_framework_core.commander.robot_groups import Group, RobotModelError, read_group
+from modular_framework_core.grasping.grasp_server import (
     GraspCommandError,
     Outcome,
     Stage,
@@ -19,10 +20,9 @@ from modular_framework_core.grasp_server import (
     torque_intensities,
     torque_share,
 )
+from modular_framework_core.grasping.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
+from modular_framework_core.grasping.stall_evidence import Attempt, StallEvidence
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
-from modular_framework_core.robot_groups import Group, RobotModelError, read_group
-from modular_framework_core.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
-from modular_framework_core.stall_evidence import Attempt, StallEvidence
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.calls import CallError
 from modular_framework_ros.start_up import start_timeout, wait_for_start

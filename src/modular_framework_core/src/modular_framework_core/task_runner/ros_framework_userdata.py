@@ -19,10 +19,14 @@ import rospy
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
-from modular_framework_core.arm_commander import ArmCommander
+from modular_framework_core.commander.arm_commander import ArmCommander
 from modular_framework_core.msg import GraspAction
 from modular_framework_core.srv import SetInitACM, SetInitACMRequest
-from modular_framework_core.userdata_parameters import UserdataParameters, manipulator_links, read_parameters
+from modular_framework_core.task_runner.userdata_parameters import (
+    UserdataParameters,
+    manipulator_links,
+    read_parameters,
+)
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import call_service, wait_for_service
 from modular_framework_ros.start_up import start_timeout

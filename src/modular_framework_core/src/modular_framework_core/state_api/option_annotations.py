@@ -10,9 +10,8 @@ from collections.abc import Mapping as MappingABC
 from dataclasses import replace
 from typing import Any
 
-from modular_framework_core.option_limits import Length, Limits
-from modular_framework_core.option_uses import KINDS, Use
-from modular_framework_core.task_constructor.option_types import (
+from modular_framework_core.state_api.option_limits import Length, Limits
+from modular_framework_core.state_api.option_types import (
     PLAIN,
     AnyOf,
     Anything,
@@ -22,6 +21,7 @@ from modular_framework_core.task_constructor.option_types import (
     OptionType,
     Plain,
 )
+from modular_framework_core.state_api.option_uses import KINDS, Use
 
 _LISTS = ("list", "List", "Sequence", "Iterable", "Collection", "tuple", "Tuple", "set", "frozenset")
 _MAPPINGS = ("dict", "Dict", "Mapping")

@@ -10,9 +10,9 @@ from typing import Any, Union
 
 import yaml
 
-from modular_framework_core.shallow_yaml import MAX_DEPTH
-from modular_framework_core.task_constructor.faults import Fault, FaultList, Place, TaskFault, listing, nearest
-from modular_framework_core.whole_files import read_whole
+from modular_framework_core.files.faults import Fault, FaultList, Place, TaskFault, listing, nearest
+from modular_framework_core.files.shallow_yaml import MAX_DEPTH
+from modular_framework_core.files.whole_files import read_whole
 
 MAX_NODES = 500_000
 """Largest number of values in a file after its aliases are expanded: a guard against files that blow up."""

@@ -11,10 +11,10 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from modular_framework_core.task_constructor.faults import Place
-from modular_framework_core.task_constructor.located_yaml import Mapping, Node, Scalar, Sequence
-from modular_framework_core.task_constructor.option_annotations import from_hint
-from modular_framework_core.task_constructor.option_types import Anything, OptionType, complaint
+from modular_framework_core.files.faults import Place
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
+from modular_framework_core.state_api.option_annotations import from_hint
+from modular_framework_core.state_api.option_types import Anything, OptionType, complaint
 
 _HERE = Place("", 0, 0)
 

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core.managers.named_poses import NamedPose, Placement
-from modular_framework_core.sensor_frames import SensorFrame, load_sensor_frames
+from modular_framework_core.scene.sensor_frames import SensorFrame, load_sensor_frames
 from modular_framework_core.srv import GetPoseStamped
 from modular_framework_ros.calls import CallError, wait_for_service
 from modular_framework_ros.start_up import start_timeout

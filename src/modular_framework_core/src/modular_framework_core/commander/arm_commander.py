@@ -34,8 +34,7 @@ from moveit_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from modular_framework_core.commander_results import ExecutionResult, IkResult, PlanResult
-from modular_framework_core.moveit_requests import (
+from modular_framework_core.commander.moveit_requests import (
     StartState,
     describe_pose,
     error_name,
@@ -44,7 +43,8 @@ from modular_framework_core.moveit_requests import (
     pose_goal,
     robot_state,
 )
-from modular_framework_core.robot_groups import Group, RobotModelError, read_group
+from modular_framework_core.commander.results import ExecutionResult, IkResult, PlanResult
+from modular_framework_core.commander.robot_groups import Group, RobotModelError, read_group
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import (
     CallError,

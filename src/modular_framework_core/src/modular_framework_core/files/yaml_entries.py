@@ -9,8 +9,8 @@ from pathlib import Path
 
 import yaml
 
-from modular_framework_core import shallow_yaml
-from modular_framework_core.whole_files import read_whole
+from modular_framework_core.files import shallow_yaml
+from modular_framework_core.files.whole_files import read_whole
 
 _NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: nobody asks for its tag
 

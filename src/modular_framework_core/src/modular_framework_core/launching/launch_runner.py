@@ -19,8 +19,8 @@ import roslaunch.pmon
 import roslaunch.rlutil
 import rospkg
 
-from modular_framework_core.launch_arguments import argument_values, check_arguments
-from modular_framework_core.launch_causes import cause_of_death
+from modular_framework_core.launching.launch_arguments import argument_values, check_arguments
+from modular_framework_core.launching.launch_causes import cause_of_death
 
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
