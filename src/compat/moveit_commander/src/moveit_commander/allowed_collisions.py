@@ -8,7 +8,7 @@ from moveit_commander.exception import MoveItCommanderException
 
 
 def set_default(acm: AllowedCollisionMatrix, obj: str, allow: bool) -> None:
-    """Whether an object may touch everything that has no entry of its own with it."""
+    """Returns whether an object may touch everything that has no entry of its own with it."""
     if obj in acm.default_entry_names:
         acm.default_entry_values[acm.default_entry_names.index(obj)] = allow
     else:
@@ -17,7 +17,7 @@ def set_default(acm: AllowedCollisionMatrix, obj: str, allow: bool) -> None:
 
 
 def set_allowed(acm: AllowedCollisionMatrix, obj: str, other: str | None = None, allow: bool = True) -> None:
-    """Whether two objects or links may touch; without `other`: the object's default.
+    """Returns whether two objects or links may touch; without `other`: the object's default.
 
     Raises:
         MoveItCommanderException: `other` has no entry in the acm.
@@ -38,7 +38,7 @@ def set_allowed(acm: AllowedCollisionMatrix, obj: str, other: str | None = None,
 
 
 def _add_entry(acm: AllowedCollisionMatrix, obj: str) -> None:
-    """A row and a column for an object, filled with the defaults in force."""
+    """Returns a row and a column for an object, filled with the defaults in force."""
     defaults = dict(zip(acm.default_entry_names, acm.default_entry_values, strict=True))
     row = [bool(defaults.get(obj, defaults.get(name, False))) for name in acm.entry_names]
     for entry, enabled in zip(acm.entry_values, row, strict=True):

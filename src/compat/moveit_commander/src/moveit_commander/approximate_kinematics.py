@@ -19,7 +19,7 @@ STANDSTILL = 1e-6
 
 
 def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping[str, float],
-                   complete: Callable[[Mapping[str, float]], Mapping[str, float]], rotation: Any,
+                   complete: Callable[[Mapping[str, float]], Mapping[str, float]], rotation: Rotation,
                    position: Any) -> dict[str, float]:
     """Moves joints within their bounds, by damped least squares, to the smallest pose error found on the way.
 
@@ -28,7 +28,8 @@ def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping
         free: those that may move, none of them mimic.
         start: positions of the robot's joints [rad or m].
         complete: adds the positions of mimic joints.
-        rotation, position: pose of the link in the base's frame, shapes (3, 3) and (3,) [m].
+        rotation: of the link in the base's frame.
+        position: of the link in the base's frame, shape (3,) [m].
 
     Returns:
         Positions of the free joints; the error adds metres and radians as inverse kinematics does.
@@ -37,18 +38,19 @@ def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping
     values = {joint.name: joint.bounded(start[joint.name]) for joint in free}
     best, least = dict(values), math.inf
     for _ in range(STEPS):
-        whole = complete({**start, **values})
-        turn, place = link_pose(chain, whole)
-        error = np.concatenate([np.asarray(position) - place, _rotation_vector(rotation @ turn.T)])
+        full_positions = complete({**start, **values})
+        current_rotation, current_position = link_pose(chain, full_positions)
+        rotation_error = (rotation * current_rotation.inv()).as_rotvec()
+        error = np.concatenate([np.asarray(position) - current_position, rotation_error])
         if float(np.linalg.norm(error)) < least:
             best, least = dict(values), float(np.linalg.norm(error))
-        full = jacobian(chain, whole, (0.0, 0.0, 0.0))
+        full = jacobian(chain, full_positions, (0.0, 0.0, 0.0))
         columns = np.column_stack([_column(full, movable, chain, joint) for joint in free])
         step = columns.T @ np.linalg.solve(columns @ columns.T + DAMPING ** 2 * np.eye(6), error)
         step *= min(1.0, WIDEST_STEP / max(float(np.abs(step).max()), STANDSTILL))
-        moved = {joint.name: min(max(values[joint.name] + float(way), joint.lower), joint.upper)
-                 if joint.kind != "continuous" else values[joint.name] + float(way)
-                 for joint, way in zip(free, step, strict=True)}
+        moved = {joint.name: min(max(values[joint.name] + float(change), joint.lower), joint.upper)
+                 if joint.kind != "continuous" else values[joint.name] + float(change)
+                 for joint, change in zip(free, step, strict=True)}
         if max(abs(moved[name] - values[name]) for name in moved) < STANDSTILL:
             break
         values = moved
@@ -56,17 +58,12 @@ def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping
 
 
 def _column(full: Any, movable: Sequence[str], chain: Sequence[Joint], joint: Joint) -> Any:
-    """How a joint, and those of the chain that mimic it, move the link."""
+    """Returns how a joint, and those of the chain that mimic it, move the link."""
     gains = {item.name: item.multiplier if item.leader == joint.name else 1.0 for item in chain
              if joint.name in (item.name, item.leader)}
     return sum((gain * full[:, movable.index(name)] for name, gain in gains.items() if name in movable), np.zeros(6))
 
 
-def rotation_and_position(pose: Sequence[float]) -> tuple[Any, Any]:
-    """Rotation matrix and position [m] of a pose [x, y, z, qx, qy, qz, qw]."""
-    return Rotation.from_quat(pose[3:]).as_matrix(), np.array(pose[:3])
-
-
-def _rotation_vector(turn: Any) -> Any:
-    """Axis times angle [rad] of a rotation matrix."""
-    return Rotation.from_matrix(turn).as_rotvec()
+def rotation_and_position(pose: Sequence[float]) -> tuple[Rotation, Any]:
+    """Returns the rotation and position [m] of a pose [x, y, z, qx, qy, qz, qw]."""
+    return Rotation.from_quat(pose[3:]), np.array(pose[:3])

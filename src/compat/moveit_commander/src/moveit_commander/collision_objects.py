@@ -18,7 +18,7 @@ def existing(name: str) -> CollisionObject:
 
 
 def primitive(name: str, pose: PoseStamped, kind: int, dimensions: Sequence[float]) -> CollisionObject:
-    """An object of one primitive; `kind` and `dimensions` [m] as in shape_msgs/SolidPrimitive."""
+    """Returns an object of one primitive; `kind` and `dimensions` [m] as in shape_msgs/SolidPrimitive."""
     sizes = [float(size) for size in dimensions]
     if any(not size > 0.0 for size in sizes):
         raise MoveItCommanderException(f"object '{name}': sizes {sizes} m; every size must be above 0")
@@ -28,7 +28,7 @@ def primitive(name: str, pose: PoseStamped, kind: int, dimensions: Sequence[floa
 
 
 def plane(name: str, pose: PoseStamped, normal: Sequence[float], offset: float) -> CollisionObject:
-    """The plane normal . p + offset = 0 in the frame of the pose [m]."""
+    """Returns the plane normal . p + offset = 0 in the frame of the pose [m]."""
     item = CollisionObject(header=pose.header, id=name, operation=CollisionObject.ADD)
     item.planes = [Plane([float(value) for value in (*normal, offset)])]
     item.plane_poses = [pose.pose]
@@ -36,7 +36,7 @@ def plane(name: str, pose: PoseStamped, normal: Sequence[float], offset: float) 
 
 
 def mesh(name: str, pose: PoseStamped, filename: str, scale: Sequence[float]) -> CollisionObject:
-    """The triangles of a mesh file (STL, OBJ, PLY, DAE), scaled along x, y, z.
+    """Returns the triangles of a mesh file (STL, OBJ, PLY, DAE), scaled along x, y, z.
 
     Raises:
         MoveItCommanderException: the file is not there, cannot be read whole, or holds no triangle.
@@ -59,6 +59,6 @@ def _empty(name: str, pose: PoseStamped) -> CollisionObject:
 
 
 def _turn(orientation: Quaternion) -> Quaternion:
-    """An orientation that was left all 0 means: not turned."""
+    """Returns an orientation that was left all 0 means: not turned."""
     turned = any((orientation.x, orientation.y, orientation.z, orientation.w))
     return orientation if turned else Quaternion(0.0, 0.0, 0.0, 1.0)

@@ -28,9 +28,9 @@ def completions(keywords: Mapping[str, Sequence[str]], line: str, text: str) -> 
 
 
 def _completer(interpreter: MoveGroupCommandInterpreter) -> Callable[[str, int], str | None]:
-    def complete(text: str, place: int) -> str | None:
+    def complete(text: str, index: int) -> str | None:
         found = completions(interpreter.get_keywords() | {"quit": []}, readline.get_line_buffer(), text)
-        return found[place] if place < len(found) else None
+        return found[index] if index < len(found) else None
 
     return complete
 

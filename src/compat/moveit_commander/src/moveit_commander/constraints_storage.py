@@ -49,7 +49,7 @@ class ConstraintsStorage:
                                                f"{LAYOUT_VERSION} is needed; make it anew")
 
     def add_constraints(self, msg: Constraints, robot: str = "", group: str = "") -> None:
-        """Saves constraints under their own name, in place of those of that name."""
+        """Saves constraints under their own name, replacing those of that name."""
         if not msg.name:
             raise MoveItCommanderException(f"constraints database {self.path}: the constraints have no name; set .name")
         data = BytesIO()
@@ -63,15 +63,15 @@ class ConstraintsStorage:
                                      msg.name, robot, group))))
 
     def has_constraints(self, name: str, robot: str = "", group: str = "") -> bool:
-        """Whether there are constraints of that name."""
+        """Returns whether there are constraints of that name."""
         return name in self.get_known_constraints(robot, group)
 
     def get_known_constraints(self, robot: str = "", group: str = "") -> list[str]:
-        """Answers the names, in order."""
+        """Returns the names, in order."""
         return sorted({name.decode() for name, _ in self._rows("", robot, group)})
 
     def get_constraints(self, name: str, robot: str = "", group: str = "") -> Constraints:
-        """Answers constraints by name; raises MoveItCommanderException with the names there are."""
+        """Returns constraints by name; raises MoveItCommanderException with the names there are."""
         rows = self._rows(name, robot, group)
         if not rows:
             raise MoveItCommanderException(f"constraints database {self.path}: no constraints '{name}' for robot "
@@ -105,10 +105,14 @@ class ConstraintsStorage:
 
     @contextmanager
     def _connected(self, create: bool = False) -> Iterator[sqlite3.Connection]:
-        """A connection whose changes are kept, to nothing where there is no file; raises MoveItCommanderException."""
-        place = str(self.path) if create or self.path.exists() else ":memory:"
+        """Opens the database and keeps its changes; without a file it is empty.
+
+        Raises:
+            MoveItCommanderException: the file cannot be read or written.
+        """
+        location = str(self.path) if create or self.path.exists() else ":memory:"
         try:
-            with closing(sqlite3.connect(place, timeout=BUSY_S)) as database, database:
+            with closing(sqlite3.connect(location, timeout=BUSY_S)) as database, database:
                 if create:
                     _lay_out(database)
                 yield database
@@ -129,7 +133,7 @@ def _lay_out(database: sqlite3.Connection) -> None:
 
 
 def _matching(name: str, robot: str, group: str) -> tuple[str, tuple[bytes, ...]]:
-    """The condition of a search and its values, which that plugin binds as bytes; what is empty is not asked for."""
+    """Returns the condition of a search and its values, as bytes like warehouse_ros_sqlite; empty names match all."""
     asked = {"M_constraints_id": name, "M_robot_id": robot, "M_group_id": group}
     wanted = {column: value.encode() for column, value in asked.items() if value}
     where = " AND ".join(f"{column} = ?" for column in wanted)

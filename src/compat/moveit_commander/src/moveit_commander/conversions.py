@@ -26,7 +26,7 @@ def msg_from_string(msg: Any, data: bytes) -> None:
 
 
 def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> list[float]:
-    """Quaternion xyzw of turns about the fixed axes x, then y, then z [rad]."""
+    """Returns the quaternion xyzw of turns about the fixed axes x, then y, then z [rad]."""
     cr, sr = math.cos(roll / 2.0), math.sin(roll / 2.0)
     cp, sp = math.cos(pitch / 2.0), math.sin(pitch / 2.0)
     cy, sy = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
@@ -49,7 +49,7 @@ def rpy_from_quaternion(quaternion: Sequence[float]) -> list[float]:
 
 
 def pose_to_list(pose_msg: Pose) -> list[float]:
-    """Answers [x, y, z, qx, qy, qz, qw] of a pose [m]."""
+    """Returns [x, y, z, qx, qy, qz, qw] of a pose [m]."""
     position, turn = pose_msg.position, pose_msg.orientation
     return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
 
@@ -74,7 +74,7 @@ def list_to_pose_stamped(pose_list: Sequence[float], target_frame: str) -> PoseS
 
 
 def transform_to_list(trf_msg: Transform) -> list[float]:
-    """Answers [x, y, z, qx, qy, qz, qw] of a transform [m]."""
+    """Returns [x, y, z, qx, qy, qz, qw] of a transform [m]."""
     shift, turn = trf_msg.translation, trf_msg.rotation
     return [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, turn.w]
 

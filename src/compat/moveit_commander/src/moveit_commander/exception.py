@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What goes wrong while a robot is commanded, as exceptions a script can tell apart."""
+"""Exceptions of the commander: what goes wrong while a robot is commanded."""
 from __future__ import annotations
 
 

@@ -10,14 +10,14 @@ from shape_msgs.msg import SolidPrimitive
 
 
 def joint_goal(positions: Mapping[str, float], tolerance: float) -> Constraints:
-    """Every joint at its position within a tolerance [rad or m]."""
+    """Constrains every joint at its position within a tolerance [rad or m]."""
     return Constraints(joint_constraints=[
         JointConstraint(joint_name=name, position=position, tolerance_above=tolerance, tolerance_below=tolerance,
                         weight=1.0) for name, position in positions.items()])
 
 
 def position_goal(link: str, pose: PoseStamped, tolerance_m: float) -> PositionConstraint:
-    """The link's origin within a sphere about the pose's position."""
+    """Constrains the link's origin within a sphere about the pose's position."""
     constraint = PositionConstraint(header=pose.header, link_name=link, weight=1.0)
     constraint.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [tolerance_m])]
     constraint.constraint_region.primitive_poses = [Pose(pose.pose.position, Quaternion(0.0, 0.0, 0.0, 1.0))]
@@ -25,7 +25,7 @@ def position_goal(link: str, pose: PoseStamped, tolerance_m: float) -> PositionC
 
 
 def orientation_goal(link: str, pose: PoseStamped, tolerance_rad: float) -> OrientationConstraint:
-    """The link turned as the pose within a tolerance about each axis."""
+    """Constrains the orientation of the link to that of the pose within a tolerance about each axis."""
     return OrientationConstraint(
         header=pose.header, orientation=pose.pose.orientation, link_name=link, weight=1.0,
         absolute_x_axis_tolerance=tolerance_rad, absolute_y_axis_tolerance=tolerance_rad,

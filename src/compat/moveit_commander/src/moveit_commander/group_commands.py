@@ -58,8 +58,8 @@ class Command:
     run: Callable[[GroupCommands, Words], Answer]
 
 
-def told(succeeded: bool, success: str, failure: str) -> Answer:
-    """Returns an answer in the words of what became of it."""
+def report(succeeded: bool, success: str, failure: str) -> Answer:
+    """Returns an answer that reports success or failure."""
     return (MoveGroupInfoLevel.SUCCESS, success) if succeeded else (MoveGroupInfoLevel.FAIL, failure)
 
 
@@ -156,7 +156,7 @@ class GroupCommands:
                                "    </group_state>"]))
 
     def database(self, words: Words) -> Answer:
-        """Chooses the file of constraints, or tells which it is."""
+        """Chooses the file of constraints, or returns which it is."""
         if words:
             self.group.set_constraints_database(words[0], int(number(words[1])) if len(words) > 1 else 33829)
         path = self.database_path()
@@ -180,7 +180,7 @@ class GroupCommands:
         """Executes the last plan."""
         if self._plan is None:
             return MoveGroupInfoLevel.WARN, "No motion plan computed"
-        return told(self.group.execute(self._plan), "Plan executed", "Failed to execute the plan")
+        return report(self.group.execute(self._plan), "Plan executed", "Failed to execute the plan")
 
     def go(self, words: Words) -> Answer:
         """Moves to a named or random state, by a distance, or to a pose (x y z, with roll pitch yaw)."""
@@ -189,12 +189,12 @@ class GroupCommands:
         if name in DIRECTIONS and len(words) == 2:
             axis, sign = DIRECTIONS[name]
             self.group.shift_pose_target(axis, sign * number(words[1]))
-            return told(self.group.go(), f"Moved {name} by {words[1]} m", f"Failed while moving {name}")
+            return report(self.group.go(), f"Moved {name} by {words[1]} m", f"Failed while moving {name}")
         if len(words) > 2:
-            self._set_place(words)
+            self._set_pose(words)
         else:
             self._set_named(words)
-        return told(self.group.go(), f"Moved to {' '.join(words)}", f"Failed while moving to {' '.join(words)}")
+        return report(self.group.go(), f"Moved to {' '.join(words)}", f"Failed while moving to {' '.join(words)}")
 
     def _set_named(self, words: Words) -> None:
         if words[0].lower() in RANDOM:
@@ -202,15 +202,15 @@ class GroupCommands:
         else:
             self.group.set_named_target(words[0])
 
-    def _set_place(self, words: Words) -> None:
+    def _set_pose(self, words: Words) -> None:
         approximate = words[-1].lower() in ("approx", "approximate")
         values = [number(word) for word in (words[:-1] if approximate else words)]
         if len(values) not in (3, 6):
             raise MoveItCommanderException(f"go {' '.join(words)}: 3 numbers (x y z) or 6 (x y z roll pitch yaw) "
                                            "are allowed")
         if approximate:
-            turn = quaternion_from_rpy(*values[3:]) if len(values) == 6 else (0.0, 0.0, 0.0, 1.0)
-            self.group.set_joint_value_target(Pose(Point(*values[:3]), Quaternion(*turn)), True)
+            quaternion = quaternion_from_rpy(*values[3:]) if len(values) == 6 else (0.0, 0.0, 0.0, 1.0)
+            self.group.set_joint_value_target(Pose(Point(*values[:3]), Quaternion(*quaternion)), True)
         elif len(values) == 3:
             self.group.set_position_target(values)
         else:
@@ -231,15 +231,15 @@ class GroupCommands:
 
     def joints(self, _: Words) -> Answer:
         """Lists the joints."""
-        return info("\n".join(f"{place} = {name}" for place, name in enumerate(self.group.get_joints())))
+        return info("\n".join(f"{index} = {name}" for index, name in enumerate(self.group.get_joints())))
 
     def pick(self, words: Words) -> Answer:
         """Picks an object."""
-        return told(self.group.pick(words[0]) == 1, f"Picked object {words[0]}", f"Failed to pick object {words[0]}")
+        return report(self.group.pick(words[0]) == 1, f"Picked object {words[0]}", f"Failed to pick object {words[0]}")
 
     def place(self, words: Words) -> Answer:
         """Places an object."""
-        return told(self.group.place(words[0]), f"Placed object {words[0]}", f"Failed to place object {words[0]}")
+        return report(self.group.place(words[0]), f"Placed object {words[0]}", f"Failed to place object {words[0]}")
 
     def plan(self, words: Words) -> Answer:
         """Plans to a named or random state, or shows the last plan."""
@@ -248,7 +248,7 @@ class GroupCommands:
         self._set_named(words)
         worked, trajectory, _, _ = self.group.plan()
         self._plan = trajectory if worked else None
-        return told(worked, f"Planned to {words[0]}: {len(trajectory.joint_trajectory.points)} points",
+        return report(worked, f"Planned to {words[0]}: {len(trajectory.joint_trajectory.points)} points",
                     f"Failed while planning to {words[0]}")
 
     def planner(self, words: Words) -> Answer:
@@ -270,7 +270,7 @@ class GroupCommands:
         """Turns the end effector to roll, pitch, yaw."""
         self.group.set_rpy_target([number(word) for word in words])
         text = " ".join(words)
-        return told(self.group.go(), f"Rotation complete: {text}", f"Failed while rotating to {text}")
+        return report(self.group.go(), f"Rotation complete: {text}", f"Failed while rotating to {text}")
 
     def show(self, words: Words) -> Answer:
         """Shows remembered joint values."""

@@ -28,7 +28,7 @@ CODE_NAMES = {value: name for name, value in vars(MoveItErrorCodes).items()
 
 
 def code_text(code: MoveItErrorCodes) -> str:
-    """An error code in words, for messages."""
+    """Returns an error code in words, for messages."""
     return f"{CODE_NAMES.get(code.val, 'unknown code')} ({code.val})"
 
 
@@ -58,27 +58,27 @@ class GroupConnection:
         self._servers.action(EXECUTE_ACTION, ExecuteTrajectoryAction, wait_for_servers)
 
     def get_name(self) -> str:
-        """Answers the name of the group."""
+        """Returns the name of the group."""
         return self._group.name
 
     def get_joints(self) -> list[str]:
-        """Answers the names of the group's joints, fixed and mimic ones included."""
+        """Returns the names of the group's joints, fixed and mimic ones included."""
         return [joint.name for joint in self._group.joints]
 
     def get_active_joints(self) -> list[str]:
-        """Answers the names of the group's joints that move by themselves."""
+        """Returns the names of the group's joints that move by themselves."""
         return [joint.name for joint in self._group.active_joints]
 
     def get_variable_count(self) -> int:
-        """Answers how many numbers describe the group's state, mimic joints included."""
+        """Returns how many numbers describe the group's state, mimic joints included."""
         return len(self._group.variables)
 
     def has_end_effector_link(self) -> bool:
-        """Whether the group has a link that poses are meant for."""
+        """Returns whether the group has a link that poses are meant for."""
         return bool(self._end_effector_link)
 
     def get_end_effector_link(self) -> str:
-        """Answers the link that poses are meant for; "" if there is none."""
+        """Returns the link that poses are meant for; "" if there is none."""
         return self._end_effector_link
 
     def set_end_effector_link(self, link_name: str) -> None:
@@ -89,7 +89,7 @@ class GroupConnection:
         self._end_effector_link = link_name
 
     def get_pose_reference_frame(self) -> str:
-        """Answers the frame of poses that name none."""
+        """Returns the frame of poses that name none."""
         return self._pose_reference_frame
 
     def set_pose_reference_frame(self, reference_frame: str) -> None:
@@ -97,31 +97,31 @@ class GroupConnection:
         self._pose_reference_frame = reference_frame
 
     def get_planning_frame(self) -> str:
-        """Answers the frame in which planning is done."""
+        """Returns the frame in which planning is done."""
         return self._model.planning_frame
 
     def get_interface_description(self) -> PlannerInterfaceDescription:
-        """Answers the first planner interface of move_group: its name and planner ids."""
+        """Returns the first planner interface of move_group: its name and planner ids."""
         answer = self._servers.call("query_planner_interface", QueryPlannerInterfaces, QueryPlannerInterfacesRequest())
         if not answer.planner_interfaces:
             raise ServerError("service query_planner_interface: the list is empty; move_group has no planning pipeline")
         return answer.planner_interfaces[0]
 
     def get_current_joint_values(self) -> list[float]:
-        """Answers the group's present joint positions [rad or m], in the order of its variables."""
+        """Returns the group's present joint positions [rad or m], in the order of its variables."""
         positions = self._state.positions(self._group_names())
         return [positions.get(joint.name, joint.default) for joint in self._group.variables]
 
     def get_current_state(self) -> RobotState:
-        """Answers the whole robot's present state."""
+        """Returns the whole robot's present state."""
         return self._state.message(self._group_names())
 
     def get_current_state_bounded(self) -> RobotState:
-        """Answers the whole robot's present state, each joint brought within its bounds."""
+        """Returns the whole robot's present state, each joint brought within its bounds."""
         return self.enforce_bounds(self.get_current_state())
 
     def enforce_bounds(self, robot_state_msg: RobotState) -> RobotState:
-        """Answers a state with each joint wrapped or cut off to its bounds; the given one stays as it is.
+        """Returns a state with each joint wrapped or cut off to its bounds; the given one stays as it is.
 
         Raises:
             genpy.DeserializationError: the state names no joint; as in MoveIt, whose message is then empty.
@@ -137,11 +137,11 @@ class GroupConnection:
         return state
 
     def get_current_pose(self, end_effector_link: str = "") -> PoseStamped:
-        """Answers the present pose of a link, or of the end effector link, in the planning frame."""
+        """Returns the present pose of a link, or of the end effector link, in the planning frame."""
         return self._pose_of(end_effector_link, self.get_current_state())
 
     def get_current_rpy(self, end_effector_link: str = "") -> list[float]:
-        """Answers the present [roll, pitch, yaw] of a link, or of the end effector link [rad]."""
+        """Returns the present [roll, pitch, yaw] of a link, or of the end effector link [rad]."""
         pose = self.get_current_pose(end_effector_link)
         return conversions.rpy_from_quaternion(conversions.pose_to_list(pose.pose)[3:])
 
@@ -151,7 +151,7 @@ class GroupConnection:
         return pose
 
     def _link(self, link: str, purpose: str) -> str:
-        """The link a command is for. Raises MoveItCommanderException if none is given and the group has none."""
+        """Returns the link a command is for; raises MoveItCommanderException if there is none."""
         chosen = link or self._end_effector_link
         if not chosen:
             raise MoveItCommanderException(f"There is no end effector to {purpose}: group '{self._group.name}' is not "

@@ -43,7 +43,7 @@ class GroupJointTargets(GroupSettings):
         self._random = random.Random()
 
     def get_joint_value_target(self) -> list[float]:
-        """Answers the joint target [rad or m], in the order of the group's variables."""
+        """Returns the joint target [rad or m], in the order of the group's variables."""
         return [self._joint_target[joint.name] for joint in self._group.variables if joint.name in self._joint_target]
 
     def set_joint_value_target(self, arg1: Any, arg2: Any = None, arg3: Any = None) -> None:
@@ -85,17 +85,17 @@ class GroupJointTargets(GroupSettings):
         self._set_values(self._model.random_values(self._group, self._random))
 
     def get_random_joint_values(self) -> list[float]:
-        """Answers joint values drawn evenly within the bounds [rad or m]."""
+        """Returns joint values drawn evenly within the bounds [rad or m]."""
         return list(self._model.random_values(self._group, self._random).values())
 
     def get_random_pose(self, end_effector_link: str = "") -> PoseStamped:
-        """Answers the pose of a link, or of the end effector link, at joint values drawn within the bounds."""
+        """Returns the pose of a link, or of the end effector link, at joint values drawn within the bounds."""
         self._link(end_effector_link, "get the pose of")
         drawn = self._state.positions(self._group_names()) | self._model.random_values(self._group, self._random)
         return self._pose_of(end_effector_link, self._state.message_of(drawn))
 
     def get_named_targets(self) -> list[str]:
-        """Answers the names of joint targets: those of the SRDF and those remembered."""
+        """Returns the names of joint targets: those of the SRDF and those remembered."""
         return sorted({*self._group.states, *self._remembered})
 
     def set_named_target(self, name: str) -> None:
@@ -103,7 +103,7 @@ class GroupJointTargets(GroupSettings):
         self._set_values(self.get_named_target_values(name))
 
     def get_named_target_values(self, target: str) -> dict[str, float]:
-        """Answers the joint values of a named target by joint [rad or m]."""
+        """Returns the joint values of a named target by joint [rad or m]."""
         if target in self._remembered:
             return group_values(self._group, self._remembered[target])
         if target not in self._group.states:
@@ -118,7 +118,7 @@ class GroupJointTargets(GroupSettings):
         self._remembered[name] = kept
 
     def get_remembered_joint_values(self) -> dict[str, list[float]]:
-        """Answers the kept joint values by name [rad or m]."""
+        """Returns the kept joint values by name [rad or m]."""
         return {name: list(values) for name, values in self._remembered.items()}
 
     def forget_joint_values(self, name: str) -> None:
@@ -165,18 +165,19 @@ class GroupJointTargets(GroupSettings):
                           if name in wanted})
 
     def _nearest_to(self, link: str, pose: PoseStamped) -> dict[str, float]:
-        """Joint values near the present target that bring a link as near to a pose as they can."""
+        """Returns joint values near the current target that bring a link as near to a pose as they can."""
         start = {**self._state.positions(self._group_names()), **self._joint_target}
         base = self._group.joints[0].parent
-        seen = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
-        base_turn, base_place = rotation_and_position(conversions.pose_to_list(seen))
-        turn, place = rotation_and_position(conversions.pose_to_list(pose.pose))
+        base_pose = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
+        base_rotation, base_position = rotation_and_position(conversions.pose_to_list(base_pose))
+        rotation, position = rotation_and_position(conversions.pose_to_list(pose.pose))
+        frame_to_base = base_rotation.inv()
         return nearest_values(self._model.chain(base, link), self._group.active_joints, start, self._model.complete,
-                              base_turn.T @ turn, base_turn.T @ (place - base_place))
+                              frame_to_base * rotation, frame_to_base.apply(position - base_position))
 
 
 def _single_value(name: str, value: Any) -> float:
-    """The one value of a one-variable joint, given as a number or as a list of one."""
+    """Returns the one value of a one-variable joint, given as a number or as a list of one."""
     if value is None:
         raise MoveItCommanderException(f"Joint value expected when joint name specified ('{name}')")
     values = list(value) if isinstance(value, Iterable) else [value]

@@ -115,7 +115,7 @@ class GroupMotion(GroupPoseTargets):
         Args:
             waypoints: poses to pass, in the pose reference frame: Pose or lists of 6 or 7 numbers [m, rad].
             eef_step: longest step along the lines [m].
-            options: [jump_threshold,] [avoid_collisions=True,] [path_constraints=None], by place or by name; older
+            options: [jump_threshold,] [avoid_collisions=True,] [path_constraints=None], by position or by name; older
                 scripts give the jump threshold (a number), newer ones do not.
 
         Returns:
@@ -140,7 +140,7 @@ class GroupMotion(GroupPoseTargets):
         return answer.solution, answer.fraction
 
     def _recalled(self, name: str) -> dict[str, float]:
-        """Joint values of a remembered or named target."""
+        """Returns joint values of a remembered or named target."""
         return self.get_named_target_values(name)
 
     def _goal(self, plan_only: bool) -> MoveGroupGoal:

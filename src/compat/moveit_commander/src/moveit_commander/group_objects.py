@@ -69,7 +69,7 @@ class GroupObjects(GroupMotion):
         return self._publish(messages)
 
     def pick(self, object_name: str, grasp: Grasp | Sequence[Grasp] = (), plan_only: bool = False) -> int:
-        """Picks an object by one of the grasps. Answers the error code.
+        """Picks an object by one of the grasps. Returns the error code.
 
         None given: those of the service plan_grasps; where nobody plans any, move_group answers for a pick without.
 
@@ -91,38 +91,39 @@ class GroupObjects(GroupMotion):
         return int(code.val)
 
     def place(self, object_name: str, location: Any = None, plan_only: bool = False) -> bool:
-        """Places an attached object at a pose, at one of several places, or (None) somewhere safe.
+        """Places an attached object at a pose, at one of several locations, or (None) anywhere.
 
         Raises:
             ServerError: move_group does not offer the action place.
             MoveItCommanderException: the location is of another type.
         """
         goal = PlaceGoal(
-            group_name=self._group.name, attached_object_name=object_name, place_locations=self._places(location),
-            support_surface_name=self._support_surface, path_constraints=self._path_constraints,
+            group_name=self._group.name, attached_object_name=object_name,
+            place_locations=self._place_locations(location), support_surface_name=self._support_surface,
+            path_constraints=self._path_constraints,
             allow_gripper_support_collision=bool(self._support_surface), planner_id=self._planner_id,
             allowed_planning_time=self._planning_time_s, planning_options=self._options(plan_only))
         caller = self._servers.action("place", PlaceAction)
         result = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S)
         return self._judge(result.error_code, "place")
 
-    def _places(self, location: Any) -> list[PlaceLocation]:
+    def _place_locations(self, location: Any) -> list[PlaceLocation]:
         given = location if isinstance(location, list) else [] if location is None else [location]
-        return [item if isinstance(item, PlaceLocation) else self._place(item) for item in given]
+        return [item if isinstance(item, PlaceLocation) else self._place_location(item) for item in given]
 
-    def _place(self, pose: Any) -> PlaceLocation:
-        """A place to come down to along the planning frame's z, and to leave against the link's x."""
+    def _place_location(self, pose: Any) -> PlaceLocation:
+        """Returns a location approached down the planning frame's z and left against the link's x."""
         if not isinstance(pose, Pose | PoseStamped):
             raise MoveItCommanderException(f"Parameter location must be a {PLACE_KINDS} object; got {type(pose)}")
-        place = PlaceLocation(place_pose=self._stamped(pose))
-        approach, retreat = place.pre_place_approach, place.post_place_retreat
+        location = PlaceLocation(place_pose=self._stamped(pose))
+        approach, retreat = location.pre_place_approach, location.post_place_retreat
         approach.direction.header.frame_id = self.get_planning_frame()
         approach.direction.vector.z = -1.0
         approach.min_distance, approach.desired_distance = 0.1, 0.2
         retreat.direction.header.frame_id = self._end_effector_link
         retreat.direction.vector.x = -1.0
         retreat.min_distance, retreat.desired_distance = 0.0, 0.2
-        return place
+        return location
 
     def _planned_grasps(self, object_name: str) -> list[Grasp]:
         request = GraspPlanningRequest(group_name=self._group.name, support_surfaces=[self._support_surface])

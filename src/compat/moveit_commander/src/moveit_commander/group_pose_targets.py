@@ -91,7 +91,7 @@ class GroupPoseTargets(GroupJointTargets):
         self._pose_targets.clear()
 
     def construct_motion_plan_request(self) -> MotionPlanRequest:
-        """Answers the planning request of the present settings and the target set last."""
+        """Returns the planning request of the present settings and the target set last."""
         return MotionPlanRequest(
             group_name=self._group.name, num_planning_attempts=self._attempts,
             allowed_planning_time=self._planning_time_s, pipeline_id=self._pipeline_id, planner_id=self._planner_id,
@@ -105,7 +105,7 @@ class GroupPoseTargets(GroupJointTargets):
         return (self._speed_limited_link or self._end_effector_link) if self._speed_limit > 0.0 else ""
 
     def _goals(self) -> list[Constraints]:
-        """The k-th goal holds the k-th pose of every link."""
+        """Returns the goals: the k-th holds the k-th pose of every link."""
         if self._active_target is Target.JOINT:
             active = {joint.name: self._joint_target[joint.name] for joint in self._group.active_joints}
             return [joint_goal(active, self._joint_tolerance)]

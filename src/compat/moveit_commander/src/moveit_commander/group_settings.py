@@ -48,19 +48,19 @@ class GroupSettings(GroupConnection):
         self._start_state = msg
 
     def get_goal_tolerance(self) -> tuple[float, float, float]:
-        """Answers the tolerances of joint [rad or m], position [m] and orientation [rad] goals."""
+        """Returns the tolerances of joint [rad or m], position [m] and orientation [rad] goals."""
         return self._joint_tolerance, self._position_tolerance, self._orientation_tolerance
 
     def get_goal_joint_tolerance(self) -> float:
-        """Answers how far each joint may be from a joint goal [rad or m]."""
+        """Returns how far each joint may be from a joint goal [rad or m]."""
         return self._joint_tolerance
 
     def get_goal_position_tolerance(self) -> float:
-        """Answers the radius of the sphere about a position goal [m]."""
+        """Returns the radius of the sphere about a position goal [m]."""
         return self._position_tolerance
 
     def get_goal_orientation_tolerance(self) -> float:
-        """Answers how far an orientation may be turned from its goal about each axis [rad]."""
+        """Returns how far an orientation may be turned from its goal about each axis [rad]."""
         return self._orientation_tolerance
 
     def set_goal_tolerance(self, value: float) -> None:
@@ -80,15 +80,15 @@ class GroupSettings(GroupConnection):
         self._orientation_tolerance = value
 
     def allow_looking(self, value: bool) -> None:
-        """Whether move_group may look around with its sensors while it moves."""
+        """Returns whether move_group may look around with its sensors while it moves."""
         self._looking = bool(value)
 
     def allow_replanning(self, value: bool) -> None:
-        """Whether move_group may plan again when the scene changes on the way."""
+        """Returns whether move_group may plan again when the scene changes on the way."""
         self._replanning = bool(value)
 
     def get_known_constraints(self) -> list[str]:
-        """Answers the names of the group's constraints in the database; none where no database is chosen."""
+        """Returns the names of the group's constraints in the database; none where no database is chosen."""
         return [] if self._storage is None else self._storage.get_known_constraints(self._model.name, self._group.name)
 
     def set_constraints_database(self, host: str, port: int) -> None:
@@ -104,7 +104,7 @@ class GroupSettings(GroupConnection):
         self._storage = ConstraintsStorage(host)
 
     def get_path_constraints(self) -> Constraints:
-        """Answers what holds along the whole path."""
+        """Returns what holds along the whole path."""
         return self._path_constraints
 
     def set_path_constraints(self, value: Constraints | str | None) -> None:
@@ -127,7 +127,7 @@ class GroupSettings(GroupConnection):
         self._path_constraints = Constraints()
 
     def get_trajectory_constraints(self) -> TrajectoryConstraints:
-        """Answers the constraints along the trajectory."""
+        """Returns the constraints along the trajectory."""
         return self._trajectory_constraints
 
     def set_trajectory_constraints(self, value: TrajectoryConstraints | None) -> None:
@@ -150,7 +150,7 @@ class GroupSettings(GroupConnection):
             self._planning_time_s = float(seconds)
 
     def get_planning_time(self) -> float:
-        """Answers how long a planner may search [s]."""
+        """Returns how long a planner may search [s]."""
         return self._planning_time_s
 
     def set_planning_pipeline_id(self, planning_pipeline: str) -> None:
@@ -159,7 +159,7 @@ class GroupSettings(GroupConnection):
             self._pipeline_id, self._planner_id = planning_pipeline, ""
 
     def get_planning_pipeline_id(self) -> str:
-        """Answers the planning pipeline; "" is move_group's default."""
+        """Returns the planning pipeline; "" is move_group's default."""
         return self._pipeline_id
 
     def set_planner_id(self, planner_id: str) -> None:
@@ -167,7 +167,7 @@ class GroupSettings(GroupConnection):
         self._planner_id = planner_id
 
     def get_planner_id(self) -> str:
-        """Answers the chosen planner; "" is the group's default."""
+        """Returns the chosen planner; "" is the group's default."""
         return self._planner_id
 
     def set_num_planning_attempts(self, num_planning_attempts: int) -> None:
@@ -207,7 +207,7 @@ class GroupSettings(GroupConnection):
         self._speed_limit, self._speed_limited_link = 0.0, ""
 
     def set_support_surface_name(self, value: str) -> None:
-        """Names the object that things are picked from and placed on."""
+        """Names the object that objects are picked from and placed on."""
         self._support_surface = value
 
 

@@ -47,11 +47,11 @@ class MoveGroupCommandInterpreter:
         self._traces = False
 
     def get_active_group(self) -> MoveGroupCommander | None:
-        """Answers the group that is commanded, if any."""
+        """Returns the group that is commanded, if any."""
         return self._groups[self._name].group if self._name else None
 
     def get_loaded_groups(self) -> list[str]:
-        """Answers the groups that were used so far."""
+        """Returns the groups that were used so far."""
         return list(self._groups)
 
     def execute(self, cmd: str) -> Answer:
@@ -69,7 +69,7 @@ class MoveGroupCommandInterpreter:
         return self.execute_group_command(group, line)
 
     def resolve_command_alias(self, cmdorig: str) -> str:
-        """Answers the command another name stands for."""
+        """Returns the command another name stands for."""
         return ALIASES.get(cmdorig.lower(), cmdorig)
 
     def execute_generic_command(self, cmd: str) -> Answer | None:
@@ -159,13 +159,13 @@ class MoveGroupCommandInterpreter:
         return OK
 
     def get_help(self) -> str:
-        """Answers all commands, a line each."""
+        """Returns all commands, a line each."""
         rows = [*GENERAL.values(), *((item.usage, item.text) for item in dict.fromkeys(COMMANDS.values())),
                 *ASSIGNMENTS]
         return "\n".join(["Known commands:", *(f"  {usage:<32} {text}" for usage, text in rows)])
 
     def get_keywords(self) -> dict[str, list[str]]:
-        """Answers what may follow each command, for completion."""
+        """Returns what may follow each command, for completion."""
         group = self.get_active_group()
         known = list(group.get_remembered_joint_values()) if group else []
         states = list(group.get_named_targets()) if group else []

@@ -37,7 +37,7 @@ class MoveGroupCommander(GroupObjects):
 
     def get_jacobian_matrix(self, joint_values: Sequence[float],
                             reference_point: Sequence[float] | None = None) -> list[list[float]]:
-        """Answers the 6 x n Jacobian of the group's last link, in the frame of the group's base link.
+        """Returns the 6 x n Jacobian of the group's last link, in the frame of the group's base link.
 
         Args:
             joint_values: positions of the group's variables [rad or m].
@@ -56,7 +56,7 @@ class MoveGroupCommander(GroupObjects):
     def retime_trajectory(self, ref_state_in: RobotState, traj_in: RobotTrajectory,
                           velocity_scaling_factor: float = 1.0, acceleration_scaling_factor: float = 1.0,
                           algorithm: str = "iterative_time_parameterization") -> RobotTrajectory:
-        """Answers the trajectory with new times, velocities and accelerations; its waypoints stay.
+        """Returns the trajectory with new times, velocities and accelerations; its waypoints stay.
 
         Args:
             ref_state_in: state of the other joints; not needed here.
@@ -93,7 +93,7 @@ class MoveGroupCommander(GroupObjects):
 
 
 def _factor(kind: str, value: float) -> float:
-    """The scaling factor; as in MoveIt, one that is not in (0, 1] is 1, with a warning."""
+    """Returns the scaling factor; as in MoveIt, one that is not in (0, 1] is 1, with a warning."""
     if 0.0 < value <= 1.0:
         return value
     rospy.logwarn("retime_trajectory: %s_scaling_factor is %s; allowed is 0 < factor <= 1; 1 is used", kind, value)

@@ -129,7 +129,7 @@ class PlanningSceneInterface:
         self._submit(attached)
 
     def get_known_object_names(self, with_type: bool = False) -> list[str]:
-        """Answers the names of the world's objects; with_type: only those with a type."""
+        """Returns the names of the world's objects; with_type: only those with a type."""
         return [item.id for item in self._world(PlanningSceneComponents.WORLD_OBJECT_NAMES)
                 if item.type.key or not with_type]
 
@@ -141,22 +141,22 @@ class PlanningSceneInterface:
                 if (item.type.key or not with_type) and inside(item, region)]
 
     def get_object_poses(self, object_ids: Sequence[str]) -> dict[str, Pose]:
-        """Answers the poses of objects in the planning frame, by name; unknown names are left out."""
+        """Returns the poses of objects in the planning frame, by name; unknown names are left out."""
         return {name: item.pose for name, item in self.get_objects(list(object_ids)).items() if name in object_ids}
 
     def get_objects(self, object_ids: Sequence[str] = ()) -> dict[str, CollisionObject]:
-        """Answers the objects of the world by name; none named: all of them."""
+        """Returns the objects of the world by name; none named: all of them."""
         return {item.id: item for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
                 if item.id in object_ids or not object_ids}
 
     def get_attached_objects(self, object_ids: Sequence[str] = ()) -> dict[str, AttachedCollisionObject]:
-        """Answers the attached objects by name; none named: all of them."""
+        """Returns the attached objects by name; none named: all of them."""
         scene = self.get_planning_scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         return {item.object.id: item for item in scene.robot_state.attached_collision_objects
                 if item.object.id in object_ids or not object_ids}
 
     def get_planning_scene(self, components: int) -> PlanningScene:
-        """Answers parts of move_group's scene: bits of moveit_msgs/PlanningSceneComponents."""
+        """Returns parts of move_group's scene: bits of moveit_msgs/PlanningSceneComponents."""
         request = GetPlanningSceneRequest(PlanningSceneComponents(components))
         return self._servers.call("get_planning_scene", GetPlanningScene, request).scene
 

@@ -24,34 +24,34 @@ class Joint:
         self._name = name
 
     def name(self) -> str:
-        """Answers its name."""
+        """Returns its name."""
         return self._name
 
     def variable_count(self) -> int:
-        """Answers how many numbers describe its position."""
+        """Returns how many numbers describe its position."""
         return int(self._robot._model.joints[self._name].movable)
 
     def bounds(self) -> list[float]:
-        """Answers [lower, upper]; [] of a fixed joint."""
+        """Returns [lower, upper]; [] of a fixed joint."""
         joint = self._robot._model.joints[self._name]
         return [joint.lower, joint.upper] if joint.movable else []
 
     def min_bound(self) -> float | list[float]:
-        """Answers the lower bound; [] of a fixed joint."""
+        """Returns the lower bound; [] of a fixed joint."""
         return next(iter(self.bounds()), [])
 
     def max_bound(self) -> float | list[float]:
-        """Answers the upper bound; [] of a fixed joint."""
+        """Returns the upper bound; [] of a fixed joint."""
         return next(iter(self.bounds()[1:]), [])
 
     def value(self) -> float | list[float]:
-        """Answers where it is now; [] of a fixed joint."""
+        """Returns where it is now; [] of a fixed joint."""
         if not self.variable_count():
             return []
         return self._robot._state.positions([self._name])[self._name]
 
     def move(self, position: float, wait: bool = True) -> bool:
-        """Moves it, by the smallest group that has it; the group's other joints stay. Answers as go does.
+        """Moves it, by the smallest group that has it; the group's other joints stay. Returns as go does.
 
         Raises:
             MoveItCommanderException: no group has it, or the position is out of bounds.
@@ -73,11 +73,11 @@ class Link:
         self._name = name
 
     def name(self) -> str:
-        """Answers its name."""
+        """Returns its name."""
         return self._name
 
     def pose(self) -> PoseStamped:
-        """Answers where it is now, in the planning frame."""
+        """Returns where it is now, in the planning frame."""
         return self._robot._link_pose(self._name)
 
 
@@ -105,74 +105,74 @@ class RobotCommander:
         self._groups: dict[str, MoveGroupCommander] = {}
 
     def get_planning_frame(self) -> str:
-        """Answers the frame in which planning is done."""
+        """Returns the frame in which planning is done."""
         return self._model.planning_frame
 
     def get_robot_name(self) -> str:
-        """Answers the name in the robot's description."""
+        """Returns the name in the robot's description."""
         return self._model.name
 
     def get_root_link(self) -> str:
-        """Answers the link that has no parent."""
+        """Returns the link that has no parent."""
         return self._model.root_link
 
     def get_active_joint_names(self, group: str | None = None) -> list[str]:
-        """Answers the joints of a group, or of the robot, that move by themselves."""
+        """Returns the joints of a group, or of the robot, that move by themselves."""
         joints = self._model.joints.values() if group is None else self._model.group(group).joints
         return [joint.name for joint in joints if joint.active]
 
     def get_joint_names(self, group: str | None = None) -> list[str]:
-        """Answers all joints of a group, or of the robot, fixed and mimic ones included."""
+        """Returns all joints of a group, or of the robot, fixed and mimic ones included."""
         joints = self._model.joints.values() if group is None else self._model.group(group).joints
         return [joint.name for joint in joints]
 
     def get_link_names(self, group: str | None = None) -> list[str]:
-        """Answers the links of a group, or of the robot."""
+        """Returns the links of a group, or of the robot."""
         return list(self._model.links if group is None else self._model.group(group).links)
 
     def get_group_names(self) -> list[str]:
-        """Answers the planning groups."""
+        """Returns the planning groups."""
         return sorted(self._model.groups)
 
     def has_group(self, name: str) -> bool:
-        """Whether there is a group of that name."""
+        """Returns whether there is a group of that name."""
         return name in self._model.groups
 
     def get_current_state(self) -> RobotState:
-        """Answers the robot's present state."""
+        """Returns the robot's present state."""
         return self._state.message()
 
     def get_current_variable_values(self) -> dict[str, float]:
-        """Answers the present joint positions by name [rad or m]."""
+        """Returns the present joint positions by name [rad or m]."""
         return self._state.positions()
 
     def get_joint(self, name: str) -> Joint:
-        """Answers a joint; raises MoveItCommanderException if there is none of that name."""
+        """Returns a joint; raises MoveItCommanderException if there is none of that name."""
         if name not in self._model.joints:
             raise MoveItCommanderException(f"There is no joint named {name}; get_joint_names lists those there are")
         return Joint(self, name)
 
     def get_link(self, name: str) -> Link:
-        """Answers a link; raises MoveItCommanderException if there is none of that name."""
+        """Returns a link; raises MoveItCommanderException if there is none of that name."""
         if name not in self._model.links:
             raise MoveItCommanderException(f"There is no link named {name}; get_link_names lists those there are")
         return Link(self, name)
 
     def get_group(self, name: str) -> MoveGroupCommander:
-        """Answers the commander of a group, the same one each time."""
+        """Returns the commander of a group, the same one each time."""
         if name not in self._groups:
             self._model.group(name)
             self._groups[name] = MoveGroupCommander(name, self._robot_description, self._ns)
         return self._groups[name]
 
     def get_default_owner_group(self, joint_name: str) -> str | None:
-        """Answers the group with the fewest links of those that have a joint; None if no group has it."""
+        """Returns the group with the fewest links of those that have a joint; None if no group has it."""
         owners = [group for group in self._model.groups.values()
                   if any(joint.name == joint_name for joint in group.joints)]
         return min(owners, key=lambda group: (len(group.links), group.name)).name if owners else None
 
     def get_robot_markers(self, *args: Any) -> MarkerArray:
-        """Answers markers that show the robot.
+        """Returns markers that show the robot.
 
         Args:
             args: nothing: as it is now; a RobotState; a dict of joint positions [rad or m], and perhaps a list of

@@ -9,11 +9,12 @@ import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetPositionFK, GetPositionFKRequest
+from scipy.spatial.transform import Rotation
 from visualization_msgs.msg import Marker, MarkerArray
 
 from moveit_commander.conversions import list_to_pose
 from moveit_commander.exception import MoveItCommanderException
-from moveit_commander.object_region import placed
+from moveit_commander.object_region import transform_point
 from moveit_commander.robot_model import RobotModel
 from moveit_commander.servers import Servers
 
@@ -21,7 +22,7 @@ GREY = 0.5
 
 
 def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links: Sequence[str]) -> MarkerArray:
-    """Markers of links in a state, in the planning frame. Raises ServerError or MoveItCommanderException."""
+    """Returns markers of links in a state, in the planning frame. Raises ServerError or MoveItCommanderException."""
     visuals = {link.get("name", ""): link.findall("visual") for link in model.urdf_root.findall("link")}
     shown = [link for link in links if visuals.get(link)]
     if not shown:
@@ -46,7 +47,7 @@ def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links:
 
 
 def _marker(visual: ET.Element) -> Marker | None:
-    """The shape of a <visual>; None if it has none that markers can show."""
+    """Returns the shape of a <visual>; None if it has none that markers can show."""
     marker = Marker(action=Marker.ADD)
     marker.color.r = marker.color.g = marker.color.b = GREY
     marker.color.a = 1.0
@@ -77,8 +78,8 @@ def _origin(visual: ET.Element) -> Pose:
 
 
 def _compose(outer: Pose, inner: Pose) -> Pose:
-    """The inner pose, given in the frame of the outer one, in the frame the outer one is given in."""
-    a, b = outer.orientation, inner.orientation
-    turn = Quaternion(a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-                      a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z)
-    return Pose(Point(*placed(outer, inner.position)), turn)
+    """Returns the inner pose, given in the frame of the outer one, in the frame the outer one is given in."""
+    rotations = (Rotation.from_quat([item.orientation.x, item.orientation.y, item.orientation.z, item.orientation.w])
+                 for item in (outer, inner))
+    quaternion = (next(rotations) * next(rotations)).as_quat()
+    return Pose(Point(*transform_point(outer, inner.position)), Quaternion(*quaternion.tolist()))

@@ -53,13 +53,13 @@ class Joint:
         return 0.0 if self.lower <= 0.0 <= self.upper else (self.lower + self.upper) / 2.0
 
     def admits(self, value: float, tolerance: float = 0.0) -> bool:
-        """Whether a position keeps the bounds; a continuous joint has none."""
+        """Returns whether a position keeps the bounds; a continuous joint has none."""
         if not math.isfinite(value):
             return False
         return self.kind == "continuous" or self.lower - tolerance <= value <= self.upper + tolerance
 
     def bounded(self, value: float) -> float:
-        """The position, wrapped to (-pi, pi] or cut off at the bounds."""
+        """Returns the position, wrapped to (-pi, pi] or cut off at the bounds."""
         if self.kind == "continuous":
             return math.remainder(value, 2.0 * math.pi)
         return min(max(value, self.lower), self.upper)
@@ -137,14 +137,14 @@ class RobotModel:
         self.end_effectors = tuple(self._end_effector(item) for item in semantics.findall("end_effector"))
 
     def group(self, name: str) -> Group:
-        """Answers a group; raises RobotModelError with the names there are."""
+        """Returns a group; raises RobotModelError with the names there are."""
         if name not in self.groups:
             raise RobotModelError(f"There is no group named '{name}' in robot '{self.name}'; it has: "
                                   f"{', '.join(sorted(self.groups)) or 'none'}")
         return self.groups[name]
 
     def chain(self, base: str, tip: str) -> list[Joint]:
-        """The joints from a link down to another one of its branch."""
+        """Returns the joints from a link down to another one of its branch."""
         joints: list[Joint] = []
         link = tip
         while link != base:
@@ -156,7 +156,7 @@ class RobotModel:
         return joints[::-1]
 
     def complete(self, positions: Mapping[str, float]) -> dict[str, float]:
-        """The positions of the model's joints, in its order, mimic joints computed; unknown joints left out."""
+        """Returns the positions of the model's joints, in its order, mimic joints computed; unknown joints left out."""
         values: dict[str, float] = {}
         for joint in self.joints.values():
             if joint.leader and joint.leader in positions:
@@ -166,11 +166,11 @@ class RobotModel:
         return values
 
     def defaults(self) -> dict[str, float]:
-        """The default position of every movable joint."""
+        """Returns the default position of every movable joint."""
         return self.complete({joint.name: joint.default for joint in self.joints.values() if joint.active})
 
     def random_values(self, group: Group, generator: random.Random) -> dict[str, float]:
-        """Positions of the group's joints, drawn evenly within the bounds."""
+        """Returns positions of the group's joints, drawn evenly within the bounds."""
         drawn = {joint.name: generator.uniform(joint.lower, joint.upper) for joint in group.active_joints}
         completed = self.complete(drawn)
         return {joint.name: completed[joint.name] for joint in group.variables if joint.name in completed}
@@ -192,7 +192,7 @@ class RobotModel:
         return Group(name, joints, links, is_chain, effector, states)
 
     def _end_effector(self, element: ET.Element) -> EndEffector:
-        """An end effector; its parent group is the named one or, as in MoveIt, the one with the fewest joints."""
+        """Returns an end effector; its parent group is the named one or, as in MoveIt, the smallest."""
         name, link = element.get("group", ""), element.get("parent_link", "")
         possible = [group for group in self.groups.values() if link in group.links and group.name != name]
         named = [group for group in possible if group.name == element.get("parent_group")]
@@ -218,7 +218,7 @@ class RobotModel:
         return members
 
     def _follows(self, sooner: Joint, later: Joint) -> bool:
-        """Whether only fixed joints lie between two joints."""
+        """Returns whether only fixed joints lie between two joints."""
         link = later.parent
         while link != sooner.child and link in self._parent_joint and self._parent_joint[link].kind == "fixed":
             link = self._parent_joint[link].parent

@@ -39,7 +39,7 @@ def load_model(robot_description: str) -> RobotModel:
 
 
 def current_state(robot_description: str, ns: str) -> CurrentState:
-    """Answers the listener of a robot; the commanders of one robot share it. Raises RobotModelError."""
+    """Returns the listener of a robot; the commanders of one robot share it. Raises RobotModelError."""
     ensure_node()
     key = (str(rospy.resolve_name(robot_description)), str(rospy.resolve_name(ns_join(ns, "joint_states"))))
     with _sharing:
@@ -75,7 +75,7 @@ class CurrentState:
         self._subscriber.unregister()
 
     def positions(self, needed: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
-        """Positions that arrived after this call [rad or m], mimic joints included.
+        """Returns positions that arrived after this call [rad or m], mimic joints included.
 
         Args:
             needed: active joints that must be heard of; none: every active joint that is not passive.
@@ -96,11 +96,11 @@ class CurrentState:
             return self.model.complete(self._positions)
 
     def message(self, needed: Iterable[str] = ()) -> RobotState:
-        """The whole known state as a message, in the planning frame; `needed` as above."""
+        """Returns the whole known state as a message, in the planning frame; `needed` as above."""
         return self.message_of(self.positions(needed))
 
     def message_of(self, positions: Mapping[str, float]) -> RobotState:
-        """A message of given positions; as in MoveIt, it has no time stamp."""
+        """Returns a message of given positions; as in MoveIt, it has no time stamp."""
         state = RobotState()
         state.joint_state.header.frame_id = self.model.planning_frame
         state.joint_state.name = list(positions)

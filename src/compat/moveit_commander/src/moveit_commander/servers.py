@@ -29,7 +29,7 @@ class Servers:
         self._actions: dict[str, ActionCaller] = {}
 
     def resolve(self, name: str) -> str:
-        """The full name of an endpoint."""
+        """Returns the full name of an endpoint."""
         return str(rospy.resolve_name(ns_join(self._ns, name)))
 
     def call(self, name: str, kind: Any, request: Any, timeout_s: float = SERVICE_TIMEOUT_S) -> Any:
@@ -49,7 +49,7 @@ class Servers:
             raise ServerError(f"service {full_name} failed: {error}; move_group's log says why") from error
 
     def action(self, name: str, kind: Any, timeout_s: float = ACTION_TIMEOUT_S) -> ActionCaller:
-        """Answers the caller of an action, connected.
+        """Returns the caller of an action, connected.
 
         Raises:
             ServerError: no server within the time; 0 waits for ever, as in MoveIt.
@@ -85,7 +85,7 @@ class ActionCaller:
         self._client.send_goal(goal)
 
     def run(self, goal: Any, timeout_s: float) -> Any:
-        """Sends a goal and answers its result.
+        """Sends a goal and returns its result.
 
         Raises:
             ServerError: no result within the time (the goal is cancelled), or the server has gone.
@@ -111,6 +111,6 @@ class ActionCaller:
         return result
 
     def _ended(self) -> bool:
-        """Whether the server says that the goal has ended, while its result is not here yet."""
+        """Returns whether the server says that the goal has ended, while its result is not here yet."""
         handle = self._client.gh
         return handle is not None and handle.get_comm_state() == CommState.WAITING_FOR_RESULT

@@ -15,14 +15,14 @@ SAME_POINT = 1e-6  # [rad or m] waypoints nearer to each other than this are one
 
 
 def distinct(points: Any) -> Any:
-    """Indices of the waypoints that differ from the one before."""
+    """Returns the indices of the waypoints that differ from the one before."""
     array = np.asarray(points, dtype=float)
     moved = np.linalg.norm(np.diff(array, axis=0), axis=1) > SAME_POINT
     return np.concatenate([[0], 1 + np.flatnonzero(moved)])
 
 
 def retime(points: Any, velocity: Any, acceleration: Any) -> tuple[Any, Any, Any]:
-    """Fastest timing of a spline through the waypoints, at rest at both ends, by reachability analysis (TOPP-RA).
+    """Returns the fastest timing of a spline through the waypoints (TOPP-RA), at rest at both ends.
 
     Args:
         points: waypoints, shape (n >= 2, joints) [rad or m], each different from the one before.
