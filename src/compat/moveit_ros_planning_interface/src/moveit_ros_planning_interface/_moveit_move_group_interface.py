@@ -76,7 +76,7 @@ class MoveGroupInterface:
         return accepted(self._commander.set_end_effector_link, link_name)
 
     def start_state_monitor(self, wait: float = 1.0) -> bool:
-        """Whether every joint's state is received within `wait` [s]."""
+        """Returns whether every joint's state is received within `wait` [s]."""
         return accepted(self._commander._state.positions, (), wait)
 
     def get_current_state(self) -> bytes:

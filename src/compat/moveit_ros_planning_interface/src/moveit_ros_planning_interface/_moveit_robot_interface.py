@@ -50,7 +50,7 @@ class RobotInterface:
         return self._robot.get_link_names()
 
     def has_group(self, group: str) -> bool:
-        """Whether there is a planning group of that name."""
+        """Returns whether there is a planning group of that name."""
         return self._robot.has_group(group)
 
     def get_group_names(self) -> list[str]:

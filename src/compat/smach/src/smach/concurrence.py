@@ -37,7 +37,7 @@ class Concurrence(Container):
         outcome_cb: OutcomeCallback | None = None,
         child_termination_cb: ChildTerminationCallback | None = None,
     ) -> None:
-        """Make an empty concurrence; states are added inside ``with concurrence:``.
+        """Makes an empty concurrence; states are added inside ``with concurrence:``.
 
         Args:
             outcomes: names of the outcomes.
@@ -59,14 +59,13 @@ class Concurrence(Container):
         self._child_outcomes: dict[str, str | None] = {}
         self._active: list[str] = []
         self._errors: list[SmachError] = []
-        self._running = False
         self._lock = threading.RLock()
         self._ended = threading.Condition(self._lock)
 
     # ---- construction --------------------------------------------------------------------------------------
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a state to the concurrence that is open.
+        """Adds a state to the concurrence that is open.
 
         Args:
             label: its name in this concurrence.
@@ -89,7 +88,7 @@ class Concurrence(Container):
         return state
 
     def check_consistency(self) -> None:
-        """Raise when there is no state, or when the outcome map names outcomes or states that are not there."""
+        """Raises when there is no state, or when the outcome map names outcomes or states that are not there."""
         if not self._states:
             raise InvalidStateError("the concurrence has no states")
         faults = []
@@ -109,15 +108,15 @@ class Concurrence(Container):
 
     # ---- looking in ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Return the states by label, in the order they were added."""
+        """Returns the states by label, in the order they were added."""
         return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
-        """Return the labels of all states: they all start together."""
+        """Returns the labels of all states: they all start together."""
         return list(self._states)
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Put values in the local userdata; the choice of states is fixed, since all of them run.
+        """Puts values in the local userdata; the choice of states is fixed, since all of them run.
 
         Args:
             initial_states: ignored with a warning unless it names all states or none.
@@ -129,25 +128,21 @@ class Concurrence(Container):
             log.warn(f"a concurrence starts all its states; the choice {list(initial_states)} is ignored")
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the states that are still running."""
+        """Returns the labels of the states that are still running."""
         with self._lock:
             return list(self._active)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the entries of the outcome map as (outcome of the child, label, outcome of the concurrence)."""
+        """Returns the entries of the outcome map as (outcome of the child, label, outcome of the concurrence)."""
         return [
             (child_outcome, label, outcome)
             for outcome, children in self._outcome_map.items()
             for label, child_outcome in children.items()
         ]
 
-    def is_running(self) -> bool:
-        """Tell whether the concurrence is executing."""
-        return self._running
-
     # ---- running -------------------------------------------------------------------------------------------
     def execute(self, parent_ud: Any = None) -> str:
-        """Run all states and return the outcome once the last of them has ended.
+        """Runs all states and returns the outcome once the last of them has ended.
 
         Args:
             parent_ud: userdata the input keys are copied from and the output keys are copied to.
@@ -215,7 +210,7 @@ class Concurrence(Container):
                 self._ended.notify_all()
 
     def _wait_for_children(self) -> None:
-        """Wait until all children have ended; after each end, decide whether others are to be stopped."""
+        """Waits until all children have ended; after each end, decides whether others are to be stopped."""
         known_active = list(self._states)
         while known_active:
             with self._ended:
@@ -248,7 +243,7 @@ class Concurrence(Container):
             self._preempt_active()
 
     def _preempt_active(self, labels: Iterable[str] | None = None) -> None:
-        """Ask running children to stop: all of them, or those named."""
+        """Asks running children to stop: all of them, or those named."""
         with self._lock:
             wanted = set(self._active if labels is None else labels)
             for label in self._active:
@@ -256,7 +251,7 @@ class Concurrence(Container):
                     self._states[label].request_preempt()
 
     def _decide(self, outcomes: dict[str, str | None]) -> str:
-        """Return the outcome of the concurrence, given those of its children."""
+        """Returns the outcome of the concurrence, given those of its children."""
         if is_shutdown() and not all(
             outcome in self._states[label].get_registered_outcomes() for label, outcome in outcomes.items()
         ):
@@ -285,7 +280,7 @@ class Concurrence(Container):
         return chosen
 
     def _settle_preempt(self) -> None:
-        """Acknowledge the request to stop when every child has acknowledged it; withdraw those left over."""
+        """Acknowledges the request to stop when every child has acknowledged it; withdraws those left over."""
         leftovers = self._recall_leftovers()
         if self._preempt_requested and not leftovers:
             self.service_preempt()
@@ -298,7 +293,7 @@ class Concurrence(Container):
         return leftovers
 
     def request_preempt(self) -> None:
-        """Ask all running children to stop; the concurrence still waits until they have."""
+        """Asks all running children to stop; the concurrence still waits until they have."""
         with self._lock:
             super().request_preempt()
             if self._running:

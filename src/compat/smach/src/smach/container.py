@@ -33,55 +33,56 @@ class Container(State):
     def __init__(
         self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()
     ) -> None:
-        """Declare the interface of the container, as of any state."""
+        """Declares the interface of the container, as of any state."""
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
+        self._running = False
         self._start_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
         self._transition_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
         self._termination_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
 
     # ---- what each kind of container defines ---------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Return the states in this container, by label."""
+        """Returns the states in this container, by label."""
         return {}
 
     def __getitem__(self, key: str) -> State:
         return self.get_children()[key]
 
     def get_initial_states(self) -> list[str]:
-        """Return the labels of the states that run first."""
+        """Returns the labels of the states that run first."""
         return []
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Choose the states that run first, and values to put in the local userdata before."""
+        """Chooses the states that run first, and values to put in the local userdata before."""
         raise self._unsupported("set_initial_state")
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the states that are running."""
+        """Returns the labels of the states that are running."""
         return []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions inside the container as (outcome, from label, to label or container outcome)."""
+        """Returns the transitions inside the container as (outcome, from label, to label or container outcome)."""
         return []
 
     def check_consistency(self) -> None:
-        """Raise when the container cannot run as it was built."""
+        """Raises when the container cannot run as it was built."""
         raise self._unsupported("check_consistency")
 
     def is_running(self) -> bool:
-        """Tell whether the container is executing."""
-        return False
+        """Returns whether the container is executing."""
+        return self._running
 
     def _unsupported(self, method: str) -> InvalidConstructionError:
         return InvalidConstructionError(f"{type(self).__name__} does not define {method}")
 
     # ---- construction --------------------------------------------------------------------------------------
     def open(self) -> None:
-        """Make this the container that ``add`` calls of this thread refer to."""
+        """Makes this the container that ``add`` calls of this thread refer to."""
         self._construction.stack.append(self)
 
     def close(self) -> None:
-        """End building this container.
+        """Ends building this container.
 
         Raises:
             smach.InvalidStateError: when another container was opened later and is still open, or none is open.
@@ -92,17 +93,17 @@ class Container(State):
         stack.pop()
 
     def is_opened(self) -> bool:
-        """Tell whether this container is being built by this thread."""
+        """Returns whether this container is being built by this thread."""
         return self in self._construction.stack
 
     def assert_opened(self, msg: str = "the container is not open; use 'with container:'") -> None:
-        """Raise ``InvalidConstructionError`` with a message unless the container is open."""
+        """Raises ``InvalidConstructionError`` with a message unless the container is open."""
         if not self.is_opened():
             raise InvalidConstructionError(msg)
 
     @contextmanager
     def opened(self) -> Iterator[Container]:
-        """Open the container for the duration of a ``with`` block; the same as ``with container:``."""
+        """Opens the container for the duration of a ``with`` block; the same as ``with container:``."""
         with self as container:
             yield container
 
@@ -122,7 +123,7 @@ class Container(State):
 
     @classmethod
     def _currently_opened_container(cls) -> Any:
-        """Return the container being built; raise ``InvalidConstructionError`` when there is none of this kind."""
+        """Returns the container being built; raises ``InvalidConstructionError`` when there is none of this kind."""
         stack = cls._construction.stack
         if not stack:
             raise InvalidConstructionError(
@@ -150,7 +151,7 @@ class Container(State):
                 parent_ud[key] = self.userdata[key]
 
     def _execute_child(self, label: str, state: State, remapping: Mapping[str, str]) -> str:
-        """Run a child with its own view of the userdata; raise ``InvalidUserCodeError`` for whatever it raises."""
+        """Runs a child with its own view of the userdata; raises ``InvalidUserCodeError`` for whatever it raises."""
         view = Remapper(
             self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping
         )
@@ -167,27 +168,27 @@ class Container(State):
 
     # ---- callbacks -----------------------------------------------------------------------------------------
     def register_start_cb(self, start_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
-        """Call ``start_cb(userdata, initial_labels, *cb_args)`` when the container starts."""
+        """Calls ``start_cb(userdata, initial_labels, *cb_args)`` when the container starts."""
         self._start_cbs.append((start_cb, tuple(cb_args)))
 
     def register_transition_cb(self, transition_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
-        """Call ``transition_cb(userdata, active_labels, *cb_args)`` when the running states have changed."""
+        """Calls ``transition_cb(userdata, active_labels, *cb_args)`` when the running states have changed."""
         self._transition_cbs.append((transition_cb, tuple(cb_args)))
 
     def register_termination_cb(self, termination_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
-        """Call ``termination_cb(userdata, last_labels, outcome, *cb_args)`` when the container ends."""
+        """Calls ``termination_cb(userdata, last_labels, outcome, *cb_args)`` when the container ends."""
         self._termination_cbs.append((termination_cb, tuple(cb_args)))
 
     def call_start_cbs(self) -> None:
-        """Call the start callbacks; an error in one of them is logged and changes nothing."""
+        """Calls the start callbacks; an error in one of them is logged and changes nothing."""
         self._call(self._start_cbs, "start", self.get_initial_states())
 
     def call_transition_cbs(self) -> None:
-        """Call the transition callbacks; an error in one of them is logged and changes nothing."""
+        """Calls the transition callbacks; an error in one of them is logged and changes nothing."""
         self._call(self._transition_cbs, "transition", self.get_active_states())
 
     def call_termination_cbs(self, terminal_states: list[str], outcome: str | None) -> None:
-        """Call the termination callbacks; an error in one of them is logged and changes nothing."""
+        """Calls the termination callbacks; an error in one of them is logged and changes nothing."""
         self._call(self._termination_cbs, "termination", terminal_states, outcome)
 
     def _call(self, callbacks: list[tuple[Callback, tuple[Any, ...]]], kind: str, *args: Any) -> None:

@@ -28,7 +28,7 @@ class Iterator(Container):
         it_label: str = "it_data",
         exhausted_outcome: str = "exhausted",
     ) -> None:
-        """Make an iterator; its state is set inside ``with iterator:``.
+        """Makes an iterator; its state is set inside ``with iterator:``.
 
         Args:
             outcomes: names of the outcomes; ``exhausted_outcome`` is added when it is missing.
@@ -47,7 +47,6 @@ class Iterator(Container):
         self._loop_outcomes: list[str] = []
         self._break_outcomes: list[str] = []
         self._final_outcome_map: dict[str, str] = {}
-        self._running = False
         self._active = False
         self._lock = threading.RLock()
 
@@ -59,7 +58,7 @@ class Iterator(Container):
         break_outcomes: Iterable[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
     ) -> None:
-        """Set the state that is run for each item.
+        """Sets the state that is run for each item.
 
         Args:
             label: its name.
@@ -78,12 +77,12 @@ class Iterator(Container):
         iterator._final_outcome_map = dict(final_outcome_map or {})
 
     def set_iteritems(self, it: Iterable[Any] | Callable[[], Iterable[Any]], it_label: str) -> None:
-        """Replace the items and the key under which the state finds the current one."""
+        """Replaces the items and the key under which the state finds the current one."""
         self._items = it
         self._items_label = it_label
 
     def check_consistency(self) -> None:
-        """Raise when there is no state, or when an outcome that ends the iteration is none of the iterator's."""
+        """Raises when there is no state, or when an outcome that ends the iteration is none of the iterator's."""
         if not isinstance(self._state, State):
             raise InvalidStateError("the iterator has no contained state; call Iterator.set_contained_state")
         registered = self._state.get_registered_outcomes()
@@ -113,26 +112,26 @@ class Iterator(Container):
 
     # ---- looking in ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Return the contained state by its label."""
+        """Returns the contained state by its label."""
         return {} if self._state is None else {self._state_label: self._state}
 
     def get_initial_states(self) -> list[str]:
-        """Return the label of the contained state, in a list."""
+        """Returns the label of the contained state, in a list."""
         return list(self.get_children())
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Put values in the local userdata; there is only one state to start with."""
+        """Puts values in the local userdata; there is only one state to start with."""
         if initial_states and list(initial_states) != self.get_initial_states():
             log.warn(f"an iterator starts with its contained state; {list(initial_states)} is ignored")
         if userdata is not None:
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the contained state while it runs."""
+        """Returns the label of the contained state while it runs."""
         return [self._state_label] if self._active else []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return (outcome, label, label or outcome of the iterator) for each outcome of the contained state."""
+        """Returns (outcome, label, label or outcome of the iterator) for each outcome of the contained state."""
         if self._state is None:
             return []
         edges: list[tuple[str, str, str | None]] = []
@@ -144,13 +143,9 @@ class Iterator(Container):
                 edges.append((outcome, self._state_label, self._exhausted_outcome))
         return edges
 
-    def is_running(self) -> bool:
-        """Tell whether the iterator is executing."""
-        return self._running
-
     # ---- running -------------------------------------------------------------------------------------------
     def execute(self, parent_ud: Any = None) -> str:
-        """Run the contained state for each item.
+        """Runs the contained state for each item.
 
         Args:
             parent_ud: userdata the input keys are copied from and the output keys are copied to.
@@ -210,7 +205,7 @@ class Iterator(Container):
         return outcome
 
     def request_preempt(self) -> None:
-        """Ask the iterator to stop: the request goes to the contained state when it runs."""
+        """Asks the iterator to stop: the request goes to the contained state when it runs."""
         with self._lock:
             super().request_preempt()
             if self._active and self._state is not None:

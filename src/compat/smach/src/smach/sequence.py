@@ -21,7 +21,7 @@ class Sequence(StateMachine):
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
     ) -> None:
-        """Make an empty sequence.
+        """Makes an empty sequence.
 
         Args:
             outcomes: names of the outcomes.
@@ -39,7 +39,7 @@ class Sequence(StateMachine):
         transitions: Mapping[str, str] | None = None,
         remapping: Mapping[str, str] | None = None,
     ) -> State:
-        """Add a state to the sequence that is open.
+        """Adds a state to the sequence that is open.
 
         Args:
             label: its name in this sequence.

@@ -21,7 +21,7 @@ class State:
         output_keys: Iterable[str] = (),
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Declare the interface of the state.
+        """Declares the interface of the state.
 
         Args:
             outcomes: names of what ``execute`` may return.
@@ -36,7 +36,7 @@ class State:
         self.register_io_keys(io_keys)
 
     def execute(self, userdata: Any) -> str:
-        """Do the work of the state and return one of its outcomes. Subclasses override this.
+        """Does the work of the state and returns one of its outcomes. Subclasses override this.
 
         Args:
             userdata: the view this state has of its container's userdata.
@@ -48,50 +48,50 @@ class State:
 
     # ---- interface -----------------------------------------------------------------------------------------
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
-        """Add outcomes to those the state may return."""
+        """Adds outcomes to those the state may return."""
         self._outcomes.update(dict.fromkeys(new_outcomes))
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
-        """Return the outcomes, in the order of declaration."""
+        """Returns the outcomes, in the order of declaration."""
         return tuple(self._outcomes)
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
-        """Add userdata keys that are read and written."""
+        """Adds userdata keys that are read and written."""
         both = dict.fromkeys(keys)
         self._input_keys.update(both)
         self._output_keys.update(both)
 
     def register_input_keys(self, keys: Iterable[str]) -> None:
-        """Add userdata keys that are read."""
+        """Adds userdata keys that are read."""
         self._input_keys.update(dict.fromkeys(keys))
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """Return the userdata keys that are read."""
+        """Returns the userdata keys that are read."""
         return tuple(self._input_keys)
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
-        """Add userdata keys that are written."""
+        """Adds userdata keys that are written."""
         self._output_keys.update(dict.fromkeys(keys))
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """Return the userdata keys that are written."""
+        """Returns the userdata keys that are written."""
         return tuple(self._output_keys)
 
     # ---- stopping ------------------------------------------------------------------------------------------
     def request_preempt(self) -> None:
-        """Ask the state to stop; it does so where its ``execute`` looks at ``preempt_requested``."""
+        """Asks the state to stop; it does so where its ``execute`` checks ``preempt_requested``."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Acknowledge the request: called by the state that stops because of it."""
+        """Acknowledges the request: called by the state that stops because of it."""
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
-        """Withdraw the request: called by whoever asked."""
+        """Withdraws the request: called by whoever asked."""
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Tell whether the state was asked to stop and has not acknowledged it yet."""
+        """Returns whether the state was asked to stop and has not acknowledged it yet."""
         return self._preempt_requested
 
 
@@ -108,7 +108,7 @@ class CBState(State):
         output_keys: Iterable[str] = (),
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Make a state of a function; an interface declared with ``cb_interface`` is taken over.
+        """Makes a state of a function; an interface declared with ``cb_interface`` is taken over.
 
         Args:
             cb: the function.
@@ -130,5 +130,5 @@ class CBState(State):
             self.register_output_keys(declared.get_registered_output_keys())
 
     def execute(self, userdata: Any) -> str:
-        """Call the function and return what it returned."""
+        """Calls the function and returns what it returned."""
         return self._cb(userdata, *self._cb_args, **self._cb_kwargs)

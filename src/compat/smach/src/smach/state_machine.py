@@ -23,7 +23,7 @@ class StateMachine(Container):
     def __init__(
         self, outcomes: Iterable[str], input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()
     ) -> None:
-        """Make an empty machine; states are added inside ``with machine:``."""
+        """Makes an empty machine; states are added inside ``with machine:``."""
         super().__init__(outcomes, input_keys, output_keys)
         self._states: dict[str, State] = {}
         self._transitions: dict[str, dict[str, str | None]] = {}
@@ -33,7 +33,6 @@ class StateMachine(Container):
         self._preempted_label: str | None = None
         self._connector_outcomes: list[str] = []
         self._connector_label: str | None = None
-        self._running = False
         self._lock = threading.RLock()
 
     # ---- construction --------------------------------------------------------------------------------------
@@ -44,7 +43,7 @@ class StateMachine(Container):
         transitions: Mapping[str, str] | None = None,
         remapping: Mapping[str, str] | None = None,
     ) -> State:
-        """Add a state to the machine that is open.
+        """Adds a state to the machine that is open.
 
         Args:
             label: its name in this machine.
@@ -78,7 +77,7 @@ class StateMachine(Container):
         transitions: Mapping[str, str] | None = None,
         remapping: Mapping[str, str] | None = None,
     ) -> State:
-        """Add a state, some of whose outcomes lead to the state that is added next.
+        """Adds a state, some of whose outcomes lead to the state that is added next.
 
         Args:
             label: its name in this machine.
@@ -106,7 +105,7 @@ class StateMachine(Container):
         self._connector_label, self._connector_outcomes = None, []
 
     def check_state_spec(self, label: str, state: State, transitions: Mapping[str, str]) -> None:
-        """Raise when a state cannot be added under a label with these transitions."""
+        """Raises when a state cannot be added under a label with these transitions."""
         if label in self._states:
             raise InvalidStateError(f"the machine already has a state with the label '{label}'")
         if label in self._outcomes:
@@ -123,7 +122,7 @@ class StateMachine(Container):
             )
 
     def check_consistency(self) -> None:
-        """Raise when the machine has no state or a transition leads nowhere, naming every such transition."""
+        """Raises when the machine has no state or a transition leads nowhere, naming every such transition."""
         if not self._states:
             raise InvalidStateError("the state machine has no states")
         if self._initial_label is not None and self._initial_label not in self._states:
@@ -144,17 +143,17 @@ class StateMachine(Container):
 
     # ---- looking in ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Return the states by label, in the order they were added."""
+        """Returns the states by label, in the order they were added."""
         return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
-        """Return the label of the first state, in a list."""
+        """Returns the label of the first state, in a list."""
         if self._initial_label is not None:
             return [self._initial_label]
         return list(self._states)[:1]
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Choose the state that runs first.
+        """Chooses the state that runs first.
 
         Args:
             initial_states: exactly one label.
@@ -171,25 +170,21 @@ class StateMachine(Container):
             self._initial_label = initial_states[0]
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the running state, in a list; empty when the machine is not running."""
+        """Returns the label of the running state, in a list; empty when the machine is not running."""
         label = self._current_label
         return [] if label is None else [label]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions as (outcome, from label, to label or outcome of the machine)."""
+        """Returns the transitions as (outcome, from label, to label or outcome of the machine)."""
         return [
             (outcome, label, outcome if target is None else target)
             for label, transitions in self._transitions.items()
             for outcome, target in transitions.items()
         ]
 
-    def is_running(self) -> bool:
-        """Tell whether the machine is executing."""
-        return self._running
-
     # ---- running -------------------------------------------------------------------------------------------
     def execute(self, parent_ud: Any = None) -> str:
-        """Run until an outcome of the machine is reached.
+        """Runs until an outcome of the machine is reached.
 
         Args:
             parent_ud: userdata the machine's input keys are copied from and its output keys are copied to.
@@ -239,7 +234,7 @@ class StateMachine(Container):
             self.call_transition_cbs()
 
     def _enter(self, label: str) -> None:
-        """Make a state the current one; a machine that was asked to stop passes the request on to it."""
+        """Makes a state the current one; a machine that was asked to stop passes the request on to it."""
         with self._lock:
             self._current_label = label
             if self._preempt_requested:
@@ -247,7 +242,7 @@ class StateMachine(Container):
                 self._states[label].request_preempt()
 
     def _settle_preempt(self, label: str, state: State) -> None:
-        """Acknowledge the machine's own request once the state it was passed to has acknowledged it."""
+        """Acknowledges the machine's own request once the state it was passed to has acknowledged it."""
         with self._lock:
             if self._preempted_label != label:
                 return
@@ -277,7 +272,7 @@ class StateMachine(Container):
         return "preempted"
 
     def request_preempt(self) -> None:
-        """Ask the machine to stop: the request goes to the running state, and to those entered later."""
+        """Asks the machine to stop: the request goes to the running state, and to those entered later."""
         with self._lock:
             super().request_preempt()
             if self._running and self._current_label is not None and self._preempted_label is None:

@@ -21,12 +21,12 @@ class UserData:
         object.__setattr__(self, "_lock", threading.RLock())
 
     def update(self, ud: UserData) -> None:
-        """Take over every value of another userdata, overwriting those with the same name."""
+        """Takes over every value of another userdata, overwriting those with the same name."""
         with self._lock:
             self._data.update(ud._data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return shallow copies of some values under other names.
+        """Returns shallow copies of some values under other names.
 
         Args:
             keys: names in this userdata.
@@ -41,7 +41,7 @@ class UserData:
         return result
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Take shallow copies of some values of another userdata.
+        """Takes shallow copies of some values of another userdata.
 
         Args:
             ud: where the values come from.
@@ -52,7 +52,7 @@ class UserData:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 
     def keys(self) -> KeysView[str]:
-        """Return the names of all values."""
+        """Returns the names of all values."""
         with self._lock:
             return dict(self._data).keys()
 
@@ -83,7 +83,7 @@ class UserData:
 
 
 def get_const(obj: Any) -> Any:
-    """Return a read-only proxy of an ordinary Python object; values without attributes of their own as they are.
+    """Returns a read-only proxy of an ordinary Python object; values without attributes of their own as they are.
 
     Numbers, strings, containers and messages (whose classes use slots) have no instance dictionary and are
     handed over unchanged.
@@ -145,10 +145,10 @@ class Remapper:
         output_keys: Iterable[str] = (),
         remapping: Mapping[str, str] | None = None,
     ) -> None:
-        """Look at ``ud`` through the interface of a state.
+        """Wraps userdata in the interface of a state.
 
         Args:
-            ud: the userdata looked at.
+            ud: the userdata of the container.
             input_keys: names that may be read.
             output_keys: names that may be written (a key that is input and output is handed over writable).
             remapping: the state's name -> name in ``ud``; names not mentioned are the same in both.
@@ -179,7 +179,7 @@ class Remapper:
         self._ud[self._remap(key)] = value
 
     def keys(self) -> list[str]:
-        """Return the declared keys (under the state's names) that have a value."""
+        """Returns the declared keys (under the state's names) that have a value."""
         declared = dict.fromkeys([*self._input_keys, *self._output_keys])
         return [key for key in declared if self._remap(key) in self._ud]
 

@@ -9,7 +9,7 @@ __all__ = ["CBInterface", "cb_interface", "has_smach_interface", "is_shutdown", 
 
 
 class _ShutdownCheck:
-    """Holds the function that tells whether the process is going down."""
+    """Holds the function that says whether the process is going down."""
 
     def __init__(self) -> None:
         self.ask: Callable[[], bool] = lambda: False
@@ -19,17 +19,17 @@ _SHUTDOWN = _ShutdownCheck()
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
-    """Install the function containers ask between two states: True = stop and return ``preempted``."""
+    """Installs the function that containers call between two states: True = stop, with the outcome ``preempted``."""
     _SHUTDOWN.ask = cb
 
 
 def is_shutdown() -> bool:
-    """Tell whether the process is going down, as far as the installed check knows (by default: never)."""
+    """Returns whether the process is going down, as far as the installed check knows (by default: never)."""
     return _SHUTDOWN.ask()
 
 
 def has_smach_interface(obj: object) -> bool:
-    """Tell whether an object declares outcomes, input keys and output keys the way states do."""
+    """Returns whether an object declares outcomes, input keys and output keys the way states do."""
     names = ("get_registered_input_keys", "get_registered_output_keys", "get_registered_outcomes")
     return all(hasattr(obj, name) for name in names)
 
@@ -45,7 +45,7 @@ class CBInterface:
         output_keys: Iterable[str] = (),
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Wrap ``cb``; keys in ``io_keys`` count as input and as output."""
+        """Wraps ``cb``; keys in ``io_keys`` count as input and as output."""
         both = list(io_keys)
         self._cb = cb
         self._outcomes = tuple(outcomes)
@@ -53,19 +53,19 @@ class CBInterface:
         self._output_keys = tuple(dict.fromkeys([*output_keys, *both]))
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Call the wrapped function."""
+        """Calls the wrapped function."""
         return self._cb(*args, **kwargs)
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
-        """Return the declared outcomes."""
+        """Returns the declared outcomes."""
         return self._outcomes
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """Return the userdata keys the function reads."""
+        """Returns the userdata keys the function reads."""
         return self._input_keys
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """Return the userdata keys the function writes."""
+        """Returns the userdata keys the function writes."""
         return self._output_keys
 
 
@@ -79,9 +79,9 @@ class cb_interface:  # noqa: N801 - public name
         output_keys: Iterable[str] = (),
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Store the interface that the decorated function will carry."""
+        """Stores the interface that the decorated function will carry."""
         self._interface = (tuple(outcomes), tuple(input_keys), tuple(output_keys), tuple(io_keys))
 
     def __call__(self, cb: Callable[..., Any]) -> CBInterface:
-        """Return the function with its interface attached."""
+        """Returns the function with its interface attached."""
         return CBInterface(cb, *self._interface)

@@ -43,7 +43,7 @@ class ActionServerWrapper:
         expand_goal_slots: bool = False,
         pack_result_slots: bool = False,
     ) -> None:
-        """Make the server; ``run_server`` starts it.
+        """Makes the server; ``run_server`` starts it.
 
         Args:
             server_name: name of the action.
@@ -89,7 +89,7 @@ class ActionServerWrapper:
         )
 
     def _new_goal_data(self, goal: Any) -> None:
-        """Put a goal in the userdata, with an empty feedback and result; None: an empty goal."""
+        """Puts a goal in the userdata, with an empty feedback and result; None: an empty goal."""
         try:
             action = self._action_spec()
             empty = action.action_goal.goal, action.action_feedback.feedback, action.action_result.result
@@ -127,22 +127,22 @@ class ActionServerWrapper:
             smach.logwarn(f"'{self._server_name}' lists outcomes {unknown} the container does not have: {list(known)}")
 
     def run_server(self) -> None:
-        """Start the server; does not block."""
+        """Starts the server; does not block."""
         self._action_server.register_preempt_callback(self.preempt_cb)
         self._action_server.start()
         smach.loginfo(f"state machine is offered as action '{rospy.resolve_name(self._server_name)}'")
 
     # ---- callbacks of the container ------------------------------------------------------------------------
     def transition_cb(self, userdata: Any, active_states: list[str]) -> None:
-        """Publish the feedback after a transition."""
+        """Publishes the feedback after a transition."""
         self.publish_feedback(userdata)
 
     def termination_cb(self, userdata: Any, terminal_states: list[str], container_outcome: str | None) -> None:
-        """Note the end of the container."""
+        """Notes the end of the container."""
         smach.logdebug(f"'{self._server_name}': container ended in {terminal_states} with '{container_outcome}'")
 
     def publish_feedback(self, userdata: Any) -> None:
-        """Publish the feedback of the container's userdata, if there is any, with the fields that are mapped."""
+        """Publishes the feedback of the container's userdata, if there is any, with the fields that are mapped."""
         if self._feedback_key not in userdata and not self._feedback_slots_map:
             return
         source = userdata if self._feedback_key in userdata else self.userdata
@@ -159,7 +159,7 @@ class ActionServerWrapper:
         self.wrapped_container.request_preempt()
 
     def execute_cb(self, goal: Any) -> None:
-        """Run the container for a goal, and end the goal as its outcome says."""
+        """Runs the container for a goal, and ends the goal as its outcome says."""
         begun_s = time.monotonic()
         container = self.wrapped_container
         self._new_goal_data(goal)

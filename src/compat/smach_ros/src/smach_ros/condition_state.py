@@ -26,7 +26,7 @@ class ConditionState(smach.State):
         timeout: rospy.Duration | None = None,
         max_checks: int = 1,
     ) -> None:
-        """Make the state.
+        """Makes the state.
 
         Args:
             cond_cb: gets the userdata; one made by ``smach.cb_interface`` brings its keys along.
@@ -57,7 +57,7 @@ class ConditionState(smach.State):
         self._wake = threading.Event()
 
     def execute(self, userdata: Any) -> str:
-        """Ask until the function says yes, or no further check is allowed.
+        """Asks until the function says yes, or no further check is allowed.
 
         Raises:
             smach.InvalidUserCodeError: the function raised.
@@ -86,6 +86,6 @@ class ConditionState(smach.State):
             ) from error
 
     def request_preempt(self) -> None:
-        """Ask the state to stop."""
+        """Asks the state to stop."""
         super().request_preempt()
         self._wake.set()

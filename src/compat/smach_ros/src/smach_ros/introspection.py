@@ -33,15 +33,15 @@ def _values(userdata: smach.UserData) -> dict[str, Any]:
 
 
 class ContainerProxy:
-    """What the server tells of one container."""
+    """What the server publishes of one container."""
 
     def __init__(self, container: smach.Container, path: str) -> None:
-        """Keep a container and its path from the root."""
+        """Keeps a container and its path from the root."""
         self.container = container
         self.path = path
 
     def structure(self) -> SmachContainerStructure:
-        """Return the message that tells the states and transitions."""
+        """Returns the message with the states and transitions."""
         edges = self.container.get_internal_edges()
         return SmachContainerStructure(
             header=Header(stamp=rospy.Time.now()),
@@ -54,7 +54,7 @@ class ContainerProxy:
         )
 
     def status(self, info: str) -> SmachContainerStatus:
-        """Return the message that tells the active states and the userdata."""
+        """Returns the message with the active states and the userdata."""
         return SmachContainerStatus(
             header=Header(stamp=rospy.Time.now()),
             path=self.path,
@@ -65,7 +65,7 @@ class ContainerProxy:
         )
 
     def set_initial_state(self, command: SmachContainerInitialStatusCmd) -> None:
-        """Do what a viewer commands.
+        """Does what a viewer commands.
 
         Raises:
             smach.SmachError: the container has no such states.
@@ -96,14 +96,14 @@ class _NewSubscriber(rospy.SubscribeListener):
 class IntrospectionServer:
     """Publishes structure and status of a container and of all containers in it.
 
-    Nothing is made up or sent while nobody listens; a new listener is told everything at once, then whenever a
+    Nothing is made up or sent while nobody listens; a new listener gets everything at once, then whenever a
     container starts, ends or makes a transition, and every two seconds.
     Publishers: ``<server_name>/smach/container_structure``, ``<server_name>/smach/container_status``.
     Subscriber: ``<server_name>/smach/container_init``.
     """
 
     def __init__(self, server_name: str, state: smach.Container, path: str, *, accept_commands: bool = True) -> None:
-        """Make the server; ``start`` starts it.
+        """Makes the server; ``start`` starts it.
 
         Args:
             server_name: start of the topics' names.
@@ -130,7 +130,7 @@ class IntrospectionServer:
         self._topics: list[Any] = []
 
     def start(self) -> None:
-        """Advertise the topics and begin to publish. A server that was stopped can be started again."""
+        """Advertises the topics and begins to publish. A server that was stopped can be started again."""
         with self._lock:
             if self._running:
                 return
@@ -157,7 +157,7 @@ class IntrospectionServer:
             self._topics.append(rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_command))
 
     def stop(self) -> None:
-        """Withdraw the topics. May be called twice."""
+        """Withdraws the topics. May be called twice."""
         with self._lock:
             self._running = False
             topics, self._topics = self._topics, []
@@ -166,7 +166,7 @@ class IntrospectionServer:
             topic.unregister()
 
     def construct(self, server_name: str, state: smach.Container, path: str) -> None:
-        """Take up a container and all containers in it; server_name is that of this server."""
+        """Takes up a container and all containers in it; server_name is that of this server."""
         proxy = ContainerProxy(state, path)
         self._proxies.append(proxy)
 
@@ -181,7 +181,7 @@ class IntrospectionServer:
                 self.construct(server_name, child, f"{path.rstrip('/')}/{label}")
 
     def clear(self) -> None:
-        """Forget all containers."""
+        """Forgets all containers."""
         self._proxies = []
 
     def _publish_loop(self, run_number: int) -> None:
@@ -202,7 +202,7 @@ class IntrospectionServer:
             self._send(self._status_pub, lambda: proxy.status(info))
 
     def _send(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
-        """Make a message and publish it when somebody listens: watching a machine must not disturb it."""
+        """Makes a message and publishes it when somebody listens: watching a machine must not disturb it."""
         try:
             if publisher.get_num_connections() > 0:
                 publisher.publish(make())
@@ -227,11 +227,11 @@ class IntrospectionClient:
     """Finds introspection servers and commands them."""
 
     def __init__(self) -> None:
-        """Make a client; it connects when it is used."""
+        """Makes a client; it connects when it is used."""
         self._publishers: dict[str, rospy.Publisher] = {}
 
     def get_servers(self) -> list[str]:
-        """Return the names of the servers that publish now."""
+        """Returns the names of the servers that publish now."""
         return [
             topic[: -len(STATUS_TOPIC)]
             for topic, kind in rospy.get_published_topics()
@@ -246,7 +246,7 @@ class IntrospectionClient:
         initial_userdata: smach.UserData | None = None,
         timeout: rospy.Duration | None = None,
     ) -> bool | None:
-        """Choose the states a container starts in.
+        """Chooses the states a container starts in.
 
         Args:
             server: name of the server.
@@ -274,15 +274,15 @@ class IntrospectionClient:
         if timeout_s is None:
             publisher.publish(command)
             return None
-        return _send_until_taken(publisher, server, command, values, timeout_s)
+        return _send_until_shown(publisher, server, command, values, timeout_s)
 
 
-def _send_until_taken(publisher: rospy.Publisher, server: str, command: SmachContainerInitialStatusCmd,
+def _send_until_shown(publisher: rospy.Publisher, server: str, command: SmachContainerInitialStatusCmd,
                       values: dict[str, Any], timeout_s: float) -> bool:
-    """Send a command again and again until a status shows its effect; return whether one did in time."""
-    taken = threading.Event()
+    """Sends a command again and again until a status shows its effect; returns whether one did in time."""
+    shown_by_server = threading.Event()
 
-    def look(status: SmachContainerStatus) -> None:
+    def on_status(status: SmachContainerStatus) -> None:
         if status.path != command.path or not set(command.initial_states) <= set(status.initial_states):
             return
         try:
@@ -291,14 +291,14 @@ def _send_until_taken(publisher: rospy.Publisher, server: str, command: SmachCon
             rospy.logwarn_throttle(10.0, f"status of '{server}' cannot be read: {error}")
             return
         if all(key in shown and shown[key] == value for key, value in values.items()):
-            taken.set()
+            shown_by_server.set()
 
-    subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, look)
+    subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, on_status)
     end = time.monotonic() + timeout_s
     try:
-        while not taken.is_set() and time.monotonic() < end and not rospy.is_shutdown():
+        while not shown_by_server.is_set() and time.monotonic() < end and not rospy.is_shutdown():
             publisher.publish(command)
-            taken.wait(max(0.0, min(0.3, end - time.monotonic())))
+            shown_by_server.wait(max(0.0, min(0.3, end - time.monotonic())))
     finally:
         subscriber.unregister()
-    return taken.is_set()
+    return shown_by_server.is_set()

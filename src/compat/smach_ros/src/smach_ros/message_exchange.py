@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import copy
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import smach
+from smach_ros.waiting import WallTimeLimit, going_down
 
 __all__ = ["AskingState", "ExchangeError", "MessageSink", "MessageSource", "UserCallback"]
 
@@ -26,7 +27,7 @@ class UserCallback:
 
     def __init__(self, what: str, function: Any, args: Iterable[Any] = (), kwargs: Mapping[str, Any] | None = None,
                  keys: tuple[Iterable[str], Iterable[str]] = ((), ())) -> None:
-        """Check and keep a function.
+        """Checks and keeps a function.
 
         Args:
             what: how errors call it.
@@ -53,7 +54,7 @@ class UserCallback:
             self.outcomes = tuple(function.get_registered_outcomes())
 
     def register_on(self, state: smach.State, with_outcomes: bool) -> None:
-        """Declare on a state what the function declares itself."""
+        """Declares on a state what the function declares itself."""
         if not self.declares_interface:
             return
         state.register_input_keys(self._input_keys)
@@ -62,7 +63,7 @@ class UserCallback:
             state.register_outcomes(self.outcomes)
 
     def call(self, userdata: Any, *values: Any) -> Any:
-        """Call the function with its view of the userdata; None when there is no function.
+        """Calls the function with its view of the userdata; None when there is no function.
 
         Raises:
             ExchangeError: it raised.
@@ -78,7 +79,7 @@ class UserCallback:
 
 
 def check_slots(what: str, message: Any, slots: Iterable[str]) -> tuple[str, ...]:
-    """Return names of fields; raise ``smach.InvalidStateError`` when a message does not have them."""
+    """Returns names of fields; raises ``smach.InvalidStateError`` when a message does not have them."""
     if isinstance(slots, str):
         raise smach.InvalidStateError(f"{what} must be a list of field names, got the string '{slots}'")
     given = tuple(slots)
@@ -95,7 +96,7 @@ class MessageSource:
 
     def __init__(self, what: str, empty: Any, fixed: Any, key: str | None, slots: Iterable[str],
                  callback: UserCallback) -> None:
-        """Check and keep the rules.
+        """Checks and keeps the rules.
 
         Args:
             what: "goal" or "request".
@@ -120,12 +121,12 @@ class MessageSource:
         self._callback = callback
 
     def register_on(self, state: smach.State) -> None:
-        """Declare the userdata keys on a state."""
+        """Declares the userdata keys on a state."""
         state.register_input_keys([*([] if self._key is None else [self._key]), *self._slots])
         self._callback.register_on(state, with_outcomes=False)
 
     def make(self, userdata: Any) -> Any:
-        """Return the message of this execution: always a new object.
+        """Returns the message of this execution: always a new object.
 
         Raises:
             ExchangeError: a userdata key has no value or one of the wrong type, or the callback failed.
@@ -163,19 +164,19 @@ class MessageSink:
     """Delivers an answer: to the callback, then whole under a userdata key, then its fields under keys."""
 
     def __init__(self, what: str, empty: Any, key: str | None, slots: Iterable[str], callback: UserCallback) -> None:
-        """Check and keep the rules; what, empty, key, slots and callback as for ``MessageSource``."""
+        """Checks and keeps the rules; what, empty, key, slots and callback as for ``MessageSource``."""
         self._what = what
         self._key = key
         self._slots = check_slots(f"{what}_slots", empty, slots)
         self._callback = callback
 
     def register_on(self, state: smach.State) -> None:
-        """Declare the userdata keys and the callback's outcomes on a state."""
+        """Declares the userdata keys and the callback's outcomes on a state."""
         state.register_output_keys([*([] if self._key is None else [self._key]), *self._slots])
         self._callback.register_on(state, with_outcomes=True)
 
     def deliver(self, userdata: Any, outcomes: Iterable[str], message: Any, *before: Any) -> str | None:
-        """Deliver an answer.
+        """Delivers an answer.
 
         Args:
             userdata: of the state.
@@ -210,9 +211,37 @@ class AskingState(smach.State):
 
     def __init__(self, input_keys: Iterable[str], output_keys: Iterable[str], io_keys: Iterable[str],
                  outcomes: Iterable[str]) -> None:
-        """Declare succeeded, aborted, preempted, and what the user adds."""
+        """Declares succeeded, aborted, preempted, and what the user adds."""
         super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, io_keys)
         self.reason = ""
+
+    def _stopped(self) -> bool:
+        return self.preempt_requested() or going_down()
+
+    def _wait_for_server(
+        self, server: str, is_there: Callable[[], bool], limit_s: float | None, problem: str
+    ) -> bool:
+        """Waits for the server; returns False when the state was asked to stop.
+
+        Args:
+            server: its name, for the warning.
+            is_there: checks for the server, for a moment.
+            limit_s: longest wait [s of wall time]; None: no limit.
+            problem: what is wrong when the time is over, for the error.
+
+        Raises:
+            ExchangeError: it did not come in time.
+        """
+        limit, next_warning = WallTimeLimit(limit_s), WallTimeLimit(1.0)
+        while not self._stopped():
+            if is_there():
+                return True
+            if limit.over():
+                raise ExchangeError(f"{problem} within {limit_s} s; start the node that offers it")
+            if next_warning.over():
+                smach.logwarn(f"still waiting for {server}")
+                next_warning = WallTimeLimit(10.0)
+        return False
 
     def _abort(self, reason: str) -> str:
         self.reason = reason

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that looks at the messages of a topic and ends when a condition no longer holds, or has held often enough."""
+"""A state that checks the messages of a topic and ends when a condition no longer holds, or has held often enough."""
 from __future__ import annotations
 
 import threading
@@ -32,7 +32,7 @@ class MonitorState(smach.State):
         io_keys: Iterable[str] = (),
         timeout: rospy.Duration | None = None,
     ) -> None:
-        """Make the state.
+        """Makes the state.
 
         Args:
             topic: name of the topic.
@@ -66,7 +66,7 @@ class MonitorState(smach.State):
         self.reason = ""
 
     def execute(self, userdata: Any) -> str:
-        """Listen to the topic until the verdict is there."""
+        """Listens to the topic until the verdict is there."""
         self.reason = ""
         self._checks = 0
         self._verdict = None
@@ -87,7 +87,7 @@ class MonitorState(smach.State):
         return self._preempted() if self.preempt_requested() else self._verdict
 
     def _check(self, message: Any, userdata: Any) -> None:
-        """Ask the condition about one message; the first verdict stays."""
+        """Asks the condition about one message; the first verdict stays."""
         with self._lock:
             if self._verdict is not None:
                 return
@@ -115,6 +115,6 @@ class MonitorState(smach.State):
         return "preempted"
 
     def request_preempt(self) -> None:
-        """Ask the state to stop."""
+        """Asks the state to stop."""
         super().request_preempt()
         self._wake.set()

@@ -10,12 +10,12 @@ import rospy
 
 import smach
 from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource, UserCallback
-from smach_ros.waiting import POLL_PERIOD_S, WallTimeLimit, going_down, seconds
+from smach_ros.waiting import POLL_PERIOD_S, WallTimeLimit, seconds
 
 __all__ = ["ServiceState"]
 
 PROBE_TIME_S = 0.25
-"""How long one look for the service takes at most [s]: the time in which a request to stop is noticed."""
+"""How long one check for the service takes at most [s]: the time in which a request to stop is noticed."""
 
 
 class _Call(threading.Thread):
@@ -33,7 +33,7 @@ class _Call(threading.Thread):
         """Body of the thread."""
         try:
             self.response = self._proxy(self._request)
-        except Exception as error:  # told by the state, whatever it is
+        except Exception as error:  # the state reports it, whatever it is
             self.error = error
         finally:
             self.ended.set()
@@ -64,7 +64,7 @@ class ServiceState(AskingState):
         server_wait_timeout: rospy.Duration | None = rospy.Duration(60.0),  # noqa: B008 - never changed
         exec_timeout: rospy.Duration | None = None,
     ) -> None:
-        """Make the state.
+        """Makes the state.
 
         Args:
             service_name: name of the service.
@@ -105,10 +105,11 @@ class ServiceState(AskingState):
         self._sink.register_on(self)
 
     def execute(self, userdata: Any) -> str:
-        """Wait for the service, call it, deliver the answer."""
+        """Waits for the service, calls it and delivers the answer."""
         self.reason = ""
         try:
-            if self._wait_for_service():
+            if self._wait_for_server(f"service '{self._service_name}'", self._is_advertised,
+                                     self._server_wait_timeout_s, "it was not advertised"):
                 call = _Call(rospy.ServiceProxy(self._service_name, self._service_spec), self._source.make(userdata))
                 if self._wait_for_answer(call):
                     chosen = self._sink.deliver(userdata, self.get_registered_outcomes(), call.response)
@@ -117,33 +118,15 @@ class ServiceState(AskingState):
             return self._abort(f"service '{self._service_name}': {error}")
         return self._preempted(f"service '{self._service_name}': asked to stop before it answered")
 
-    def _stopped(self) -> bool:
-        return self.preempt_requested() or going_down()
-
-    def _wait_for_service(self) -> bool:
-        """Wait for the service; return False when the state was asked to stop.
-
-        Raises:
-            ExchangeError: it was not advertised in time.
-        """
-        limit = WallTimeLimit(self._server_wait_timeout_s)
-        told = WallTimeLimit(1.0)
-        while not self._stopped():
-            try:
-                rospy.wait_for_service(self._service_name, PROBE_TIME_S)
-                return True
-            except rospy.ROSException as error:
-                if limit.over():
-                    raise ExchangeError(
-                        f"it was not advertised within {self._server_wait_timeout_s} s; start the node that offers it"
-                    ) from error
-            if told.over():
-                smach.logwarn(f"still waiting for service '{self._service_name}'")
-                told = WallTimeLimit(10.0)
-        return False
+    def _is_advertised(self) -> bool:
+        try:
+            rospy.wait_for_service(self._service_name, PROBE_TIME_S)
+        except rospy.ROSException:
+            return False
+        return True
 
     def _wait_for_answer(self, call: _Call) -> bool:
-        """Call the service; return False when the state was asked to stop before the answer.
+        """Calls the service; returns False when the state was asked to stop before the answer.
 
         Raises:
             ExchangeError: the call failed or took too long.
@@ -163,7 +146,7 @@ class ServiceState(AskingState):
 
 
 def _empty_messages(service_name: str, service_spec: Any) -> tuple[Any, Any]:
-    """Return an empty request and response of a service type; raise ``InvalidStateError`` when it is none."""
+    """Returns an empty request and response of a service type; raises ``InvalidStateError`` when it is none."""
     if not isinstance(service_name, str) or not service_name:
         raise smach.InvalidStateError(f"service_name must be the name of a service, got {service_name!r}")
     try:

@@ -12,7 +12,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 
 import smach
 from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource, UserCallback
-from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, WallTimeLimit, going_down, seconds
+from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, WallTimeLimit, seconds
 
 __all__ = ["SimpleActionState"]
 
@@ -50,7 +50,7 @@ class SimpleActionState(AskingState):
         server_wait_timeout: rospy.Duration | None = rospy.Duration(60.0),  # noqa: B008 - never changed
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Make the state.
+        """Makes the state.
 
         Args:
             action_name: name of the action.
@@ -105,7 +105,7 @@ class SimpleActionState(AskingState):
 
     # ---- stopping ------------------------------------------------------------------------------------------
     def request_preempt(self) -> None:
-        """Ask the state to stop: a goal that is out is cancelled at once."""
+        """Asks the state to stop: a goal that is out is cancelled at once."""
         with self._lock:
             super().request_preempt()
             if self._goal_is_out and self._client is not None:
@@ -115,12 +115,14 @@ class SimpleActionState(AskingState):
 
     # ---- running -------------------------------------------------------------------------------------------
     def execute(self, userdata: Any) -> str:
-        """Wait for the server, send the goal, wait for its end."""
+        """Waits for the server, sends the goal and waits for its end."""
         self.reason = ""
         self._wake.clear()
         try:
-            self._wait_for_server()
-            if self.preempt_requested() or going_down():
+            if not self._wait_for_server(
+                f"the server of action '{self._action_name}'", self._is_connected, self._server_wait_timeout_s,
+                f"no server of type {self._action_spec._type} was at '{rospy.resolve_name(self._action_name)}'",
+            ):
                 return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
             goal = self._source.make(userdata)
             with self._lock:  # a request to stop comes before this, or finds the goal out
@@ -136,28 +138,14 @@ class SimpleActionState(AskingState):
             with self._lock:
                 self._goal_is_out = False
 
-    def _wait_for_server(self) -> None:
-        """Wait until the server is there, or the state is asked to stop.
-
-        Raises:
-            ExchangeError: it did not come in time.
-        """
-        client = self._connect()
-        limit = WallTimeLimit(self._server_wait_timeout_s)
-        told = WallTimeLimit(1.0)
-        while not (_server_is_there(client) or self.preempt_requested() or going_down()):
-            if limit.over():
-                raise ExchangeError(
-                    f"no server of type {self._action_spec._type} was at '{rospy.resolve_name(self._action_name)}' "
-                    f"within {self._server_wait_timeout_s} s; start the node that offers it"
-                )
-            if told.over():
-                smach.logwarn(f"still waiting for the server of action '{self._action_name}'")
-                told = WallTimeLimit(10.0)
-            self._wake.wait(POLL_PERIOD_S)
+    def _is_connected(self) -> bool:
+        if _server_is_there(self._connect()):
+            return True
+        self._wake.wait(POLL_PERIOD_S)
+        return False
 
     def _follow(self, client: SimpleActionClient, userdata: Any) -> str:
-        """Wait for the end of the goal and return the outcome."""
+        """Waits for the end of the goal and returns the outcome."""
         too_late = self._wait_for_end(client)
         # only now: the status of a goal can be final before its result has come
         status = client.get_state()
@@ -168,7 +156,7 @@ class SimpleActionState(AskingState):
         return outcome if chosen is None else chosen
 
     def _wait_for_end(self, client: SimpleActionClient) -> str:
-        """Wait until the goal has ended; return "" or why the state gave it up.
+        """Waits until the goal has ended; returns "" or why the state gave it up.
 
         Raises:
             ExchangeError: the goal did not end though it was cancelled, or the server has gone.
@@ -202,15 +190,15 @@ class SimpleActionState(AskingState):
     def _outcome(self, status: int, text: str, too_late: str) -> str:
         if status == GoalStatus.SUCCEEDED:
             return "succeeded"
-        told = f": {text}" if text else ""
-        if status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED) and (self.preempt_requested() or going_down()):
-            return self._preempted(f"action '{self._action_name}': the goal was stopped{told}")
-        why = too_late or f"ended with status {_STATUS_NAMES.get(status, status)}{told}"
+        detail = f": {text}" if text else ""
+        if status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED) and self._stopped():
+            return self._preempted(f"action '{self._action_name}': the goal was stopped{detail}")
+        why = too_late or f"ended with status {_STATUS_NAMES.get(status, status)}{detail}"
         return self._abort(f"action '{self._action_name}' {why}")
 
 
 def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
-    """Return an empty goal and result of an action type; raise ``InvalidStateError`` when it is none."""
+    """Returns an empty goal and result of an action type; raises ``InvalidStateError`` when it is none."""
     if not isinstance(action_name, str) or not action_name:
         raise smach.InvalidStateError(f"action_name must be the name of an action, got {action_name!r}")
     try:
@@ -223,7 +211,7 @@ def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
 
 
 def _server_is_there(client: SimpleActionClient) -> bool:
-    """Tell whether one server is connected by all topics of the action."""
+    """Returns whether one server is connected by all topics of the action."""
     inner = client.action_client
     status = inner.last_status_msg
     if status is None:
@@ -239,17 +227,17 @@ def _server_is_there(client: SimpleActionClient) -> bool:
 
 
 def _ended(client: SimpleActionClient) -> bool:
-    """Tell whether the goal has ended and its result is here.
+    """Returns whether the goal has ended and its result is here.
 
-    The handle knows better than the client, which misses the end of a goal that ends while it is being sent.
+    The handle is right where the client is not: that misses the end of a goal that ends while it is being sent.
     """
     return client.gh is not None and client.gh.get_comm_state() == CommState.DONE
 
 
 def _cancel(client: SimpleActionClient) -> None:
-    """Cancel the goal.
+    """Cancels the goal.
 
-    The client's own way takes a goal that is cancelled before its server has confirmed it for lost.
+    The client's own `cancel_goal` counts a goal that is cancelled before its server has confirmed it as lost.
     """
     handle = client.gh
     if handle is not None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Userdata as text in messages: a pickled dictionary in base64, as viewers of state machines expect it.
 
-Pickles can run code. So only plain values and messages are written (of others, their type is told), and nothing else
+Pickles can run code. So only plain values and messages are written (of others, only their type), and nothing else
 is ever read.
 """
 from __future__ import annotations
@@ -24,7 +24,7 @@ PROTOCOL = 2
 """Pickle protocol of the public implementation."""
 
 MAX_VALUE_BYTES = 65536
-"""Values that are larger when pickled [bytes] are told by type only."""
+"""Values that are larger when pickled [bytes] are written as their type only."""
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, bytearray)
 _MESSAGE_MODULE = re.compile(r"[A-Za-z]\w*\.(msg|srv)\._\w+")
@@ -35,7 +35,7 @@ class UserdataError(ValueError):
 
 
 def is_plain(value: Any) -> bool:
-    """Tell whether a value consists of numbers, texts, collections, times and messages only."""
+    """Returns whether a value consists of numbers, texts, collections, times and messages only."""
     if isinstance(value, genpy.Message):
         return all(is_plain(getattr(value, slot, None)) for slot in value.__slots__)
     if type(value) in (list, tuple, set, frozenset):
@@ -46,11 +46,11 @@ def is_plain(value: Any) -> bool:
 
 
 def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
-    """Write userdata as text.
+    """Writes userdata as text.
 
     Args:
         values: by key.
-        strict: whether a value that cannot be written is an error; else its type is written in its place.
+        strict: whether a value that cannot be written is an error; else its type is written instead.
 
     Raises:
         UserdataError: there is one, and ``strict``.
@@ -59,7 +59,7 @@ def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
     for key, value in values.items():
         try:
             fits = is_plain(value) and (strict or len(pickle.dumps(value, PROTOCOL)) <= MAX_VALUE_BYTES)
-        except Exception:  # changed by its owner meanwhile, or nested without end: told by type
+        except Exception:  # changed by its owner meanwhile, or nested without end: written as its type
             fits = False
         if not fits and strict:
             raise UserdataError(f"userdata '{key}' is a {type(value).__name__}; allowed are plain values and messages")
@@ -68,7 +68,7 @@ def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
 
 
 def decode(text: str) -> dict[str, Any]:
-    """Read userdata that was written as text.
+    """Reads userdata that was written as text.
 
     Raises:
         UserdataError: it is no dictionary of plain values and messages.
@@ -89,7 +89,7 @@ def decode(text: str) -> dict[str, Any]:
 
 
 def _bytes_from_text(text: str, encoding: str) -> bytes:
-    """Stand in for ``_codecs.encode``, by which protocol 2 writes bytes."""
+    """Stands in for ``_codecs.encode``, by which protocol 2 writes bytes."""
     if encoding != "latin1":
         raise UserdataError(f"userdata holds bytes as '{encoding}'; allowed is latin1")
     return text.encode("latin1")
@@ -110,7 +110,7 @@ class _PlainUnpickler(pickle.Unpickler):
     """Finds plain types, times and messages, and nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return a type that is allowed in a pickle."""
+        """Returns a type that is allowed in a pickle."""
         if (module, name) in _ALLOWED:
             return _ALLOWED[module, name]
         if module in ("genpy.rostime", "rospy.rostime") and name in ("Time", "Duration"):

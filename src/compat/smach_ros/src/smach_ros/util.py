@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stops a state machine when ROS shuts down, while its states can still tell other nodes."""
+"""Stops a state machine when ROS shuts down, while its states can still reach other nodes."""
 from __future__ import annotations
 
 import time
@@ -15,7 +15,7 @@ STOP_TIME_S = 5.0
 
 
 def set_preempt_handler(sc: smach.Container) -> None:
-    """Ask a container to stop when ROS is told to shut down, and hold the shutdown until it has, or 5 s are over.
+    """Asks a container to stop when ROS is asked to shut down, and holds the shutdown until it has, or 5 s are over.
 
     The container is to be executed in a thread of its own: the one that received SIGINT is the one that waits.
 

@@ -14,11 +14,11 @@ import smach
 __all__ = ["POLL_PERIOD_S", "RosTimeLimit", "WallTimeLimit", "going_down", "seconds"]
 
 POLL_PERIOD_S = 0.02
-"""How often a waiting state looks around [s]."""
+"""How often a waiting state checks [s]."""
 
 
 def seconds(what: str, duration: object) -> float | None:
-    """Return a duration in seconds; None stays None: no limit.
+    """Returns a duration in seconds; None stays None: no limit.
 
     Args:
         what: name of the argument, for the error.
@@ -37,7 +37,7 @@ def seconds(what: str, duration: object) -> float | None:
 
 
 def going_down() -> bool:
-    """Tell whether the process or the machine is asked to end."""
+    """Returns whether the process or the machine is asked to end."""
     return rospy.is_shutdown() or smach.is_shutdown()
 
 
@@ -45,12 +45,12 @@ class RosTimeLimit:
     """A limit in ROS time; a clock that jumps back starts it anew."""
 
     def __init__(self, limit_s: float | None) -> None:
-        """Start the limit [s]; None: there is none."""
+        """Starts the limit [s]; None: there is none."""
         self._limit_s = limit_s
         self._start = rospy.get_time() if limit_s is not None else 0.0
 
     def over(self) -> bool:
-        """Tell whether the time is over."""
+        """Returns whether the time is over."""
         if self._limit_s is None:
             return False
         now = rospy.get_time()
@@ -62,9 +62,9 @@ class WallTimeLimit:
     """A limit in wall time."""
 
     def __init__(self, limit_s: float | None) -> None:
-        """Start the limit [s]; None: there is none."""
+        """Starts the limit [s]; None: there is none."""
         self._end = None if limit_s is None else time.monotonic() + limit_s
 
     def over(self) -> bool:
-        """Tell whether the time is over."""
+        """Returns whether the time is over."""
         return self._end is not None and time.monotonic() >= self._end

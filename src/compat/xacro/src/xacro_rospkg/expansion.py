@@ -36,7 +36,7 @@ class PackageNotFoundError(substitution_args.SubstitutionException):
 
 
 def find_package(package: str) -> str:
-    """Return the folder of a ROS package.
+    """Returns the folder of a ROS package.
 
     Args:
         package: name as written in its package.xml.
@@ -52,7 +52,7 @@ def find_package(package: str) -> str:
 
 
 def parse_without_doctype(inp: Any, filename: str | None = None) -> Any:
-    """Parse a text or file as ``xacro.parse`` does; a DOCTYPE is refused before any entity is expanded.
+    """Parses a text or file as ``xacro.parse`` does; a DOCTYPE is refused before any entity is expanded.
 
     Raises:
         xacro.XacroException: when there is a DOCTYPE.
@@ -67,7 +67,7 @@ def parse_without_doctype(inp: Any, filename: str | None = None) -> Any:
 
 
 def adapt_xacro() -> None:
-    """Make the xacro module answer ``$(find pkg)`` through rospkg, and refuse a DOCTYPE in every file it reads."""
+    """Makes the xacro module resolve ``$(find pkg)`` through rospkg, and refuse a DOCTYPE in every file it reads."""
     if not hasattr(substitution_args, "_eval_find"):
         raise RuntimeError(
             "xacro.substitution_args has no '_eval_find': this version of the PyPI package xacro is not supported. "
@@ -78,7 +78,7 @@ def adapt_xacro() -> None:
 
 
 def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
-    """Return the XML a xacro file expands to.
+    """Returns the XML a xacro file expands to.
 
     Args:
         path: the xacro file.
@@ -99,7 +99,7 @@ def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the ``xacro`` command line; ``--inorder`` is accepted and, being the only order there is, ignored."""
+    """Runs the ``xacro`` command line; ``--inorder`` is accepted and, being the only order there is, ignored."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     adapt_xacro()
     sys.argv = [sys.argv[0], *(argument for argument in given if argument not in _IN_ORDER_FLAGS)]
