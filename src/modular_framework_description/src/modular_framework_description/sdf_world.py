@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
 
 from modular_framework_description.solids import rotation_from_rpy
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.xml_text import Element
 
 Array = npt.NDArray[np.float64]
 
@@ -65,15 +65,15 @@ def transform_from_pose_text(text: str, where: str) -> Array:
     return transform
 
 
-def _pose_of(element: ElementTree.Element, where: str) -> Array:
+def _pose_of(element: Element, where: str) -> Array:
     return transform_from_pose_text(element.findtext("pose", ""), where)
 
 
-def _floats(element: ElementTree.Element, tag: str) -> tuple[float, ...]:
+def _floats(element: Element, tag: str) -> tuple[float, ...]:
     return tuple(float(value) for value in element.findtext(tag, "").split())
 
 
-def _shape_of(collision: ElementTree.Element, pose: Array, where: str) -> PlacedShape:
+def _shape_of(collision: Element, pose: Array, where: str) -> PlacedShape:
     geometry = collision.find("geometry")
     shape = None if geometry is None else next(iter(geometry), None)
     kind = "nothing" if shape is None else shape.tag
@@ -84,7 +84,7 @@ def _shape_of(collision: ElementTree.Element, pose: Array, where: str) -> Placed
     return PlacedShape(kind, size, pose @ _pose_of(collision, where))
 
 
-def _links_of(model: ElementTree.Element, name: str, pose: Array) -> list[PlacedLink]:
+def _links_of(model: Element, name: str, pose: Array) -> list[PlacedLink]:
     links = []
     for link in model.findall("link"):
         where = f"model '{name}', link '{link.get('name')}'"
@@ -94,14 +94,14 @@ def _links_of(model: ElementTree.Element, name: str, pose: Array) -> list[Placed
     return links
 
 
-def _read(path: Path) -> ElementTree.Element:
+def _read(path: Path) -> Element:
     try:
         return xml_text.read(path)
     except xml_text.XmlError as error:
         raise WorldError(str(error)) from error
 
 
-def _included_model(include: ElementTree.Element, models_dir: Path) -> ElementTree.Element:
+def _included_model(include: Element, models_dir: Path) -> Element:
     uri = include.findtext("uri", "").strip()
     folder = models_dir / uri.removeprefix("model://")
     if not uri.startswith("model://") or not (folder / "model.sdf").is_file():

@@ -2,15 +2,14 @@
 """What a COLLADA file says besides its vertices: the length of its unit, and how many triangles its scene shows."""
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
-
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.xml_text import Element
 
 _MOST_NODES = 100_000
 _LOOKS = ("library_images", "library_effects", "library_materials")
 
 
-def parse(content: bytes, where: str) -> ET.Element:
+def parse(content: bytes, where: str) -> Element:
     """Returns the root of a COLLADA file; the tags lose their namespace.
 
     Raises:
@@ -24,7 +23,7 @@ def parse(content: bytes, where: str) -> ET.Element:
     return root
 
 
-def unit(root: ET.Element) -> float:
+def unit(root: Element) -> float:
     """Returns the length of the file's unit [m]; raises ValueError where it is none."""
     element = root.find("asset/unit")
     metres = float("1" if element is None else element.get("meter", "1"))
@@ -33,16 +32,16 @@ def unit(root: ET.Element) -> float:
     return metres
 
 
-def without_materials(root: ET.Element) -> bytes:
+def without_materials(root: Element) -> bytes:
     """Returns the file without what only its looks need: a reader gives up a part whose texture is missing."""
     root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
     for parent in list(root.iter()):
         for child in [one for one in parent if one.tag == "bind_material" or one.tag in _LOOKS]:
             parent.remove(child)
-    return bytes(ET.tostring(root))
+    return xml_text.to_text(root).encode()
 
 
-def triangles(root: ET.Element) -> int:
+def triangles(root: Element) -> int:
     """Counts the triangles of every instance that the scene shows."""
     known = {element.get("id"): element for element in root.iter() if element.get("id")}
     shown = root.find("scene/instance_visual_scene")
@@ -63,7 +62,7 @@ def triangles(root: ET.Element) -> int:
     return triangles
 
 
-def _mesh_of(known: dict[str | None, ET.Element], name: str) -> ET.Element:
+def _mesh_of(known: dict[str | None, Element], name: str) -> Element:
     """Returns the geometry a name stands for; that of a controller is the one it deforms."""
     element = known[name]
     while element.tag == "controller":
@@ -74,7 +73,7 @@ def _mesh_of(known: dict[str | None, ET.Element], name: str) -> ET.Element:
     return element
 
 
-def _geometry(geometry: ET.Element) -> int:
+def _geometry(geometry: Element) -> int:
     triangles = 0
     for kind in ("triangles", "tristrips", "trifans", "polylist", "polygons"):
         for primitive in geometry.findall(f"mesh/{kind}"):

@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parses the XML of descriptions, and refuses every document type: its entities may grow without bound."""
+"""Parses the XML of descriptions so that each element knows its line, and refuses every document type.
+
+The entities of a document type may grow without bound. Elements of a default namespace (`<robot xmlns="...">`) are
+called as they are written.
+"""
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import Any
 from xml.parsers import expat
+
+from lxml import etree
+
+Element = Any
+"""An lxml element; `sourceline` is its line, from 1."""
 
 
 class XmlError(ValueError):
@@ -47,8 +56,8 @@ def refuse_doctype(text: str | bytes, where: str) -> None:
         return
 
 
-def parse(text: str | bytes, where: str) -> ElementTree.Element:
-    """Returns the root element of a document.
+def parse(text: str | bytes, where: str) -> Element:
+    """Returns the root element of a document; comments and processing instructions are left out.
 
     Args:
         text: the document.
@@ -58,15 +67,24 @@ def parse(text: str | bytes, where: str) -> ElementTree.Element:
         XmlError: it is not well-formed XML, or has a DOCTYPE.
     """
     refuse_doctype(text, where)
+    encoding = "utf-8" if isinstance(text, str) else None  # a declared one does not hold for decoded text
+    parser = etree.XMLParser(encoding=encoding, remove_comments=True, remove_pis=True, resolve_entities=False,
+                             huge_tree=True)
     try:
-        root: ElementTree.Element = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise XmlError(f"{where}:{error.position[0]}", f"not an XML document ({error})",
+        root = etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
+    except (etree.XMLSyntaxError, UnicodeEncodeError) as error:
+        line, fault = getattr(error, "lineno", None) or 1, getattr(error, "msg", error)
+        raise XmlError(f"{where}:{line}", f"not an XML document (not well-formed XML: {fault})",
                        "well-formed XML is needed; mend it") from error
+    if None in root.nsmap:
+        for element in root.iter():
+            if element.prefix is None:
+                element.tag = etree.QName(element).localname
+        etree.cleanup_namespaces(root)
     return root
 
 
-def read(path: Path) -> ElementTree.Element:
+def read(path: Path) -> Element:
     """Returns the root element of a file.
 
     Raises:
@@ -74,3 +92,14 @@ def read(path: Path) -> ElementTree.Element:
         XmlError: it is not well-formed XML, or has a DOCTYPE.
     """
     return parse(path.read_bytes(), str(path))
+
+
+def add_child(parent: Element, tag: str, **attributes: str) -> Element:
+    """Appends an element to a parsed document and returns it."""
+    return etree.SubElement(parent, tag, attributes)
+
+
+def to_text(root: Element) -> str:
+    """Returns a parsed document as text."""
+    text: str = etree.tostring(root, encoding="unicode")
+    return text

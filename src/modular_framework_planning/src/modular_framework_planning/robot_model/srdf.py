@@ -2,12 +2,12 @@
 """Reads the semantic description (SRDF) of a robot into plain records; it knows nothing of the robot's joints."""
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from modular_framework_planning.errors import ModelError
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.xml_text import Element
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +62,14 @@ class SemanticDescription:
     disabled_pairs: Mapping[frozenset[str], str] = field(default_factory=dict)
 
 
-def _need(element: ET.Element, attribute: str) -> str:
+def _need(element: Element, attribute: str) -> str:
     value = element.get(attribute)
     if value is None:
         raise ModelError(f"SRDF: <{element.tag}> {dict(element.attrib)} has no attribute '{attribute}'; add it")
     return value
 
 
-def _group(element: ET.Element) -> GroupSpec:
+def _group(element: Element) -> GroupSpec:
     return GroupSpec(
         name=_need(element, "name"),
         joints=tuple(_need(item, "name") for item in element.findall("joint")),
@@ -79,7 +79,7 @@ def _group(element: ET.Element) -> GroupSpec:
     )
 
 
-def _group_states(root: ET.Element) -> dict[str, dict[str, dict[str, float]]]:
+def _group_states(root: Element) -> dict[str, dict[str, dict[str, float]]]:
     states: dict[str, dict[str, dict[str, float]]] = {}
     for element in root.findall("group_state"):
         values = {_need(item, "name"): float(_need(item, "value").split()[0]) for item in element.findall("joint")}
@@ -87,7 +87,7 @@ def _group_states(root: ET.Element) -> dict[str, dict[str, dict[str, float]]]:
     return states
 
 
-def _pair(element: ET.Element) -> frozenset[str]:
+def _pair(element: Element) -> frozenset[str]:
     return frozenset((_need(element, "link1").strip(), _need(element, "link2").strip()))
 
 

@@ -2,7 +2,6 @@
 """Prepares a URDF for Pinocchio: shapes are read, continuous joints become unbounded, mimics are noted."""
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.xml_text import Element
 
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
@@ -71,7 +71,7 @@ def package_resolver(uri: str) -> str:
     return str(path)
 
 
-def _number(element: ET.Element, attribute: str, default: float, where: str) -> float:
+def _number(element: Element, attribute: str, default: float, where: str) -> float:
     text = element.get(attribute)
     if text is None:
         return default
@@ -92,7 +92,7 @@ class _Joints:
     notes: list[str] = field(default_factory=list)
 
 
-def _read_joints(root: ET.Element) -> _Joints:
+def _read_joints(root: Element) -> _Joints:
     """Reads the joints and makes them ready for Pinocchio; raises ModelError."""
     result = _Joints()
     for joint in root.findall("joint"):
@@ -111,12 +111,12 @@ def _read_joints(root: ET.Element) -> _Joints:
     return replace(result, mimics=mimics)
 
 
-def _prepare_joint(joint: ET.Element, name: str, result: _Joints) -> None:
+def _prepare_joint(joint: Element, name: str, result: _Joints) -> None:
     if joint.get("type") == "continuous":
         joint.set("type", "revolute")
         limit = joint.find("limit")
         if limit is None:
-            limit = ET.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
+            limit = xml_text.add_child(joint, "limit", effort="0", velocity="0")
         limit.set("lower", str(-CONTINUOUS_BOUND))
         limit.set("upper", str(CONTINUOUS_BOUND))
     mimic = joint.find("mimic")
@@ -142,7 +142,7 @@ def _numbers(text: str | None, default: tuple[float, float, float], where: str) 
     return first, second, third
 
 
-def _geometries(link: ET.Element, role: str) -> Iterator[tuple[ET.Element, Transform, str]]:
+def _geometries(link: Element, role: str) -> Iterator[tuple[Element, Transform, str]]:
     """Geometry elements of a link's visuals or collisions, their poses in the link and where that is."""
     where = f"URDF link '{link.get('name')}' {role}"
     for element in link.findall(role):
@@ -154,20 +154,20 @@ def _geometries(link: ET.Element, role: str) -> Iterator[tuple[ET.Element, Trans
             yield geometry, pose, where
 
 
-def _visual_meshes(link: ET.Element) -> Iterator[VisualMesh]:
+def _visual_meshes(link: Element) -> Iterator[VisualMesh]:
     for geometry, pose, where in _geometries(link, "visual"):
         if geometry.tag == "mesh":
             yield geometry.get("filename", ""), pose, _numbers(geometry.get("scale"), (1.0, 1.0, 1.0), where)
 
 
-def _visual_shapes(link: ET.Element) -> Iterator[PlacedShape]:
+def _visual_shapes(link: Element) -> Iterator[PlacedShape]:
     for geometry, pose, where in _geometries(link, "visual"):
         shape = None if geometry.tag == "capsule" else _primitive(geometry, where)  # no marker shows a capsule
         if shape is not None:
             yield shape, pose
 
 
-def _primitive(geometry: ET.Element, where: str) -> Shape | None:
+def _primitive(geometry: Element, where: str) -> Shape | None:
     match geometry.tag:
         case "box":
             return Box(*_numbers(geometry.get("size"), (1.0, 1.0, 1.0), where))
@@ -179,7 +179,7 @@ def _primitive(geometry: ET.Element, where: str) -> Shape | None:
     return None
 
 
-def _collisions(link: ET.Element, resolve: MeshResolver) -> Iterator[PlacedShape]:
+def _collisions(link: Element, resolve: MeshResolver) -> Iterator[PlacedShape]:
     """Shapes of a link; raises ModelError for a mesh that is not there or cannot be read, or an unknown shape."""
     for geometry, pose, where in _geometries(link, "collision"):
         if geometry.tag == "mesh":
@@ -199,12 +199,12 @@ def _collisions(link: ET.Element, resolve: MeshResolver) -> Iterator[PlacedShape
         yield shape, pose
 
 
-def _without_geometry(root: ET.Element) -> str:
+def _without_geometry(root: Element) -> str:
     """Returns the document as Pinocchio gets it: kinematics and inertias."""
     for link in root.findall("link"):
         for element in (*link.findall("collision"), *link.findall("visual")):
             link.remove(element)
-    return ET.tostring(root, encoding="unicode")
+    return xml_text.to_text(root)
 
 
 def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocument:

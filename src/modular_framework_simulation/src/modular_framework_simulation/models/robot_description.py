@@ -8,7 +8,6 @@ a fraction of the time and computes contacts faster.
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.xml_text import Element
 
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
 
@@ -98,7 +98,7 @@ def read_robot(
     joints = _with_leaders(joints)
     _rewrite_meshes(root, find_package, convex_parts, with_visuals)
     _give_frames_no_weight(root)
-    engine_urdf = ElementTree.tostring(root, encoding="unicode")
+    engine_urdf = xml_text.to_text(root)
     parents = {_link_of(joint, "child"): _link_of(joint, "parent") for joint in root.findall("joint")}
     return RobotDescription(root.get("name", "robot"), joints, links, parents, engine_urdf)
 
@@ -114,7 +114,7 @@ def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
     return tuple(replace(joint, mimic=mimics.get(joint.name)) for joint in joints)
 
 
-def _transmissions(root: ElementTree.Element) -> dict[str, tuple[str, ...]]:
+def _transmissions(root: Element) -> dict[str, tuple[str, ...]]:
     interfaces: dict[str, tuple[str, ...]] = {}
     for transmission in root.findall("transmission"):
         for joint in transmission.findall("joint"):
@@ -127,7 +127,7 @@ def _transmissions(root: ElementTree.Element) -> dict[str, tuple[str, ...]]:
     return interfaces
 
 
-def _joint(joint: ElementTree.Element, transmissions: dict[str, tuple[str, ...]]) -> RobotJoint:
+def _joint(joint: Element, transmissions: dict[str, tuple[str, ...]]) -> RobotJoint:
     name = joint.get("name", "")
     limit, mimic_element = joint.find("limit"), joint.find("mimic")
 
@@ -155,7 +155,7 @@ def _joint(joint: ElementTree.Element, transmissions: dict[str, tuple[str, ...]]
     )
 
 
-def _link_of(joint: ElementTree.Element, role: str) -> str:
+def _link_of(joint: Element, role: str) -> str:
     element = joint.find(role)
     if element is None or not element.get("link"):
         where = f"robot_description: joint '{joint.get('name')}'"
@@ -163,7 +163,7 @@ def _link_of(joint: ElementTree.Element, role: str) -> str:
     return element.get("link", "")
 
 
-def _number(joint: str, element: ElementTree.Element, key: str, default: float) -> float:
+def _number(joint: str, element: Element, key: str, default: float) -> float:
     text = element.get(key)
     try:
         return default if text is None else float(text)
@@ -173,7 +173,7 @@ def _number(joint: str, element: ElementTree.Element, key: str, default: float) 
 
 
 def _rewrite_meshes(
-    root: ElementTree.Element, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool
+    root: Element, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool
 ) -> None:
     for link in root.findall("link"):
         if not with_visuals:
@@ -193,7 +193,7 @@ def _rewrite_meshes(
             mesh.attrib.pop("scale", None)
 
 
-def _require_sizes(link: str, shape: ElementTree.Element) -> None:
+def _require_sizes(link: str, shape: Element) -> None:
     """Refuses primitives that are larger than the engine can place to the millimetre."""
     for element in shape.findall("geometry/*"):
         for key, text in ((key, element.get(key)) for key in ("size", "radius", "length")):
@@ -206,14 +206,14 @@ def _require_sizes(link: str, shape: ElementTree.Element) -> None:
                 raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {LARGEST_LENGTH_M:g} m")
 
 
-def _give_frames_no_weight(root: ElementTree.Element) -> None:
+def _give_frames_no_weight(root: Element) -> None:
     """Links without mass are mere frames; the engine would take each of them for a kilogram."""
     for link in root.findall("link"):
         if link.find("inertial") is None:
-            inertial = ElementTree.SubElement(link, "inertial")
-            ElementTree.SubElement(inertial, "mass", value="1e-5")
+            inertial = xml_text.add_child(link, "inertial")
+            xml_text.add_child(inertial, "mass", value="1e-5")
             moments = {"ixx": "1e-9", "ixy": "0", "ixz": "0", "iyy": "1e-9", "iyz": "0", "izz": "1e-9"}
-            ElementTree.SubElement(inertial, "inertia", moments)
+            xml_text.add_child(inertial, "inertia", **moments)
 
 
 def _mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a URDF says of a robot, as plain records; `urdf_reader.read_urdf` makes them."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from modular_framework_urdf.mimics import Mimic
+
+Vector = tuple[float, float, float]
+MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """A pose in the frame of the parent.
+
+    Attributes:
+        xyz: position [m].
+        rpy: turns about the fixed axes x, y and z, in this order [rad].
+    """
+
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+
+    def matrix(self) -> npt.NDArray[np.float64]:
+        """Returns the pose as a (4, 4) matrix."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = Rotation.from_euler("xyz", self.rpy).as_matrix()
+        matrix[:3, 3] = self.xyz
+        return matrix
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Its edges along x, y and z [m]."""
+
+    size: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """Its radius [m]."""
+
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Radius, and length along z [m]."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """Radius, and length of the cylinder between its ends, along z [m]."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFile:
+    """URI of a mesh file, and by what it is scaled along x, y and z."""
+
+    uri: str
+    scale: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownShape:
+    """A shape that URDF does not have."""
+
+    tag: str
+
+
+Shape = Box | Sphere | Cylinder | Capsule | MeshFile | UnknownShape
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedShapes:
+    """A <visual> or <collision>: its shapes (one, in a correct description), and their pose in the link."""
+
+    shapes: tuple[Shape, ...]
+    origin: Origin
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A link and what it looks and feels like."""
+
+    name: str
+    visuals: tuple[PlacedShapes, ...]
+    collisions: tuple[PlacedShapes, ...]
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A <limit>: positions [rad or m], largest effort [N m or N] and velocity [rad/s or m/s]; None is not given."""
+
+    lower: float
+    upper: float
+    effort: float | None
+    velocity: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyController:
+    """A <safety_controller>: the range [rad or m] and gains of ros_control's soft limits; None is not given."""
+
+    soft_lower_limit: float | None
+    soft_upper_limit: float | None
+    k_position: float | None
+    k_velocity: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A joint.
+
+    Attributes:
+        name: of the joint.
+        kind: the URDF type.
+        parent: link it hangs on; empty when the description names none.
+        child: link it carries; empty when the description names none.
+        origin: pose in the parent link.
+        axis: in the joint's own frame.
+        limit: None without the element.
+        safety: None without the element.
+        mimic: the joint it follows directly; None when it follows none.
+        line: of the description.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Origin
+    axis: Vector
+    limit: Limit | None
+    safety: SafetyController | None
+    mimic: Mimic | None
+    line: int
+
+    @property
+    def movable(self) -> bool:
+        """Whether it is of a kind that moves."""
+        return self.kind in MOVABLE_KINDS
+
+
+@dataclass(frozen=True, slots=True)
+class LocatedText:
+    """What an element holds, without the white space around it, and its line."""
+
+    text: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class TransmissionPart:
+    """A <joint> or <actuator> of a transmission; None is not given."""
+
+    tag: str
+    name: str
+    role: str
+    reduction: LocatedText | None
+    offset: LocatedText | None
+    interfaces: tuple[LocatedText, ...]
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Transmission:
+    """A <transmission>, in the words of the file."""
+
+    name: str
+    kind: str
+    joints: tuple[TransmissionPart, ...]
+    actuators: tuple[TransmissionPart, ...]
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot; everything in the order of the file."""
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    transmissions: tuple[Transmission, ...]
+
+    def movable_joints(self) -> Iterator[Joint]:
+        """Yields the joints of kinds that move."""
+        return (joint for joint in self.joints if joint.movable)
+
+    def root_links(self) -> list[str]:
+        """Returns the names of the links that no joint carries; a correct description has one."""
+        carried = {joint.child for joint in self.joints}
+        return [link.name for link in self.links if link.name not in carried]

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The one reader of the semantic description (SRDF) of a robot; it knows nothing of the robot's joints."""
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from modular_framework_urdf import xml_text
+from modular_framework_urdf.xml_text import Element, XmlError
+
+MemberKind = Literal["joint", "link", "chain", "group"]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupMember:
+    """One element of a <group>: a joint, link or group by its name, or a chain by its two links."""
+
+    kind: MemberKind
+    name: str = ""
+    base_link: str = ""
+    tip_link: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class GroupSpec:
+    """A <group>, its members in the order of the file."""
+
+    name: str
+    members: tuple[GroupMember, ...] = ()
+
+    def _names(self, kind: MemberKind) -> tuple[str, ...]:
+        return tuple(member.name for member in self.members if member.kind == kind)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of its joints."""
+        return self._names("joint")
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of its links, each of which stands for the joint above it."""
+        return self._names("link")
+
+    @property
+    def subgroups(self) -> tuple[str, ...]:
+        """Names of the groups in it."""
+        return self._names("group")
+
+    @property
+    def chains(self) -> tuple[tuple[str, str], ...]:
+        """Base and tip link of each chain."""
+        return tuple((member.base_link, member.tip_link) for member in self.members if member.kind == "chain")
+
+
+@dataclass(frozen=True, slots=True)
+class EndEffector:
+    """A gripper group fixed to a link of another group."""
+
+    name: str
+    group: str
+    parent_link: str
+    parent_group: str
+
+
+@dataclass(frozen=True, slots=True)
+class VirtualJoint:
+    """How the root of the robot is fixed to the world."""
+
+    name: str
+    kind: str
+    parent_frame: str
+    child_link: str
+
+
+@dataclass(frozen=True, slots=True)
+class SemanticDescription:
+    """Everything of an SRDF that the framework uses.
+
+    Attributes:
+        group_states: {group: {state: {joint: position}}} [rad or m].
+        touching_links: links that may touch anything by default (<disable_default_collisions>).
+        enabled_pairs: pairs that are checked all the same (<enable_collisions>).
+        disabled_pairs: pairs that may touch, and the reason the file gives (<disable_collisions>).
+    """
+
+    robot_name: str
+    groups: Mapping[str, GroupSpec] = field(default_factory=dict)
+    group_states: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
+    end_effectors: tuple[EndEffector, ...] = ()
+    virtual_joints: tuple[VirtualJoint, ...] = ()
+    passive_joints: frozenset[str] = frozenset()
+    touching_links: tuple[str, ...] = ()
+    enabled_pairs: frozenset[frozenset[str]] = frozenset()
+    disabled_pairs: Mapping[frozenset[str], str] = field(default_factory=dict)
+
+
+def read_srdf(text: str | bytes, where: str = "SRDF") -> SemanticDescription:
+    """Reads an SRDF.
+
+    Args:
+        text: the document.
+        where: file or parameter it comes from, for messages.
+
+    Raises:
+        XmlError: the text is not XML, has a DOCTYPE, an element lacks an attribute, or a position is no number.
+    """
+    return _Reader(where).read(xml_text.parse(text, where))
+
+
+class _Reader:
+    """Reads one document; `where` is what to call it in messages."""
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+
+    def read(self, root: Element) -> SemanticDescription:
+        need = self._need
+        return SemanticDescription(
+            robot_name=root.get("name", ""),
+            groups={spec.name: spec for spec in map(self._group, root.findall("group"))},
+            group_states=self._group_states(root),
+            end_effectors=tuple(
+                EndEffector(need(e, "name"), need(e, "group"), need(e, "parent_link"), e.get("parent_group", ""))
+                for e in root.findall("end_effector")),
+            virtual_joints=tuple(
+                VirtualJoint(need(e, "name"), need(e, "type"), need(e, "parent_frame"), need(e, "child_link"))
+                for e in root.findall("virtual_joint")),
+            passive_joints=frozenset(need(e, "name") for e in root.findall("passive_joint")),
+            touching_links=tuple(dict.fromkeys(
+                need(e, "link").strip() for e in root.findall("disable_default_collisions"))),
+            enabled_pairs=frozenset(map(self._pair, root.findall("enable_collisions"))),
+            disabled_pairs={self._pair(e): e.get("reason", "") for e in root.findall("disable_collisions")},
+        )
+
+    def _need(self, element: Element, attribute: str) -> str:
+        value = element.get(attribute)
+        if value is None:
+            raise XmlError(f"{self._where}:{element.sourceline}",
+                           f"<{element.tag}> {dict(element.attrib)} has no attribute '{attribute}'", "add it")
+        return str(value)
+
+    def _group(self, element: Element) -> GroupSpec:
+        return GroupSpec(self._need(element, "name"), tuple(
+            GroupMember("chain", "", self._need(item, "base_link"), self._need(item, "tip_link"))
+            if item.tag == "chain" else GroupMember(item.tag, self._need(item, "name"))
+            for item in element if item.tag in ("joint", "link", "chain", "group")))
+
+    def _group_states(self, root: Element) -> dict[str, dict[str, dict[str, float]]]:
+        states: dict[str, dict[str, dict[str, float]]] = {}
+        for element in root.findall("group_state"):
+            values = {self._need(item, "name"): self._position(item) for item in element.findall("joint")}
+            states.setdefault(self._need(element, "group"), {})[self._need(element, "name")] = values
+        return states
+
+    def _position(self, element: Element) -> float:
+        text = self._need(element, "value")
+        try:
+            return float(text.split()[0]) if text.strip() else math.nan
+        except ValueError as error:
+            raise XmlError(f"{self._where}:{element.sourceline}", "a group_state holds a value that is not a number "
+                           f"('{text}' for joint '{element.get('name')}')", "give a position in rad or m") from error
+
+    def _pair(self, element: Element) -> frozenset[str]:
+        return frozenset((self._need(element, "link1").strip(), self._need(element, "link2").strip()))

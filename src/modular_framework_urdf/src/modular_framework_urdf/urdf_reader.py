@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The one reader of URDF; every fault says its line.
+
+It is written here because the readers that others maintain do not read what the framework needs: urdf_parser_py keeps
+no lines and knows no capsule; urdfdom and Pinocchio leave out the transmissions.
+"""
+from __future__ import annotations
+
+import math
+
+from modular_framework_urdf import xml_text
+from modular_framework_urdf.mimics import Mimic
+from modular_framework_urdf.robot import (
+    Box,
+    Capsule,
+    Cylinder,
+    Joint,
+    Limit,
+    Link,
+    LocatedText,
+    MeshFile,
+    Origin,
+    PlacedShapes,
+    Robot,
+    SafetyController,
+    Shape,
+    Sphere,
+    Transmission,
+    TransmissionPart,
+    UnknownShape,
+    Vector,
+)
+from modular_framework_urdf.xml_text import Element, XmlError
+
+
+class AttributeFault(XmlError):
+    """An attribute of a description is not what it has to be.
+
+    Attributes:
+        tag: of the element that has the attribute.
+        owner: what the element belongs to: "joint 'elbow'".
+        key: name of the attribute.
+        text: its value.
+        expected: what is allowed.
+    """
+
+    def __init__(self, where: str, tag: str, owner: str, key: str, text: str, expected: str) -> None:
+        super().__init__(where, f"<{tag}> of {owner}: {key} is '{text}'",
+                         f"expected {expected}; correct the description")
+        self.tag, self.owner, self.key, self.text, self.expected = tag, owner, key, text, expected
+
+
+def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
+    """Reads a URDF, xacro already expanded.
+
+    Args:
+        text: the document.
+        where: file or parameter it comes from, for messages.
+
+    Raises:
+        AttributeFault: something is no number.
+        XmlError: not well-formed XML, or a DOCTYPE.
+    """
+    root = xml_text.parse(text, where)
+    return Robot(root.get("name", ""), tuple(_link(item, where) for item in root.findall("link")),
+                 tuple(_joint(item, where) for item in root.findall("joint")),
+                 tuple(map(_transmission, root.findall("transmission"))))
+
+
+class _Attributes:
+    """The attributes of an element, as numbers; without an element none is given."""
+
+    def __init__(self, element: Element | None, owner: str, where: str) -> None:
+        self._element, self._owner, self._where = element, owner, where
+
+    def text(self, key: str) -> str | None:
+        return None if self._element is None else self._element.get(key)
+
+    def optional(self, key: str) -> float | None:
+        text = self.text(key)
+        return None if text is None else self._numbers(key, text, 1, "a number")[0]
+
+    def number(self, key: str, default: float) -> float:
+        value = self.optional(key)
+        return default if value is None else value
+
+    def vector(self, key: str, default: Vector, *, finite: bool = True) -> Vector:
+        text = self.text(key)
+        if not (text or "").strip():
+            return default
+        x, y, z = self._numbers(key, text or "", 3, "three numbers")
+        if finite and not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+            raise self._fault(key, text or "", "three numbers")
+        return x, y, z
+
+    def _numbers(self, key: str, text: str, count: int, expected: str) -> list[float]:
+        try:
+            values = [float(word) for word in text.split()]
+        except ValueError:
+            values = []
+        if len(values) != count or any(map(math.isnan, values)):
+            raise self._fault(key, text, expected)
+        return values
+
+    def _fault(self, key: str, text: str, expected: str) -> AttributeFault:
+        element: Element = self._element
+        return AttributeFault(f"{self._where}:{element.sourceline}", element.tag, self._owner, key, text, expected)
+
+
+def _link(element: Element, where: str) -> Link:
+    name = element.get("name", "")
+
+    def placed(role: str) -> tuple[PlacedShapes, ...]:
+        owner = f"{role} shape of link '{name}'"
+        return tuple(PlacedShapes(tuple(_shape(shape, owner, where) for shape in item.findall("geometry/*")),
+                                  _origin(item, owner, where), item.sourceline) for item in element.findall(role))
+
+    return Link(name, placed("visual"), placed("collision"), element.sourceline)
+
+
+def _origin(element: Element, owner: str, where: str) -> Origin:
+    origin = _Attributes(element.find("origin"), owner, where)
+    return Origin(origin.vector("xyz", (0.0, 0.0, 0.0)), origin.vector("rpy", (0.0, 0.0, 0.0)))
+
+
+def _shape(element: Element, owner: str, where: str) -> Shape:
+    """A size that is not given is 1 m."""
+    attributes = _Attributes(element, owner, where)
+    match element.tag:
+        case "box":
+            return Box(attributes.vector("size", (1.0, 1.0, 1.0), finite=False))
+        case "sphere":
+            return Sphere(attributes.number("radius", 1.0))
+        case "cylinder":
+            return Cylinder(attributes.number("radius", 1.0), attributes.number("length", 1.0))
+        case "capsule":
+            return Capsule(attributes.number("radius", 1.0), attributes.number("length", 1.0))
+        case "mesh":
+            return MeshFile(element.get("filename", ""), attributes.vector("scale", (1.0, 1.0, 1.0)))
+        case tag:
+            return UnknownShape(tag)
+
+
+def _joint(element: Element, where: str) -> Joint:
+    name = element.get("name", "")
+
+    def inner(tag: str) -> _Attributes:
+        return _Attributes(element.find(tag), f"joint '{name}'", where)
+
+    limit, safety, mimic = inner("limit"), inner("safety_controller"), inner("mimic")
+    return Joint(
+        name, element.get("type", ""), inner("parent").text("link") or "", inner("child").text("link") or "",
+        _origin(element, f"joint '{name}'", where), inner("axis").vector("xyz", (1.0, 0.0, 0.0)),
+        None if element.find("limit") is None else Limit(
+            limit.number("lower", 0.0), limit.number("upper", 0.0), limit.optional("effort"),
+            limit.optional("velocity")),
+        None if element.find("safety_controller") is None else SafetyController(
+            *(safety.optional(key) for key in ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"))),
+        None if element.find("mimic") is None else Mimic(
+            mimic.text("joint") or "", mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)),
+        element.sourceline)
+
+
+def _transmission(element: Element) -> Transmission:
+    parts = {tag: tuple(_part(item) for item in element.findall(tag)) for tag in ("joint", "actuator")}
+    return Transmission(element.get("name", ""), (element.findtext("type") or "").strip(), parts["joint"],
+                        parts["actuator"], element.sourceline)
+
+
+def _part(element: Element) -> TransmissionPart:
+    return TransmissionPart(element.tag, element.get("name", ""), (element.findtext("role") or "").strip(),
+                            _text(element.find("mechanicalReduction")), _text(element.find("offset")),
+                            tuple(LocatedText((item.text or "").strip(), item.sourceline)
+                                  for item in element.findall("hardwareInterface")), element.sourceline)
+
+
+def _text(element: Element | None) -> LocatedText | None:
+    return None if element is None else LocatedText((element.text or "").strip(), element.sourceline)
