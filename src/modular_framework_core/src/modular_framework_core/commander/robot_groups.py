@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from modular_framework_urdf import xml_text
-
-MOVING_TYPES = ("revolute", "continuous", "prismatic")
+from modular_framework_urdf.robot import MOVABLE_KINDS
+from modular_framework_urdf.robot import Joint as UrdfJoint
+from modular_framework_urdf.srdf_reader import GroupSpec, read_srdf
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
 
 
 class RobotModelError(ValueError):
@@ -44,7 +46,7 @@ class Joint:
     @property
     def is_active(self) -> bool:
         """True when the joint moves and follows no other."""
-        return self.kind in MOVING_TYPES and not self.mimics
+        return self.kind in MOVABLE_KINDS and not self.mimics
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,22 +92,23 @@ def read_joints(urdf: str) -> dict[str, Joint]:
     Raises:
         RobotModelError: The text is no URDF.
     """
-    joints: dict[str, Joint] = {}
-    for element in _parse(urdf, "robot_description (URDF)").findall("joint"):
-        parent, child = element.find("parent"), element.find("child")
-        if parent is None or child is None:
-            continue
-        name, kind = element.get("name", ""), element.get("type", "")
-        limit, mimic = element.find("limit"), element.find("mimic")
-        bounded = limit is not None and kind != "continuous"
-        joints[name] = Joint(
-            name, kind, parent.get("link", ""), child.get("link", ""),
-            float(limit.get("lower", 0.0)) if limit is not None and bounded else -math.inf,
-            float(limit.get("upper", 0.0)) if limit is not None and bounded else math.inf,
-            float(limit.get("effort", math.inf)) if limit is not None else math.inf,
-            mimic.get("joint", "") if mimic is not None else "",
-            float(limit.get("velocity", math.inf)) if limit is not None else math.inf)
-    return joints
+    try:
+        robot = read_urdf(urdf, "robot_description (URDF)")
+    except XmlError as error:
+        raise _unreadable(error) from error
+    return {joint.name: _joint(joint) for joint in robot.joints if joint.parent and joint.child}
+
+
+def _joint(joint: UrdfJoint) -> Joint:
+    limit = joint.limit
+    bounded = limit is not None and joint.kind != "continuous"
+    return Joint(
+        joint.name, joint.kind, joint.parent, joint.child,
+        limit.lower if limit is not None and bounded else -math.inf,
+        limit.upper if limit is not None and bounded else math.inf,
+        math.inf if limit is None or limit.effort is None else limit.effort,
+        joint.mimic.leader if joint.mimic is not None else "",
+        math.inf if limit is None or limit.velocity is None else limit.velocity)
 
 
 def read_group(urdf: str, srdf: str, name: str) -> Group:
@@ -123,17 +126,17 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
         RobotModelError: A text cannot be read, or there is no such group, or the group names what is not there.
     """
     joints = read_joints(urdf)
-    root = _parse(srdf, "robot_description_semantic (SRDF)")
-    groups = {element.get("name", ""): element for element in root.findall("group")}
-    names, tip = _collect(name, groups, joints, ())
+    try:
+        semantics = read_srdf(srdf, "robot_description_semantic (SRDF)")
+    except XmlError as error:
+        raise _unreadable(error) from error
+    names, tip = _collect(name, semantics.groups, joints, ())
     active = [joints[joint] for joint in dict.fromkeys(names) if joints[joint].is_active]
-    states = {state.get("name", ""): {joint.get("name", ""): float(joint.get("value", "nan").split()[0])
-                                      for joint in state.findall("joint")}
-              for state in root.findall("group_state") if state.get("group") == name}
+    states = {state: dict(positions) for state, positions in semantics.group_states.get(name, {}).items()}
     return Group(name, tuple(active), tip, states)
 
 
-def _collect(name: str, groups: dict[str, ElementTree.Element], joints: dict[str, Joint],
+def _collect(name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint],
              above: tuple[str, ...]) -> tuple[list[str], str]:
     if name not in groups:
         raise RobotModelError(f"There is no planning group '{name}'; the SRDF has {sorted(groups)}.")
@@ -142,21 +145,21 @@ def _collect(name: str, groups: dict[str, ElementTree.Element], joints: dict[str
     by_child = {joint.child: joint for joint in joints.values()}
     names: list[str] = []
     tip = ""
-    for element in groups[name]:
-        match element.tag:
+    for member in groups[name].members:
+        match member.kind:
             case "chain":
-                tip = element.get("tip_link", "")
-                names += _chain(element.get("base_link", ""), tip, by_child)
+                tip = member.tip_link
+                names += _chain(member.base_link, tip, by_child)
             case "joint":
-                joint = element.get("name", "")
-                if joint not in joints:
-                    raise RobotModelError(f"Planning group '{name}' names the joint '{joint}', which the URDF lacks.")
-                names.append(joint)
+                if member.name not in joints:
+                    raise RobotModelError(f"Planning group '{name}' names the joint '{member.name}', which the URDF "
+                                          "lacks.")
+                names.append(member.name)
             case "link":
-                parent = by_child.get(element.get("name", ""))
+                parent = by_child.get(member.name)
                 names += [parent.name] if parent is not None else []
             case "group":
-                inner, inner_tip = _collect(element.get("name", ""), groups, joints, (*above, name))
+                inner, inner_tip = _collect(member.name, groups, joints, (*above, name))
                 names += inner
                 tip = tip or inner_tip
     return names, tip
@@ -174,8 +177,5 @@ def _chain(base: str, tip: str, by_child: dict[str, Joint]) -> list[str]:
     return names[::-1]
 
 
-def _parse(text: str, what: str) -> ElementTree.Element:
-    try:
-        return xml_text.parse(text, what)
-    except xml_text.XmlError as error:
-        raise RobotModelError(f"{error}. Check the launch file that loads it.") from error
+def _unreadable(error: XmlError) -> RobotModelError:
+    return RobotModelError(f"{error}. Check the launch file that loads it.")

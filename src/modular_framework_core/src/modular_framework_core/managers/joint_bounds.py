@@ -8,7 +8,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from modular_framework_core.files.faults import nearest
-from modular_framework_urdf import xml_text
+from modular_framework_urdf.urdf_reader import read_urdf
 
 Bounds = tuple[float, float]
 TOLERANCE = 1e-6  # [rad or m]; numbers rounded in a file may end just outside
@@ -19,17 +19,15 @@ def bounds_from_urdf(text: str) -> Mapping[str, Bounds]:
     """Returns (lower, upper) [rad or m] of every joint that moves; a continuous joint has no bounds.
 
     Raises:
-        ValueError: The text is no XML, or has a DOCTYPE.
+        ValueError: The text is no XML, has a DOCTYPE, or a limit is no number.
     """
-    root = xml_text.parse(text, "robot_description")
     bounds: dict[str, Bounds] = {}
-    for joint in root.findall("joint"):
-        limit = joint.find("limit")
-        match joint.get("type"):
-            case "revolute" | "prismatic" if limit is not None:
-                bounds[str(joint.get("name"))] = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
+    for joint in read_urdf(text).joints:
+        match joint.kind:
+            case "revolute" | "prismatic" if joint.limit is not None:
+                bounds[joint.name] = joint.limit.lower, joint.limit.upper
             case "continuous":
-                bounds[str(joint.get("name"))] = -math.inf, math.inf
+                bounds[joint.name] = -math.inf, math.inf
     return MappingProxyType(bounds)
 
 

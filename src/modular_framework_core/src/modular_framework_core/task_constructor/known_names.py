@@ -11,7 +11,7 @@ import yaml
 
 from modular_framework_core.files import default_folders, shallow_yaml
 from modular_framework_core.files.whole_files import read_whole
-from modular_framework_urdf import xml_text
+from modular_framework_urdf.srdf_reader import read_srdf
 
 _FILES = {"joint_state": "named_joint_states.yaml", "trajectory": "named_trajectories.yaml", "pose": "named_poses.yaml"}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
@@ -46,14 +46,13 @@ class KnownNames:
             origin: where it comes from, for messages.
 
         Raises:
-            ValueError: the text is no XML, or has a DOCTYPE.
+            ValueError: the text cannot be read as SRDF.
         """
-        robot = xml_text.parse(srdf, origin)
-        groups = frozenset(item.get("name", "") for item in robot.findall("group"))
+        robot = read_srdf(srdf, origin)
+        groups = frozenset(robot.groups)
         names, origins = {**self.names, "group": groups}, {**self.origins, "group": origin}
         if self.manipulator_group in groups:
-            names["posture"] = frozenset(item.get("name", "") for item in robot.findall("group_state")
-                                         if item.get("group") == self.manipulator_group)
+            names["posture"] = frozenset(robot.group_states.get(self.manipulator_group, {}))
             origins["posture"] = f"group '{self.manipulator_group}' of {origin}"
         return KnownNames(names, origins, self.manipulator_group)
 
