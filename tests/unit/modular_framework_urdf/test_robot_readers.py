@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from modular_framework_urdf.mesh_uri import MeshUriError, mesh_path
 from modular_framework_urdf.mimics import Mimic
 from modular_framework_urdf.robot import (
     Box,
@@ -104,14 +102,3 @@ def test_a_fault_of_an_srdf_says_its_line(found: str, wrong: str, fault: str) ->
     with pytest.raises(XmlError) as caught:
         read_srdf(SRDF.replace(found, wrong))
     assert str(caught.value).startswith(fault)
-
-
-def test_the_file_of_a_mesh_is_found_or_the_reason_said(tmp_path: Path) -> None:
-    (tmp_path / "a.stl").touch()
-    for uri in ("package://p/a.stl", f"file://{tmp_path}/a.stl", f"{tmp_path}/a.stl"):
-        assert mesh_path(uri, lambda _: str(tmp_path)) == tmp_path / "a.stl"
-    for uri, fault in (("http://a.stl", "got 'http://a.stl'; allowed: package://"), ("package://q/b.stl", "not exist")):
-        with pytest.raises(MeshUriError, match=fault):
-            mesh_path(uri, lambda _: str(tmp_path))
-    with pytest.raises(MeshUriError, match=r"package 'q' is not found .*; install it"):
-        mesh_path("package://q/a.stl", {}.__getitem__)
