@@ -14,7 +14,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 
 NAP_S = 0.001
 LATE_S = 0.001
@@ -42,25 +41,16 @@ class Witnesses:
         return None if None in told else [[(begin_s, end_s) for begin_s, end_s in spans] for spans in told]
 
 
-def cycles_without_processor(taken: Sequence[Spans], period_s: float) -> int:
-    """How many cycles of a loop all processors were away for, at most.
+def cycles_without_processor(spans: Spans, period_s: float) -> int:
+    """Returns how many cycles of a loop a processor was away for, at most.
 
-    That is how many a loop loses when one is due as they go; due later, it may lose one less.
+    That is how many a loop loses when one is due as it goes; due later, it may lose one less.
 
     Args:
-        taken: when each processor was away [s].
+        spans: when the processor was away [s].
         period_s: of the loop [s].
     """
-    away = taken[0]
-    for spans in taken[1:]:
-        away = common(away, spans)
-    return sum(math.floor((end_s - begin_s) / period_s) for begin_s, end_s in away)
-
-
-def common(one: Spans, other: Spans) -> Spans:
-    """Where spans of both overlap."""
-    overlaps = ((max(a[0], b[0]), min(a[1], b[1])) for a in one for b in other)
-    return [(begin_s, end_s) for begin_s, end_s in overlaps if begin_s < end_s]
+    return sum(math.floor((end_s - begin_s) / period_s) for begin_s, end_s in spans)
 
 
 def longest_s(spans: Spans) -> float:

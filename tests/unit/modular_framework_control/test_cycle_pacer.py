@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import os
 import threading
-import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -49,7 +48,7 @@ def test_cycles_begin_at_multiples_of_the_period_and_what_is_left_out_is_counted
         clock.now_s += work_s[len(begun) - 1]
         return len(begun) < len(work_s)
 
-    CyclePacer(0.01, None, clock, clock.sleep).run(cycle)
+    CyclePacer(0.01, clock, clock.sleep).run(cycle)
     assert len(begun) == len(work_s) and begun[0] == (5.0, 0.0, 0)
     beats = 0
     for begun_s, late_s, missed in begun:
@@ -69,116 +68,50 @@ def test_a_cycle_that_takes_longer_is_made_up_for_when_the_next_ones_are_short()
         clock.now_s += work_s[len(begun) - 1]
         return len(begun) < len(work_s)
 
-    CyclePacer(0.01, None, clock, clock.sleep).run(cycle)
+    CyclePacer(0.01, clock, clock.sleep).run(cycle)
     assert begun == [(0.0, 0), (0.0, 0), (4.0, 0), (0.0, 0), (25.0, 2), (0.0, 0)]
 
 
-PROCESSORS = (max(os.sched_getaffinity(0)),) * 2
-"""The loop's and the stand-in's; they are told apart by their threads, so these tests run on one processor too."""
-
-
-class Loop:
-    """A loop of 5 ms with its stand-in; who is asleep when `taken_away` is set sleeps on until `given_back`."""
-
-    def __init__(self, cycles: int) -> None:
-        self.begun: list[tuple[str, float, int]] = []
-        self.in_cycle = 0
-        self.overlapped = False
-        self.taken_away = {"loop": threading.Event(), "stand_in": threading.Event()}
-        self.given_back = threading.Event()
-        self._cycles = cycles
-        self.pacer = CyclePacer(0.005, PROCESSORS, sleep=self._sleep)
-
-    @staticmethod
-    def who() -> str:
-        return "stand_in" if threading.current_thread().name == "stand_in" else "loop"
-
-    def _sleep(self, duration_s: float) -> None:
-        time.sleep(duration_s)
-        if self.taken_away[self.who()].is_set():
-            assert self.given_back.wait(10.0)
-
-    def cycle(self, late_s: float, missed: int) -> bool:
-        self.in_cycle += 1
-        self.overlapped |= self.in_cycle > 1
-        self.begun.append((self.who(), late_s, missed))
-        time.sleep(0.0005)
-        self.in_cycle -= 1
-        return len(self.begun) < self._cycles
-
-
-def test_the_stand_in_runs_the_cycles_while_the_processor_of_the_loop_is_taken_away() -> None:
-    loop = Loop(120)
+def test_what_a_cycle_raises_ends_the_loop_and_is_raised_by_run() -> None:
+    clock = Clock()
+    begun: list[float] = []
 
     def cycle(late_s: float, missed: int) -> bool:
-        goes_on = loop.cycle(late_s, missed)
-        if len(loop.begun) == 20:
-            loop.taken_away["loop"].set()
-        if len(loop.begun) == 70:
-            loop.taken_away["loop"].clear()
-            loop.given_back.set()
-        return goes_on
-
-    allowed = os.sched_getaffinity(0)
-    loop.pacer.run(cycle)
-    assert {who for who, _, _ in loop.begun[25:70]} == {"stand_in"}
-    assert any(who == "loop" for who, _, _ in loop.begun[75:]), "it takes over again"
-    assert len(loop.begun) == 120 and not loop.overlapped
-    assert os.sched_getaffinity(0) == allowed, "only the loop is bound to a processor"
-
-
-def test_no_cycle_is_run_twice_or_beside_another() -> None:
-    loop = Loop(200)
-    begun_s = time.monotonic()
-    loop.pacer.run(loop.cycle)
-    beats = sum(1 + missed for _, _, missed in loop.begun)
-    assert not loop.overlapped and len(loop.begun) == 200
-    assert (beats - 1) * 0.005 <= time.monotonic() - begun_s
-
-
-@pytest.mark.parametrize("who", ["loop", "stand_in"])
-def test_what_a_cycle_raises_ends_both_and_is_raised_by_run(who: str) -> None:
-    loop = Loop(1000)
-    other = "stand_in" if who == "loop" else "loop"
-
-    def cycle(late_s: float, missed: int) -> bool:
-        loop.cycle(late_s, missed)
-        if len(loop.begun) == 5:
-            loop.taken_away[other].set()
-        if len(loop.begun) > 10 and loop.who() == who:
-            loop.given_back.set()
+        del missed
+        begun.append(late_s)
+        if len(begun) > 10:
             raise RuntimeError("the arm is on fire")
         return True
 
     with pytest.raises(RuntimeError, match="on fire"):
-        loop.pacer.run(cycle)
-    assert not any(thread.name == "stand_in" for thread in threading.enumerate())
+        CyclePacer(0.01, clock, clock.sleep).run(cycle)
+    assert len(begun) == 11
 
 
-def test_a_loop_that_is_broken_off_ends_its_stand_in_after_the_cycle_under_way() -> None:
-    begun: list[str] = []
-    in_cycle = threading.Event()
-
-    def sleep(duration_s: float) -> None:
-        if Loop.who() == "loop" and len(begun) > 3:
-            assert in_cycle.wait(10.0)
-            raise KeyboardInterrupt
-        time.sleep(duration_s)
+def test_a_late_start_after_sleep_counts_as_no_processor_and_one_after_long_work_does_not() -> None:
+    clock = Clock()
+    statistics = LoopStatistics(0.01)
+    pacer = CyclePacer(0.01, clock, clock.sleep)
+    cycles = 0
 
     def cycle(late_s: float, missed: int) -> bool:
-        begun.append(Loop.who())
-        if len(begun) > 5:
-            in_cycle.set()
-            time.sleep(0.05)
-        return len(begun) < 300
+        nonlocal cycles
+        cycles += 1
+        work_s = 0.014 if cycles == 2 else 0.002
+        clock.now_s += work_s
+        clock.oversleep_s = {4: 0.0005, 5: 0.025}.get(cycles, 0.0)
+        statistics.add(late_s, missed, work_s, pacer.woken_late_s)
+        return cycles < 8
 
-    with pytest.raises(KeyboardInterrupt):
-        CyclePacer(0.005, PROCESSORS, sleep=sleep).run(cycle)
-    assert len(begun) < 20
-    assert not any(thread.name == "stand_in" for thread in threading.enumerate())
+    pacer.run(cycle)
+    figures = statistics.figures()
+    assert (figures.overruns, figures.missed) == (1, 2)
+    assert figures.no_processor_s == figures.no_processor_max_s == pytest.approx(0.025)
+    statistics.reset()
+    assert statistics.figures().no_processor_max_s == 0.0
 
 
-def test_a_wish_that_processors_stay_awake_is_held_and_a_refusal_is_said(tmp_path: Path,
+def test_a_request_that_processors_stay_awake_is_held_and_a_refusal_is_said(tmp_path: Path,
                                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     device = tmp_path / "latency"
     monkeypatch.setattr(real_time, "_LATENCY_DEVICE", str(device))
@@ -188,16 +121,6 @@ def test_a_wish_that_processors_stay_awake_is_held_and_a_refusal_is_said(tmp_pat
     held = [link for link in Path("/proc/self/fd").iterdir() if os.path.realpath(link) == str(device)]
     assert device.read_bytes() == bytes(4) and len(held) == 1
     os.close(int(held[0].name))
-
-
-@pytest.mark.parametrize(("allowed", "policy", "chosen"), [
-    ({3}, os.SCHED_FIFO, None), ({0, 1}, os.SCHED_FIFO, (1, 0)), ({0, 2, 5, 7}, os.SCHED_FIFO, (7, 5)),
-    ({0, 2, 5, 7}, os.SCHED_OTHER, None)])
-def test_an_urgent_loop_and_its_stand_in_take_the_last_processors_allowed(
-        allowed: set[int], policy: int, chosen: tuple[int, int] | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: allowed)
-    monkeypatch.setattr(os, "sched_getscheduler", lambda process: policy)
-    assert real_time.processors_for_loop() == chosen
 
 
 @given(st.lists(st.floats(0.0, 0.019), min_size=1, max_size=300))

@@ -2,9 +2,9 @@
 """What every controller is: a class made without arguments that is initialised, started, updated and stopped.
 
 `init` runs on a thread that may wait; `waiting`, `starting`, `update`, `stopping`, `aborting` and `failed` run in the
-control loop and must not block. The loop calls them from either of two threads, one at a time; what is started there
-inherits the processor and the priority of the loop, so start threads and processes in `init`. All time a controller
-knows is the time it is given there, so that it behaves alike under simulated and real time.
+control loop and must not block. What is started there inherits the priority of the loop, so start threads and processes
+in `init`. All time a controller knows is the time it is given there, so that it behaves alike under simulated and real
+time.
 """
 from __future__ import annotations
 

@@ -59,18 +59,6 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     return refused
 
 
-def processors_for_loop() -> tuple[int, int] | None:
-    """The processors for a control loop and its stand-in: the last two that this process may use, None if it has one.
-
-    The first ones serve most interrupts; `taskset` and `isolcpus` decide which may be used at all. A loop that does not
-    go before all others (SCHED_FIFO) is better off where the system puts it: None as well.
-    """
-    allowed = sorted(os.sched_getaffinity(0))
-    if len(allowed) < 2 or os.sched_getscheduler(0) != os.SCHED_FIFO:
-        return None
-    return allowed[-1], allowed[-2]
-
-
 def keep_processors_awake() -> list[str]:
     """Keep idle processors from sleep they take time to wake from, as long as this process lives (it costs power).
 
@@ -78,7 +66,7 @@ def keep_processors_awake() -> list[str]:
         What was not permitted and why; nothing when all was.
     """
     try:
-        device = os.open(_LATENCY_DEVICE, os.O_WRONLY | os.O_CLOEXEC)   # the wish holds as long as it is open
+        device = os.open(_LATENCY_DEVICE, os.O_WRONLY | os.O_CLOEXEC)   # the request holds as long as it is open
         os.write(device, (0).to_bytes(4, sys.byteorder))
     except OSError as error:
         return [f"idle processors kept awake ({_LATENCY_DEVICE}: {error.strerror}; allow to write it with a rule of "

@@ -55,8 +55,7 @@ class RobotHW:
 
     `init`, `close`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `fault`,
     `do_switch` and `switch_result` run in the control loop and must neither block nor raise for an expected condition.
-    The loop calls them from either of two threads, one at a time; what is started there inherits the processor and the
-    priority of the loop, so start threads and processes in `init`.
+    What is started there inherits the priority of the loop, so start threads and processes in `init`.
     """
 
     announces_ready: ClassVar[bool] = False

@@ -5,7 +5,7 @@ Subclass `RobotHWConformance` in a test module under a name that begins with Tes
 pytest finds the rest. Hardware that takes long to make may be handed out again by `make_robot_hw`, unless
 `close_after_test` is True.
 
-What belongs into the control loop is called from either of two threads in turn, one at a time, as the loop does.
+What belongs to the control loop is called from a thread of its own, as the loop does.
 """
 from __future__ import annotations
 
@@ -73,20 +73,18 @@ class RobotHWConformance(ABC):
         self._made: list[RobotHW] = []
         self._time_s = 0.0
         self._read_s = math.nan
-        self._loops = [ThreadPoolExecutor(1, "loop"), ThreadPoolExecutor(1, "stand-in")]
+        self._loop = ThreadPoolExecutor(1, "loop")
 
     def teardown_method(self) -> None:
         """Called by pytest after each test."""
-        for loop in self._loops:
-            loop.shutdown()
+        self._loop.shutdown()
         if self.close_after_test:
             for robot_hw in self._made:
                 robot_hw.close()
 
     def _in_loop(self, call: Callable[..., ResultT], *arguments: Any) -> ResultT:
-        """Calls in the other one of the loop's threads than the last time; returns what it returns."""
-        self._loops.reverse()
-        return self._loops[0].submit(call, *arguments).result()
+        """Calls in the thread of the loop; returns what it returns."""
+        return self._loop.submit(call, *arguments).result()
 
     def _read(self, robot_hw: RobotHW) -> None:
         self._in_loop(robot_hw.read, self._time_s, self.period_s)

@@ -23,7 +23,8 @@ class LoopReport:
 
     The status is a warning when cycles were late since the last one, an error when the hardware has a fault. Values:
     `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
-    `work_max_us`, `fault`.
+    `work_max_us`, `no_processor_us` (for how long in all the loop was to run and had no processor),
+    `no_processor_max_us` (the longest such time), `fault`.
 
     Args:
         statistics: figures that the loop writes.
@@ -74,14 +75,17 @@ class LoopReport:
         if news:
             rospy.logwarn_throttle(OVERRUN_WARNING_PERIOD_S,
                                    f"control loop at {text}; the longest took {figures.work_max_s * 1e3:.1f} ms, its "
-                                   f"period is {self._period_s * 1e3:.1f} ms")
+                                   f"period is {self._period_s * 1e3:.1f} ms; it was without a processor for "
+                                   f"{figures.no_processor_max_s * 1e3:.1f} ms at most")
         status = DiagnosticStatus(name=f"{rospy.get_name().lstrip('/')}: control loop", hardware_id=self._hardware,
                                   message=f"hardware fault: {fault}; {text}" if fault else text)
         status.level = DiagnosticStatus.ERROR if fault else DiagnosticStatus.WARN if news else DiagnosticStatus.OK
         values = {"rate": 1.0 / self._period_s, "cycles": figures.cycles, "missed": figures.missed,
                   "overruns": figures.overruns, "late_p50_us": figures.late_p50_s * 1e6,
                   "late_p99_us": figures.late_p99_s * 1e6, "late_max_us": figures.late_max_s * 1e6,
-                  "work_mean_us": figures.work_mean_s * 1e6, "work_max_us": figures.work_max_s * 1e6}
+                  "work_mean_us": figures.work_mean_s * 1e6, "work_max_us": figures.work_max_s * 1e6,
+                  "no_processor_us": figures.no_processor_s * 1e6,
+                  "no_processor_max_us": figures.no_processor_max_s * 1e6}
         status.values = [KeyValue(key, f"{value:.10g}") for key, value in values.items()] + [KeyValue("fault", fault)]
         message = DiagnosticArray(status=[status])
         message.header.stamp = rospy.Time.now()

@@ -18,7 +18,6 @@ from modular_framework_control.plugins import PluginError
 from modular_framework_control.real_time import (
     keep_processors_awake,
     prepare_interpreter,
-    processors_for_loop,
     run_in_real_time,
 )
 from modular_framework_control.robot_hw import RobotHW
@@ -125,9 +124,9 @@ class RobotHwNode:
             raise RuntimeError("connect() comes before run()")
         starter = threading.Thread(target=self._get_ready, args=(self._manager,), name="get_ready", daemon=True)
         starter.start()
-        processors = self._prepare()
+        self._prepare()
         try:
-            self._loop(self._manager, processors)
+            self._loop(self._manager)
         except Exception as error:  # a user's hardware may raise anything
             self._failure = f"hardware {type(self._robot_hw).__name__} raised {type(error).__name__}: {error}"
             rospy.logfatal("control loop ends: %s\n%s", self._failure, traceback.format_exc())
@@ -135,30 +134,31 @@ class RobotHwNode:
             self._end(self._manager, starter)
         return not self._failure
 
-    def _prepare(self) -> tuple[int, int] | None:
-        """Ask the system for what the loop needs; answers the processors for it and its stand-in, if it has one."""
+    def _prepare(self) -> None:
+        """Asks the system for what the loop needs."""
         prepare_interpreter()
         if not self._real_time:
-            return None
+            return
         refused = run_in_real_time() + keep_processors_awake()
         if refused:
             rospy.logwarn("control loop without: %s", "; ".join(refused))
-        return processors_for_loop()
 
-    def _loop(self, manager: RosControllerManager, processors: tuple[int, int] | None) -> None:
+    def _loop(self, manager: RosControllerManager) -> None:
         if not self._goes_on():
             return
         if rospy.rostime.is_wallclock():
             self._last_s = self._loop_time.now()
-            CyclePacer(self._period_s, processors).run(
-                lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed))
+            pacer = CyclePacer(self._period_s)
+            pacer.run(lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed,
+                                                         pacer.woken_late_s))
             return
         self._last_s = rospy.get_time()
         while self._cycle(manager, rospy.get_time(), 0.0, 0):   # how late it is, is not known
             self._wait_for_simulated_clock()
 
-    def _cycle(self, manager: RosControllerManager, time_s: float, late_s: float, missed: int) -> bool:
-        """Read, update, write; answers whether the loop goes on."""
+    def _cycle(self, manager: RosControllerManager, time_s: float, late_s: float, missed: int,
+               woken_late_s: float = 0.0) -> bool:
+        """Reads, updates, writes; returns whether the loop goes on."""
         begun_s = time.perf_counter()
         period_s = max(0.0, time_s - self._last_s)
         self._last_s = time_s
@@ -166,7 +166,7 @@ class RobotHwNode:
         if self._connected.is_set():
             manager.update(time_s, period_s)
         self._robot_hw.write(time_s, period_s)
-        self._statistics.add(late_s, missed, time.perf_counter() - begun_s)
+        self._statistics.add(late_s, missed, time.perf_counter() - begun_s, woken_late_s)
         return self._goes_on()
 
     def _goes_on(self) -> bool:
