@@ -15,16 +15,16 @@ import numpy as np
 import rospkg
 from xacro_rospkg import expand
 
-from modular_framework_control.controller import Controller
-from modular_framework_control.controller_manager import ControllerManager
-from modular_framework_control.goal_ticket import GoalStatus
-from modular_framework_control.hardware_interface import COMMAND_INTERFACES
-from modular_framework_control.joint_trajectory_controller import JointTrajectoryController
-from modular_framework_control.loop_time import LoopTime
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.real_time import run_in_real_time
-from modular_framework_control.robot_hw import RobotHW
-from modular_framework_control.trajectory_goal import GoalRejectedError, TrajectoryGoal, TrajectoryTicket
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.controller_manager.controller_manager import ControllerManager
+from modular_framework_control.controllers.joint_trajectory_controller import JointTrajectoryController
+from modular_framework_control.hardware_interface.interfaces import COMMAND_INTERFACES
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.realtime.goal_handle import GoalStatus
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.realtime.scheduling import run_in_real_time
+from modular_framework_control.trajectory.trajectory_goal import GoalRejectedError, TrajectoryGoal, TrajectoryGoalHandle
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
@@ -128,14 +128,14 @@ class Rig:
         self.positions = np.array([handle.position for handle in self._handles])
         self.velocities = np.array([handle.velocity for handle in self._handles])
 
-    def submit(self, goal: TrajectoryGoal, by_topic: bool = False) -> TrajectoryTicket:
-        """Send a goal; one that is refused at once ends as rejected. A command has a ticket that nobody works on."""
-        ticket: TrajectoryTicket = TrajectoryTicket()
+    def submit(self, goal: TrajectoryGoal, by_topic: bool = False) -> TrajectoryGoalHandle:
+        """Send a goal; one that is refused at once ends as rejected. A command has an unused goal handle."""
+        goal_handle: TrajectoryGoalHandle = TrajectoryGoalHandle()
         try:
-            self.controllers[self.running].submit(goal, None if by_topic else ticket)
+            self.controllers[self.running].submit(goal, None if by_topic else goal_handle)
         except GoalRejectedError as error:
-            ticket.finish(GoalStatus.REJECTED, error.code, str(error))
-        return ticket
+            goal_handle.finish(GoalStatus.REJECTED, error.code, str(error))
+        return goal_handle
 
     def switch(self, start: list[str], stop: list[str]) -> None:
         """Switch controllers while the loop runs."""

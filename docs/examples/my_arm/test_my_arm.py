@@ -6,8 +6,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from modular_framework_control.joint_limits import JointLimits
-from modular_framework_control.robot_hw_conformance import RobotHWConformance
+from modular_framework_control.hardware_interface.joint_limits import JointLimits
+from modular_framework_control.hardware_interface.robot_hw_conformance import RobotHWConformance
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 sys.path.insert(0, str(Path(__file__).parent / "src"))

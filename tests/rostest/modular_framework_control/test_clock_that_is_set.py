@@ -17,8 +17,8 @@ from ros_session import until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from modular_framework_control.loop_time import LoopTime
-from modular_framework_control.ros_robot_hw import RobotHwNode
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.ros.robot_hw_node import RobotHwNode
 
 HOUR_S = 3600.0
 

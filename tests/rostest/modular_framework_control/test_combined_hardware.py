@@ -19,7 +19,7 @@ import time
 
 import rospy
 from std_msgs.msg import Bool
-from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 
 class LabGripper(MockRobotHW):
     announces_ready = True

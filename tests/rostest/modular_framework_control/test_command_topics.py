@@ -16,8 +16,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 MODULE = """
-from modular_framework_control.controller import Controller
-from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
 
 class Nodder(Controller):
     interface_class = PositionJointInterface

@@ -28,8 +28,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 MODULE = """
 import rospy
 from std_msgs.msg import String
-from modular_framework_control.hardware_interface import ForceTorqueSensorHandle, ForceTorqueSensorInterface
-from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.interfaces import ForceTorqueSensorHandle, ForceTorqueSensorInterface
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 
 class LabArm(MockRobotHW):
     announces_ready = True

@@ -15,9 +15,9 @@ from std_msgs.msg import Float64MultiArray
 
 MODULE = '''
 import math
-from modular_framework_control.joint_limits import JointLimitGuard
-from modular_framework_control.robot_hw import RobotHW
-from modular_framework_control.robot_transmissions import RobotTransmissions
+from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_transmissions import RobotTransmissions
 
 class Motors(RobotHW):
     def init(self, root_nh, robot_hw_nh):

@@ -12,7 +12,7 @@ import pytest
 import rospy
 from controller_manager_msgs.srv import ListControllers, SwitchController, SwitchControllerResponse
 
-from modular_framework_control.robot_hw import SwitchState
+from modular_framework_control.hardware_interface.robot_hw import SwitchState
 
 sys.path.insert(0, str(Path(__file__).parent))
 from stepped_robot import WAIT_S, SteppedRobot  # noqa: E402

@@ -57,7 +57,7 @@ class Gripper:
     def _on_joint_state(self, message: JointState) -> None:
         self.joint_state = message
 
-    def order(self, command: str, **arguments: object) -> str:
+    def command(self, command: str, **arguments: object) -> str:
         return send_command(self.command_port, command, **arguments)
 
     def send(self, stage: int, grasp: StandardisedGrasp, max_torque: float = 400.0) -> list[JointState]:
@@ -90,9 +90,9 @@ def running(ros_launch, tmp_path_factory: pytest.TempPathFactory) -> Gripper:
 @pytest.fixture
 def gripper(running: Gripper) -> Gripper:
     """The gripper, well, empty and at 0.4 rad."""
-    for order in ("plug", "clear", "no_object"):
-        running.order(order)
-    running.order("heat", celsius=30)
+    for command in ("plug", "clear", "no_object"):
+        running.command(command)
+    running.command("heat", celsius=30)
     until(lambda: running.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
           "a pregrasp without a fault")
     return running
@@ -108,7 +108,7 @@ def test_a_pregrasp_is_reached_and_watched(gripper: Gripper) -> None:
 
 
 def test_an_object_is_grasped_held_and_let_go(gripper: Gripper) -> None:
-    gripper.order("object", position=1.2)
+    gripper.command("object", position=1.2)
     state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
     until(lambda: gripper.joint_state.position[0] == pytest.approx(1.2, abs=0.05), "the fingers at the object")
@@ -120,7 +120,7 @@ def test_an_object_is_grasped_held_and_let_go(gripper: Gripper) -> None:
 
 
 def test_max_torque_and_intensity_bound_the_torque(gripper: Gripper) -> None:
-    gripper.order("object", position=1.2)
+    gripper.command("object", position=1.2)
     gripper.run(GraspCommand.GRASP_STATE, grasp(intensity=1.0), max_torque=200.0)
     until(lambda: gripper.joint_state.effort[0] == pytest.approx(200 / 1023, abs=0.01), "the torque that was allowed")
 
@@ -132,7 +132,7 @@ def test_closing_on_nothing_is_no_grasp(gripper: Gripper) -> None:
 
 
 def test_a_blocked_pregrasp_is_a_failure(gripper: Gripper) -> None:
-    gripper.order("object", position=0.8)
+    gripper.command("object", position=0.8)
     state, flags, text, _ = gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.5))
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
     assert f"joint '{JOINT}' is " in text
@@ -149,7 +149,7 @@ def test_fingers_that_their_torque_cannot_move_have_grasped_nothing(gripper: Gri
 
 
 def test_fingers_that_touch_an_object_from_the_beginning_grasp_it(gripper: Gripper) -> None:
-    gripper.order("object", position=0.41)
+    gripper.command("object", position=0.41)
     state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
 
@@ -186,7 +186,7 @@ def test_a_cancel_stops_the_servo(gripper: Gripper) -> None:
 
 def opening_and_speed(gripper: Gripper) -> tuple[int, int]:
     """Of the emulated servo [ticks, ticks/s]; the fingers' whole travel are 2560 ticks."""
-    found = re.search(r"opening=(-?\d+) speed=(-?\d+)", gripper.order("state"))
+    found = re.search(r"opening=(-?\d+) speed=(-?\d+)", gripper.command("state"))
     assert found is not None
     return int(found[1]), int(found[2])
 
@@ -207,21 +207,21 @@ def test_a_fault_under_way_ends_the_goal_with_the_reason_and_the_next_one_works(
                                                                                  text: str) -> None:
     gripper.send(GraspCommand.GRASP_STATE, grasp(intensity=0.2))
     until(lambda: gripper.joint_state.position[0] > 0.5, "closing fingers")
-    gripper.order(fault)
+    gripper.command(fault)
     assert gripper.client.wait_for_result(rospy.Duration(30))
     assert gripper.client.get_state() == GoalStatus.ABORTED
     assert re.search(text, gripper.client.get_goal_status_text()), gripper.client.get_goal_status_text()
     assert not gripper.client.get_result().grasped.data
-    gripper.order("plug")
+    gripper.command("plug")
     until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
           "a pregrasp after the fault")
 
 
 def test_a_hot_motor_refuses_goals_until_it_has_cooled(gripper: Gripper) -> None:
-    gripper.order("heat", celsius=85)
+    gripper.command("heat", celsius=85)
     until(lambda: "too hot (8" in gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[2],
           "the refusal of a hot motor")
-    gripper.order("heat", celsius=40)
+    gripper.command("heat", celsius=40)
     until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[0] == GoalStatus.SUCCEEDED,
           "a pregrasp of the cooled motor")
 
@@ -233,10 +233,10 @@ def test_orders_without_arguments_are_services_too(gripper: Gripper) -> None:
 
 
 def test_joint_states_stop_while_the_gripper_is_out_of_reach(gripper: Gripper) -> None:
-    gripper.order("unplug")
+    gripper.command("unplug")
     time.sleep(1.0)
     last = gripper.joint_state.header.stamp
     time.sleep(0.3)
     assert gripper.joint_state.header.stamp == last
-    gripper.order("plug")
+    gripper.command("plug")
     until(lambda: gripper.joint_state.header.stamp > last, "joint states again")

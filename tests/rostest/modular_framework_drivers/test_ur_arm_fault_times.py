@@ -19,7 +19,7 @@ def arm(ros_launch: Callable[..., Any]) -> Arm:
     return launched_arm(ros_launch)
 
 
-def told_after_s(arm: Arm, order: str, reason: str) -> float:
+def told_after_s(arm: Arm, command: str, reason: str) -> float:
     """Cause a fault in the midst of a motion; returns how long after it the client has the result [s].
 
     The arm must be standing soon after, and it must not move when the fault is over.
@@ -27,7 +27,7 @@ def told_after_s(arm: Arm, order: str, reason: str) -> float:
     done = arm.send([position + 0.2 for position in arm.true_positions()], 2.0)
     time.sleep(0.7)
     begun_s = time.monotonic()
-    arm.order(order)
+    arm.command(command)
     assert done.wait(10.0)
     told_s = time.monotonic() - begun_s
     assert arm.client.get_state() == GoalStatus.ABORTED
@@ -42,12 +42,12 @@ def told_after_s(arm: Arm, order: str, reason: str) -> float:
     return told_s
 
 
-@pytest.mark.parametrize(("order", "reason"), [
+@pytest.mark.parametrize(("command", "reason"), [
     ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
     ("cut", "link to the arm"), ("freeze", "link to the arm")])
-def test_a_client_is_told_of_a_fault_within_a_fifth_of_a_second(arm: Arm, order: str, reason: str) -> None:
+def test_a_client_is_told_of_a_fault_within_a_fifth_of_a_second(arm: Arm, command: str, reason: str) -> None:
     """Other work on the computer can only make it later: what the software takes is the shortest of some times."""
     times_s: list[float] = []
     while not times_s or (min(times_s) >= TOLD_WITHIN_S and len(times_s) < ATTEMPTS):
-        times_s.append(told_after_s(arm, order, reason))
+        times_s.append(told_after_s(arm, command, reason))
     assert min(times_s) < TOLD_WITHIN_S, times_s

@@ -39,7 +39,7 @@ def test_a_slider_at_a_third_makes_it_three_times_as_long(arm: Arm) -> None:
     paces: list[float] = []
     pace = rospy.Subscriber("speed_scaling_factor", Float64, lambda message: paces.append(message.data))
     until(lambda: paces and paces[-1] == 1.0, "the arm at full pace")
-    arm.order("slider", value=1.0 / 3.0)
+    arm.command("slider", value=1.0 / 3.0)
     until(lambda: paces[-1] == pytest.approx(1.0 / 3.0), "the arm at a third of its pace")
     pace.unregister()
     begun_s = time.monotonic()
@@ -58,15 +58,15 @@ def test_a_pause_makes_a_goal_wait(arm: Arm) -> None:
     assert arm.client.get_result().error_code == 0, arm.client.get_goal_status_text()
 
 
-@pytest.mark.parametrize(("order", "reason"), [
+@pytest.mark.parametrize(("command", "reason"), [
     ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
     ("cut", "link to the arm"), ("freeze", "link to the arm")])
-def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_stands(arm: Arm, order: str,
+def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_stands(arm: Arm, command: str,
                                                                                       reason: str) -> None:
     start = arm.positions
     done = arm.send([position + 0.5 for position in start], 4.0)
     time.sleep(0.7)
-    arm.order(order)
+    arm.command(command)
     assert done.wait(10.0)
     assert arm.client.get_state() == GoalStatus.ABORTED
     assert reason in arm.client.get_result().error_string
@@ -74,11 +74,11 @@ def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_
     success, text = arm.call("resume")
     assert not success and reason in text
     assert arm.send(start, 1.0).wait(5.0) and reason in arm.client.get_result().error_string
-    arm.order("restore")
-    if order == "protective_stop":
+    arm.command("restore")
+    if command == "protective_stop":
         assert arm.call("dashboard/unlock_protective_stop") == (True, "Protective stop releasing")
-    elif order == "emergency_stop":
-        arm.order("release_emergency_stop")
+    elif command == "emergency_stop":
+        arm.command("release_emergency_stop")
         assert arm.call("dashboard/power_on")[0] and arm.call("dashboard/brake_release")[0]
     until(lambda: arm.call("resume")[0], "an arm that follows again")
     until(lambda: arm.ready is True, "a ready arm")
@@ -90,7 +90,7 @@ def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_
 
 
 def test_a_dashboard_that_does_not_answer_is_told(arm: Arm) -> None:
-    arm.order("cut")
+    arm.command("cut")
     success, text = arm.call("dashboard/power_on")
     assert not success and f"{arm.address}:29999" in text
     until(lambda: arm.ready is False, "a driver that knows of the cut, before the next test makes the arm well")
@@ -98,5 +98,5 @@ def test_a_dashboard_that_does_not_answer_is_told(arm: Arm) -> None:
 
 def test_the_node_stops_the_arm_and_its_program_at_its_end(arm: Arm) -> None:
     os.system("rosnode kill /robot_hw > /dev/null 2>&1")
-    until(lambda: "runtime_state=STOPPED" in arm.order("state") and "connections=0" in arm.order("state"),
+    until(lambda: "runtime_state=STOPPED" in arm.command("state") and "connections=0" in arm.command("state"),
           "an arm without program and links")

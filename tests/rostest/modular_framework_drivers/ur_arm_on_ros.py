@@ -72,17 +72,17 @@ class Arm:
 
     def well(self) -> None:
         """End all faults, and have the arm follow."""
-        for order in ("restore", "unlock", "release_emergency_stop", "power_on"):
-            self.order(order)
-        self.order("slider", value=1.0)
+        for command in ("restore", "unlock", "release_emergency_stop", "power_on"):
+            self.command(command)
+        self.command("slider", value=1.0)
         until(lambda: self.call("resume")[0], "an arm that follows again")
 
     def true_positions(self) -> list[float]:
         """Where the emulated joints are, whatever the driver knows [rad]."""
-        state = dict(pair.split("=") for pair in self.order("state").split())
+        state = dict(pair.split("=") for pair in self.command("state").split())
         return [float(value) for value in state["q"].split(",")]
 
-    def order(self, command: str, **arguments: object) -> str:
+    def command(self, command: str, **arguments: object) -> str:
         return send_command(29901, command, self.address, **arguments)
 
     def call(self, name: str) -> tuple[bool, str]:

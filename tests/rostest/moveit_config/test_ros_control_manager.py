@@ -11,7 +11,7 @@ import rospy
 from controller_manager_msgs.srv import ListControllers
 from moveit_commander import MoveGroupCommander
 
-from modular_framework_control.ros_controller_manager_client import ControllerManagerClient
+from modular_framework_control.ros.controller_manager_client import ControllerManagerClient
 
 PACKAGES = Path(__file__).parents[2] / "packages"
 JOINTS = [f"panda_joint{number}" for number in range(1, 8)]

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.controller import Controller
-from modular_framework_control.controller_manager import ControllerManager
-from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.controller_manager.controller_manager import ControllerManager
+from modular_framework_control.controller_manager.controller_types import ControllerTypes
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 

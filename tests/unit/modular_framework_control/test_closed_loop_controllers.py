@@ -9,20 +9,24 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.controller import Controller, ControllerError
-from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
-from modular_framework_control.gripper_action_controller import GripperTicket
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_interface.pid import Pid, PidGains, read_pid
+from modular_framework_control.controller_manager.controller_types import ControllerTypes
+from modular_framework_control.controllers.gripper_action_controller import GripperGoalHandle
+from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
     HardwareInterface,
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.pid import Pid, PidGains, read_pid
-from modular_framework_control.plugins import CONTROLLER_BASE, Plugin, PluginIndex
-from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectoryTicket
+from modular_framework_control.hardware_interface.plugins import CONTROLLER_BASE, Plugin, PluginIndex
+from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.trajectory_goal import (
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectoryGoalHandle,
+)
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 
 URDF = """<robot name="r"><joint name="a" type="revolute"><limit lower="-1" upper="1" velocity="9" effort="90"/></joint>
@@ -64,10 +68,10 @@ def test_a_trajectory_is_followed_by_gains_and_the_goal_is_reached(start: Callab
     tolerance = {"trajectory": 0.1, "goal": 0.01}
     loop = start(family, "JointTrajectoryController", joints=["a", "b"], gains=gains,
                  constraints={"goal_time": 0.5, "a": tolerance, "b": tolerance})
-    ticket = TrajectoryTicket()
-    loop.controllers["c"].submit(goal((1.0, (0.5, -0.4))), ticket)
+    goal_handle = TrajectoryGoalHandle()
+    loop.controllers["c"].submit(goal((1.0, (0.5, -0.4))), goal_handle)
     loop.run(2.0)
-    assert (ticket.status, ticket.result) == (GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL)
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL)
     assert abs(joint(loop, family, "a").position - 0.5) < 0.01 and abs(joint(loop, family, "b").position + 0.4) < 0.01
 
 
@@ -259,23 +263,23 @@ def test_a_gripper_of_efforts_reaches_its_goal_within_the_bound_of_its_effort(st
                                                                               max_effort: float,
                                                                               largest: float) -> None:
     loop = start("effort", "GripperActionController", joint="a", gains={"a": STIFF}, goal_tolerance=0.001)
-    ticket: GripperTicket = GoalTicket()
+    goal_handle: GripperGoalHandle = RealtimeGoalHandle()
     handle = joint(loop, "effort")
-    loop.controllers["c"].submit(0.1, max_effort, ticket)
+    loop.controllers["c"].submit(0.1, max_effort, goal_handle)
     seen = 0.0
-    while ticket.status in (GoalStatus.PENDING, GoalStatus.ACTIVE):
+    while goal_handle.status in (GoalStatus.PENDING, GoalStatus.ACTIVE):
         loop.step()
         seen = max(seen, abs(handle.command))
-    assert ticket.status is GoalStatus.SUCCEEDED and abs(handle.position - 0.1) <= 0.001
+    assert goal_handle.status is GoalStatus.SUCCEEDED and abs(handle.position - 0.1) <= 0.001
     assert seen == pytest.approx(largest)
 
 
 def test_a_gripper_of_efforts_that_meets_something_stalls_and_goes_on_squeezing(start: Callable[..., Any]) -> None:
     loop = start("effort", "GripperActionController", joint="a", gains={"a": STIFF}, stall_timeout=0.2)
-    ticket: GripperTicket = GoalTicket()
-    loop.controllers["c"].submit(1.5, 2.0, ticket)
+    goal_handle: GripperGoalHandle = RealtimeGoalHandle()
+    loop.controllers["c"].submit(1.5, 2.0, goal_handle)
     loop.run(3.0)
-    assert ticket.status is GoalStatus.ABORTED and ticket.result is not None and ticket.result.stalled
+    assert goal_handle.status is GoalStatus.ABORTED and goal_handle.result is not None and goal_handle.result.stalled
     assert joint(loop, "effort").command == 2.0
     assert loop.switch([], ["c"]) is None
     assert joint(loop, "effort").command == 0.0

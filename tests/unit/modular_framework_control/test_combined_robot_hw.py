@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.combined_robot_hw import CombinedRobotHW
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     InterfaceResources,
     JointHandle,
@@ -17,8 +17,8 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.robot_hw import RobotHW, SwitchState
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW, SwitchState
 from modular_framework_ros.node_handle import MappingNodeHandle, NodeHandle
 
 MOCK = "modular_framework_control/MockRobotHW"

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control import ros_robot_hw
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.ros_robot_hw import RobotHwNode, moves
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.ros import robot_hw_node
+from modular_framework_control.ros.robot_hw_node import RobotHwNode, moves
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 RATE = 125.0
@@ -78,12 +78,12 @@ def make_node(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[RobotHwNod
         tree = MappingNodeHandle({
             "joints": ["a"], "command_interface": "VelocityJointInterface", "real_time": False, "rate": RATE,
             "joint_limits": {"a": {"has_acceleration_limits": True, "max_acceleration": ACCELERATION}}})
-        monkeypatch.setattr(ros_robot_hw, "RosNodeHandle", lambda namespace: tree)
-        monkeypatch.setattr(ros_robot_hw, "robot_hw_of_type", lambda name: robot_hw)
-        monkeypatch.setattr(ros_robot_hw, "prepare_interpreter", lambda: None)
-        monkeypatch.setattr(ros_robot_hw, "RosControllerManager", lambda *arguments, **more: Manager(robot_hw))
+        monkeypatch.setattr(robot_hw_node, "RosNodeHandle", lambda namespace: tree)
+        monkeypatch.setattr(robot_hw_node, "robot_hw_of_type", lambda name: robot_hw)
+        monkeypatch.setattr(robot_hw_node, "prepare_interpreter", lambda: None)
+        monkeypatch.setattr(robot_hw_node, "RosControllerManager", lambda *arguments, **more: Manager(robot_hw))
         for name in ("HardwareReadiness", "LoopReport"):
-            monkeypatch.setattr(ros_robot_hw, name, lambda *arguments: Nothing())
+            monkeypatch.setattr(robot_hw_node, name, lambda *arguments: Nothing())
         ended = threading.Event()
         ended.set()
         node = RobotHwNode(ended)
@@ -124,12 +124,12 @@ def test_a_robot_whose_velocities_are_never_0_is_believed_after_a_while(make_nod
     node, robot_hw = make_node(1.0)
     robot_hw.noise = 1e-3
     assert moves_after(node, robot_hw)
-    assert 10 < len(robot_hw.written) <= ros_robot_hw.RESTLESS_S * RATE + 2
+    assert 10 < len(robot_hw.written) <= robot_hw_node.RESTLESS_S * RATE + 2
 
 
 def test_a_robot_that_does_not_stop_is_not_waited_for_without_end(make_node: Callable[..., Any],
                                                                   monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ros_robot_hw, "LONGEST_END_S", 0.3)
+    monkeypatch.setattr(robot_hw_node, "LONGEST_END_S", 0.3)
     node, robot_hw = make_node(1.0)
     robot_hw.noise = 1.0
     begun_s = time.monotonic()

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import pytest
 
-from modular_framework_control.controller_types import BUILT_IN_TYPES
+from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES
 
 BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_control.ros_controller_groups import GroupPlan, plan_group, read_groups
-from modular_framework_control.ros_controller_manager_client import ControllerManagerClientError
+from modular_framework_control.ros.controller_groups import GroupPlan, plan_group, read_groups
+from modular_framework_control.ros.controller_manager_client import ControllerManagerClientError
 
 GROUPS = {"follow": ["states", "arm", "gripper"], "teach": ["states", "gravity"], "empty": []}
 

@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.controller import Controller, ControllerError
-from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_manager.controller_types import ControllerTypes
+from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     JointHandle,
     JointStateHandle,
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.robot_hw import RobotHW, SwitchState
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW, SwitchState
 from modular_framework_ros.node_handle import NodeHandle, read_names
 
 BEST_EFFORT, STRICT = 1, 2

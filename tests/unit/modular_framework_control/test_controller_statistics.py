@@ -6,12 +6,12 @@ import statistics
 
 import pytest
 
-from modular_framework_control.controller import Controller
-from modular_framework_control.controller_manager import ControllerManager, ControllerReport
-from modular_framework_control.controller_statistics import UpdateStatistics
-from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.hardware_interface import JointStateInterface
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.controller_manager.controller_manager import ControllerManager, ControllerReport
+from modular_framework_control.controller_manager.controller_statistics import UpdateStatistics
+from modular_framework_control.controller_manager.controller_types import ControllerTypes
+from modular_framework_control.hardware_interface.interfaces import JointStateInterface
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 

@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_control import real_time
-from modular_framework_control.cycle_pacer import RESOLUTION_S, CyclePacer, LoopStatistics
-from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory_goal import TrajectoryGoal
+from modular_framework_control.realtime import scheduling
+from modular_framework_control.realtime.cycle_pacer import RESOLUTION_S, CyclePacer, LoopStatistics
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.trajectory_goal import TrajectoryGoal
 
 
 class Clock:
@@ -114,10 +114,10 @@ def test_a_late_start_after_sleep_counts_as_no_processor_and_one_after_long_work
 def test_a_request_that_processors_stay_awake_is_held_and_a_refusal_is_said(tmp_path: Path,
                                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     device = tmp_path / "latency"
-    monkeypatch.setattr(real_time, "_LATENCY_DEVICE", str(device))
-    assert "No such file" in real_time.keep_processors_awake()[0]
+    monkeypatch.setattr(scheduling, "_LATENCY_DEVICE", str(device))
+    assert "No such file" in scheduling.keep_processors_awake()[0]
     device.touch()
-    assert real_time.keep_processors_awake() == []
+    assert scheduling.keep_processors_awake() == []
     held = [link for link in Path("/proc/self/fd").iterdir() if os.path.realpath(link) == str(device)]
     assert device.read_bytes() == bytes(4) and len(held) == 1
     os.close(int(held[0].name))
@@ -152,8 +152,8 @@ def test_what_the_system_does_not_permit_is_said_with_the_remedy(monkeypatch: py
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    monkeypatch.setattr(real_time.resource, "getrlimit", lambda which: (65536, 65536))
-    refused = real_time.run_in_real_time()
+    monkeypatch.setattr(scheduling.resource, "getrlimit", lambda which: (65536, 65536))
+    refused = scheduling.run_in_real_time()
     assert [text.split(" (")[0] for text in refused] == ["real-time scheduling", "locking of memory"]
     assert "rtprio" in refused[0] and "64 kB" in refused[1] and "memlock" in refused[1]
 
@@ -168,8 +168,8 @@ def test_a_thread_that_ends_meanwhile_does_not_keep_the_loop_from_real_time(monk
 
     monkeypatch.setattr(os, "listdir", lambda folder: ["11", "12", "13", str(threading.get_native_id())])
     monkeypatch.setattr(os, "sched_setscheduler", schedule)
-    monkeypatch.setattr(real_time, "_lock_memory", lambda: "")
-    assert real_time.run_in_real_time(60) == []
+    monkeypatch.setattr(scheduling, "_lock_memory", lambda: "")
+    assert scheduling.run_in_real_time(60) == []
     assert given == {11: 50, 13: 50, threading.get_native_id(): 60}
 
 
@@ -182,8 +182,8 @@ def test_where_the_loop_itself_may_not_be_urgent_nothing_else_is(monkeypatch: py
         given[thread] = parameters.sched_priority
 
     monkeypatch.setattr(os, "sched_setscheduler", schedule)
-    monkeypatch.setattr(real_time, "_lock_memory", lambda: "")
-    assert len(real_time.run_in_real_time()) == 1 and given == {}
+    monkeypatch.setattr(scheduling, "_lock_memory", lambda: "")
+    assert len(scheduling.run_in_real_time()) == 1 and given == {}
 
 
 def test_ten_thousand_cycles_with_moving_controllers_use_up_no_memory(make_loop: Callable[..., Any]) -> None:

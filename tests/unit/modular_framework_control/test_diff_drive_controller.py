@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.controller import ControllerError
-from modular_framework_control.diff_drive_controller import DiffDriveController, WheelState
-from modular_framework_control.hardware_interface import VelocityJointInterface
-from modular_framework_control.mobile_base_controller import BaseVelocity, OdometrySnapshot
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.hardware_interface.interfaces import VelocityJointInterface
+from modular_framework_control.mobile_base.diff_drive_controller import DiffDriveController, WheelState
+from modular_framework_control.mobile_base.mobile_base_controller import BaseVelocity, OdometrySnapshot
 
 RADIUS, SEPARATION = 0.1, 0.5
 WHEELS = ["left", "right"]

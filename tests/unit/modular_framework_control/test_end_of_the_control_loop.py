@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control import ros_robot_hw
-from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.ros import robot_hw_node
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 
@@ -53,18 +53,18 @@ def run_node(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], list[str]]:
     def run(raises: bool) -> list[str]:
         notes: list[str] = []
         tree = MappingNodeHandle({"joints": ["a"], "real_time": False})
-        monkeypatch.setattr(ros_robot_hw, "RosNodeHandle", lambda namespace: tree)
-        monkeypatch.setattr(ros_robot_hw, "robot_hw_of_type", lambda name: NotingHardware(notes, raises))
-        monkeypatch.setattr(ros_robot_hw, "prepare_interpreter", lambda: None)
+        monkeypatch.setattr(robot_hw_node, "RosNodeHandle", lambda namespace: tree)
+        monkeypatch.setattr(robot_hw_node, "robot_hw_of_type", lambda name: NotingHardware(notes, raises))
+        monkeypatch.setattr(robot_hw_node, "prepare_interpreter", lambda: None)
         for attribute, name in (("HardwareReadiness", "readiness"), ("RosControllerManager", "manager"),
                                 ("LoopReport", "report")):
             def make(*arguments: Any, _name: str = name, **more: Any) -> Noted:
                 return Noted(notes, _name, raises)
 
-            monkeypatch.setattr(ros_robot_hw, attribute, make)
+            monkeypatch.setattr(robot_hw_node, attribute, make)
         ended = threading.Event()
         ended.set()
-        node = ros_robot_hw.RobotHwNode(ended)
+        node = robot_hw_node.RobotHwNode(ended)
         node.connect()
         assert node.run()
         return notes

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_control.plugins import ROBOT_HW_BASE, PluginIndex
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginIndex
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 
 PACKAGE = Path(__file__).resolve().parents[3] / "docs" / "examples" / "my_arm"
 

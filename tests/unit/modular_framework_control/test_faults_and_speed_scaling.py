@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modular_framework_control.controller import ControllerError
-from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
-from modular_framework_control.gripper_action_controller import GripperTicket
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.controllers.gripper_action_controller import GripperGoalHandle
+from modular_framework_control.hardware_interface.interfaces import (
     COMMAND_INTERFACES,
     SpeedScalingHandle,
     SpeedScalingInterface,
 )
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory_clock import RISE_PER_S, TrajectoryClock
-from modular_framework_control.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectoryTicket
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.trajectory_clock import RISE_PER_S, TrajectoryClock
+from modular_framework_control.trajectory.trajectory_goal import (
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectoryGoalHandle,
+)
 from modular_framework_ros.node_handle import NodeHandle
 
 FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
@@ -72,11 +76,11 @@ def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     return starter
 
 
-def send(loop: Any, *points: tuple[float, Sequence[float]]) -> TrajectoryTicket:
-    ticket = TrajectoryTicket()
+def send(loop: Any, *points: tuple[float, Sequence[float]]) -> TrajectoryGoalHandle:
+    goal_handle = TrajectoryGoalHandle()
     rows = tuple(TrajectoryPoint(time_s, tuple(row), ZEROS, ZEROS) for time_s, row in points)
-    loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(("a", "b"), rows)), ticket)
-    return ticket
+    loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(("a", "b"), rows)), goal_handle)
+    return goal_handle
 
 
 def positions(loop: Any) -> list[float]:
@@ -86,13 +90,13 @@ def positions(loop: Any) -> list[float]:
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 def test_a_fault_ends_the_goal_in_the_same_cycle_and_says_why(start: Callable[..., Any], family: str) -> None:
     loop = start(family)
-    ticket = send(loop, (1.0, (1.0, -1.0)))
+    goal_handle = send(loop, (1.0, (1.0, -1.0)))
     loop.run(0.5)
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.robot_hw.reason = "protective stop"
     loop.step()
-    assert (ticket.status, ticket.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL)
-    assert ticket.text == "hardware fault: protective stop"
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL)
+    assert goal_handle.text == "hardware fault: protective stop"
 
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))
@@ -116,9 +120,9 @@ def test_after_a_fault_the_joints_are_held_where_they_are_then_and_new_goals_beg
     loop.robot_hw.by_hand = None
     loop.run(0.3)
     assert positions(loop) == pytest.approx([0.3, 0.7], abs=1e-3)
-    ticket = send(loop, (1.0, (0.4, 0.6)))
+    goal_handle = send(loop, (1.0, (0.4, 0.6)))
     loop.run(1.5)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert positions(loop) == pytest.approx([0.4, 0.6], abs=0.01)
 
 
@@ -132,26 +136,26 @@ def test_a_controller_started_during_a_fault_refuses_goals_until_it_is_over(star
     assert refused.text == "hardware fault: emergency stop"
     loop.robot_hw.reason = ""
     loop.step()
-    ticket = send(loop, (0.5, (0.1, 0.1)))
+    goal_handle = send(loop, (0.5, (0.1, 0.1)))
     loop.run(0.6)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
 
 
 @pytest.mark.parametrize("family", ["position", "effort"])
 def test_a_gripper_drops_its_goal_in_a_fault_and_holds_where_it_is(start: Callable[..., Any], family: str) -> None:
     loop = start(family, "GripperActionController", joint="a", goal_tolerance=0.001)
-    ticket: GripperTicket = GoalTicket()
+    goal_handle: GripperGoalHandle = RealtimeGoalHandle()
     loop.robot_hw.by_hand = [0.2]
-    loop.controllers["c"].submit(1.0, 0.0, ticket)
+    loop.controllers["c"].submit(1.0, 0.0, goal_handle)
     loop.step(2)
     joint = loop.robot_hw.joints[0]
     loop.robot_hw.reason, loop.robot_hw.by_hand = "servo 1: overload", [0.4]
     loop.step()
-    assert (ticket.status, ticket.text) == (GoalStatus.ABORTED, "hardware fault: servo 1: overload")
-    assert ticket.result is not None and not ticket.result.stalled and not ticket.result.reached_goal
+    assert (goal_handle.status, goal_handle.text) == (GoalStatus.ABORTED, "hardware fault: servo 1: overload")
+    assert goal_handle.result is not None and not goal_handle.result.stalled and not goal_handle.result.reached_goal
     loop.step(2)
     assert joint.command == (0.4 if family == "position" else 0.0)
-    refused: GripperTicket = GoalTicket()
+    refused: GripperGoalHandle = RealtimeGoalHandle()
     loop.controllers["c"].submit(1.0, 0.0, refused)
     loop.step()
     assert (refused.status, refused.text) == (GoalStatus.REJECTED, "hardware fault: servo 1: overload")
@@ -193,14 +197,14 @@ def test_a_robot_at_a_tenth_of_its_speed_takes_ten_times_as_long_on_the_same_pat
     loop = start(constraints={"a": tight, "b": tight})
     loop.robot_hw.scaling.factor = 0.1
     loop.run(1.0)
-    ticket = send(loop, (0.5, (0.4, -0.2)), (1.0, (1.0, 0.3)))
+    goal_handle = send(loop, (0.5, (0.4, -0.2)), (1.0, (1.0, 0.3)))
     seen = []
     for _ in range(990):
         loop.step()
         seen.append([joint.command for joint in loop.robot_hw.joints])
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.run(0.2)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     loop.robot_hw.scaling.factor = 1.0
     loop.robot_hw.by_hand = [0.0, 0.0]
     loop.run(1.0)
@@ -215,14 +219,14 @@ def test_a_robot_at_a_tenth_of_its_speed_takes_ten_times_as_long_on_the_same_pat
 def test_a_paused_robot_stays_where_it_is_and_goes_on_smoothly(start: Callable[..., Any]) -> None:
     tight = {"trajectory": 0.02, "goal": 0.001}
     loop = start(constraints={"a": tight, "b": tight})
-    ticket = send(loop, (1.0, (1.0, -1.0)))
+    goal_handle = send(loop, (1.0, (1.0, -1.0)))
     loop.run(0.5)
     loop.robot_hw.scaling.factor = 0.0
     loop.step()
     held = [joint.command for joint in loop.robot_hw.joints]
     loop.run(5.0)
     assert [joint.command for joint in loop.robot_hw.joints] == held
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.robot_hw.scaling.factor = 1.0
     steps = [np.array(held)]
     for _ in range(100):
@@ -232,7 +236,7 @@ def test_a_paused_robot_stays_where_it_is_and_goes_on_smoothly(start: Callable[.
     fastest = 15.0 / 8.0
     assert np.abs(velocities).max() < fastest * 1.001
     assert np.abs(np.diff(velocities, axis=0)).max() < fastest * RISE_PER_S * loop.period_s * 1.6
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert steps[-1] == pytest.approx([1.0, -1.0], abs=1e-9)
 
 
@@ -269,12 +273,12 @@ def test_what_a_robot_is_asked_to_do_later_allows_for_how_slowly_it_moves(start:
 def test_cancel_of_a_slowed_goal_does_not_move_the_robot_further_than_it_would_roll(start: Callable[..., Any],
                                                                                     factor: float) -> None:
     loop = start(stop_trajectory_duration=0.2)
-    ticket = send(loop, (1.0, (1.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.0, 0.0)))
     loop.run(0.5)
     loop.robot_hw.scaling.factor = factor
     loop.step(2)
     before, speed = loop.robot_hw.joints[0].command, 15.0 / 8.0 * factor
-    loop.controllers["c"].cancel(ticket)
+    loop.controllers["c"].cancel(goal_handle)
     loop.run(0.5)
     loop.robot_hw.scaling.factor = 1.0
     loop.run(0.5)
@@ -283,14 +287,14 @@ def test_cancel_of_a_slowed_goal_does_not_move_the_robot_further_than_it_would_r
 
 def test_goal_time_passes_as_slowly_as_the_robot_moves(start: Callable[..., Any]) -> None:
     loop = start(constraints={"goal_time": 0.2, "a": {"goal": 0.01}})
-    ticket = send(loop, (0.5, (0.3, 0.0)))
+    goal_handle = send(loop, (0.5, (0.3, 0.0)))
     loop.run(0.5)
     loop.robot_hw.by_hand = [0.2, 0.0]
     loop.robot_hw.scaling.factor = 0.1
     loop.run(1.5)
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.run(0.6)
-    assert ticket.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert goal_handle.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
 
 
 def test_a_clock_slows_at_once_speeds_up_gradually_and_never_runs_ahead() -> None:

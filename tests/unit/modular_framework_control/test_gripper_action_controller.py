@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.goal_ticket import GoalStatus
-from modular_framework_control.gripper_action_controller import GripperGoalError, GripperTicket
-from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.controllers.gripper_action_controller import GripperGoalError, GripperGoalHandle
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.realtime.goal_handle import GoalStatus
 
 URDF = """<robot name="r"><joint name="finger" type="revolute">
 <limit lower="0" upper="0.5" velocity="1.0" effort="1"/></joint></robot>"""
@@ -30,10 +30,10 @@ def loop(make_loop: Callable[..., Any]) -> Any:
     return made
 
 
-def send(loop: Any, position: float, max_effort: float = 0.0) -> GripperTicket:
-    ticket = GripperTicket()
-    loop.controllers["gripper"].submit(position, max_effort, ticket)
-    return ticket
+def send(loop: Any, position: float, max_effort: float = 0.0) -> GripperGoalHandle:
+    goal_handle = GripperGoalHandle()
+    loop.controllers["gripper"].submit(position, max_effort, goal_handle)
+    return goal_handle
 
 
 def handle(loop: Any) -> Any:
@@ -42,22 +42,22 @@ def handle(loop: Any) -> Any:
 
 
 def test_a_free_gripper_reaches_its_goal(loop: Any) -> None:
-    ticket = send(loop, 0.4)
+    goal_handle = send(loop, 0.4)
     loop.run(0.3)
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.run(0.2)
-    assert ticket.status is GoalStatus.SUCCEEDED
-    assert ticket.result is not None and ticket.result.reached_goal and not ticket.result.stalled
+    assert goal_handle.status is GoalStatus.SUCCEEDED
+    assert goal_handle.result is not None and goal_handle.result.reached_goal and not goal_handle.result.stalled
 
 
 def test_a_blocked_gripper_stalls_after_the_timeout_and_goes_on_squeezing(loop: Any) -> None:
-    ticket = send(loop, 0.8)
+    goal_handle = send(loop, 0.8)
     loop.run(0.5 + 0.25)
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.run(0.2)
-    assert ticket.status is GoalStatus.ABORTED
-    assert ticket.result is not None and ticket.result.stalled and not ticket.result.reached_goal
-    assert "joint 'finger' stands at 0.5" in ticket.text
+    assert goal_handle.status is GoalStatus.ABORTED
+    assert goal_handle.result is not None and goal_handle.result.stalled and not goal_handle.result.reached_goal
+    assert "joint 'finger' stands at 0.5" in goal_handle.text
     loop.manager.update(loop.time_s, 0.01)
     assert handle(loop).command == 0.8
 
@@ -73,14 +73,14 @@ def test_a_stall_is_not_seen_before_the_timeout_has_passed_since_the_goal(loop: 
 
 
 def test_trembling_in_place_is_a_stall(loop: Any) -> None:
-    ticket = send(loop, 0.8)
+    goal_handle = send(loop, 0.8)
     loop.run(0.6)
     for cycle in range(40):
         loop.robot_hw.read(loop.time_s, 0.01)
         handle(loop).state.velocity = 0.05 * (-1) ** cycle
         loop.manager.update(loop.time_s, 0.01)
         loop.time_s += 0.01
-    assert ticket.status is GoalStatus.ABORTED
+    assert goal_handle.status is GoalStatus.ABORTED
 
 
 def test_the_effort_of_the_goal_is_passed_on_and_none_means_the_default(loop: Any) -> None:
@@ -96,11 +96,11 @@ def test_the_effort_of_the_goal_is_passed_on_and_none_means_the_default(loop: An
 
 
 def test_what_holds_something_does_not_press_harder_when_it_is_canceled(loop: Any) -> None:
-    ticket = send(loop, 0.8, 0.5)
+    goal_handle = send(loop, 0.8, 0.5)
     loop.run(0.6)
-    loop.controllers["gripper"].cancel(ticket)
+    loop.controllers["gripper"].cancel(goal_handle)
     loop.step(2)
-    assert ticket.status is GoalStatus.CANCELED and handle(loop).max_effort == 0.5
+    assert goal_handle.status is GoalStatus.CANCELED and handle(loop).max_effort == 0.5
     assert loop.switch([], ["gripper"]) is None and loop.switch(["gripper"], []) is None
     loop.step()
     assert handle(loop).max_effort == 2.0
@@ -116,32 +116,32 @@ def test_a_new_goal_replaces_the_one_before(loop: Any) -> None:
 
 
 def test_cancel_stops_where_the_joint_is(loop: Any) -> None:
-    ticket = send(loop, 0.4)
+    goal_handle = send(loop, 0.4)
     loop.run(0.2)
-    loop.controllers["gripper"].cancel(ticket)
+    loop.controllers["gripper"].cancel(goal_handle)
     loop.step(2)
-    assert ticket.status is GoalStatus.CANCELED
+    assert goal_handle.status is GoalStatus.CANCELED
     here = handle(loop).position
     loop.run(0.3)
     assert handle(loop).position == pytest.approx(here, abs=0.011)
 
 
 def test_a_finger_that_is_measured_at_no_position_stays_where_it_was_and_nothing_starts(loop: Any) -> None:
-    ticket = send(loop, 0.4)
+    goal_handle = send(loop, 0.4)
     loop.run(0.2)
     finger = handle(loop)
     there, finger.state.position = finger.position, math.nan
     loop.manager.update(loop.time_s, 0.01)
-    assert ticket.status is GoalStatus.ABORTED
-    assert "joint 'finger' is measured at nan; expected a position" in ticket.text
+    assert goal_handle.status is GoalStatus.ABORTED
+    assert "joint 'finger' is measured at nan; expected a position" in goal_handle.text
     assert finger.command == pytest.approx(there) and 0.1 < there < 0.3
     again = send(loop, 0.4)
     loop.manager.update(loop.time_s, 0.01)
     assert again.status is GoalStatus.ABORTED and finger.command == pytest.approx(there)
     loop.step()
-    ticket = send(loop, 0.4)
+    goal_handle = send(loop, 0.4)
     loop.run(0.5)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
 
 
 def test_a_gripper_does_not_start_on_a_finger_that_is_measured_at_no_position(
@@ -157,14 +157,14 @@ def test_a_gripper_does_not_start_on_a_finger_that_is_measured_at_no_position(
 @pytest.mark.parametrize(("position", "effort"), [(math.nan, 0.0), (math.inf, 0.0), (0.1, math.nan)])
 def test_a_goal_that_makes_no_sense_is_refused(loop: Any, position: float, effort: float) -> None:
     with pytest.raises(GripperGoalError, match="expected finite numbers"):
-        loop.controllers["gripper"].submit(position, effort, GripperTicket())
+        loop.controllers["gripper"].submit(position, effort, GripperGoalHandle())
 
 
 def test_a_stopped_controller_ends_its_goal_and_takes_no_other(loop: Any) -> None:
-    ticket = send(loop, 0.4)
+    goal_handle = send(loop, 0.4)
     loop.step()
     assert loop.switch([], ["gripper"]) is None
-    assert ticket.status is GoalStatus.CANCELED
+    assert goal_handle.status is GoalStatus.CANCELED
     with pytest.raises(GripperGoalError, match="not running"):
         send(loop, 0.1)
 
@@ -179,7 +179,7 @@ def test_feedback_comes_at_its_rate(make_loop: Callable[..., Any]) -> None:
     loop = make_loop(parameters(action_monitor_rate=20.0))
     loop.spawn("gripper")
     seen: list[float] = []
-    loop.controllers["gripper"].on_feedback = lambda ticket, state: seen.append(state.position)
+    loop.controllers["gripper"].on_feedback = lambda goal_handle, state: seen.append(state.position)
     send(loop, 0.45)
     loop.run(0.4)
     assert len(seen) == pytest.approx(8, abs=1)
@@ -194,8 +194,8 @@ def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_l
             assert loop.switch([], ["gripper"]) is None
             return float(self)
 
-    ticket = send(loop, 0.4, Effort(1.0))
-    assert (ticket.status, ticket.text) == (GoalStatus.REJECTED, "the controller was stopped")
+    goal_handle = send(loop, 0.4, Effort(1.0))
+    assert (goal_handle.status, goal_handle.text) == (GoalStatus.REJECTED, "the controller was stopped")
     assert loop.switch(["gripper"], []) is None
     before = handle(loop).command
     loop.run(0.1)
@@ -203,11 +203,11 @@ def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_l
 
 
 def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any) -> None:
-    def fail(told: GripperTicket) -> None:
+    def fail(told: GripperGoalHandle) -> None:
         if told.status is GoalStatus.CANCELED:
             raise ArithmeticError("nobody listens")
 
-    active = GripperTicket(fail)
+    active = GripperGoalHandle(fail)
     loop.controllers["gripper"].submit(0.4, 0.0, active)
     loop.run(0.1)
     taken_up, behind = send(loop, 0.1), send(loop, 0.2)
@@ -236,11 +236,11 @@ def test_a_gripper_on_its_way_stops_with_its_controller_and_one_that_holds_somet
 
 
 def test_a_canceled_gripper_does_not_push_on_against_what_holds_it_up(loop: Any) -> None:
-    ticket = send(loop, 0.4)
+    goal_handle = send(loop, 0.4)
     for _ in range(30):
         loop.step()
         handle(loop).state.position = 0.1
-    loop.controllers["gripper"].cancel(ticket)
+    loop.controllers["gripper"].cancel(goal_handle)
     loop.robot_hw.read(loop.time_s, 0.01)
     handle(loop).state.position = 0.1
     loop.manager.update(loop.time_s, 0.01)

@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.combined_robot_hw import CombinedRobotHW
-from modular_framework_control.controller import Controller
-from modular_framework_control.controller_types import ControllerTypes
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.controller_manager.controller_types import ControllerTypes
+from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.interfaces import (
     ForceTorqueSensorHandle,
     ForceTorqueSensorInterface,
     PositionJointInterface,
     SpeedScalingHandle,
     SpeedScalingInterface,
 )
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.robot_hw import RobotHW, speed_scaling_handles
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW, speed_scaling_handles
 from modular_framework_ros.node_handle import NodeHandle, read_names
 
 LAB = "lab/Fragile"

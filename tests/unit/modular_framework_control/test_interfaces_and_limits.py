@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_control.controller import ControllerError
-from modular_framework_control.controller_types import BUILT_IN_TYPES, ControllerTypes
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
+from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
     HardwareInterfaceError,
     JointHandle,
@@ -21,7 +21,7 @@ from modular_framework_control.hardware_interface import (
     PositionJointInterface,
     interface_from_name,
 )
-from modular_framework_control.joint_limits import (
+from modular_framework_control.hardware_interface.joint_limits import (
     EffortJointSaturation,
     JointLimits,
     PositionJointSaturation,
@@ -29,7 +29,7 @@ from modular_framework_control.joint_limits import (
     limits_from_urdf,
     limits_with_parameters,
 )
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError, join_names, read_number
 
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     JointHandle,
     JointStateHandle,
     PositionJointInterface,
@@ -19,7 +19,7 @@ from modular_framework_control.hardware_interface import (
     PosVelAccJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.joint_limits import (
+from modular_framework_control.hardware_interface.joint_limits import (
     EffortJointSaturation,
     JointLimitGuard,
     JointLimits,
@@ -31,7 +31,7 @@ from modular_framework_control.joint_limits import (
     soft_limits_from_urdf,
     soft_limits_with_parameters,
 )
-from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 
 LIMITS = JointLimits(-1.0, 1.0, 2.0, 5.0)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.controller import ControllerError
+from modular_framework_control.controller_interface.controller import ControllerError
 
 
 def reports_of(make_loop: Callable[..., Any], **parameters: Any) -> list[Any]:

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from modular_framework_control import joint_trajectory_controller
-from modular_framework_control.controller import ControllerError
-from modular_framework_control.controller_switch import ControllerState
-from modular_framework_control.goal_ticket import GoalStatus
-from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory_goal import (
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.controller_manager.controller_switch import ControllerState
+from modular_framework_control.controllers import joint_trajectory_controller
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.realtime.goal_handle import GoalStatus
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.tolerances import JointTolerance
+from modular_framework_control.trajectory.trajectory_goal import (
     GoalRejectedError,
     TrajectoryErrorCode,
     TrajectoryGoal,
-    TrajectoryTicket,
+    TrajectoryGoalHandle,
 )
-from modular_framework_control.trajectory_tolerances import JointTolerance
 
 URDF = """<robot name="r"><joint name="a" type="revolute"><limit lower="-9" upper="9" velocity="90" effort="1"/></joint>
 <joint name="b" type="revolute"><limit lower="-9" upper="9" velocity="90" effort="1"/></joint>
@@ -69,11 +69,11 @@ def points(*rows: tuple[float, tuple[float, ...]]) -> tuple[TrajectoryPoint, ...
 
 
 def send(loop: Any, *rows: tuple[float, tuple[float, ...]], names: tuple[str, ...] = ("a", "b", "c"),
-         stamp_s: float = 0.0, **more: Any) -> TrajectoryTicket:
-    ticket = TrajectoryTicket()
+         stamp_s: float = 0.0, **more: Any) -> TrajectoryGoalHandle:
+    goal_handle = TrajectoryGoalHandle()
     trajectory = JointTrajectory(names, points(*rows), stamp_s)
-    loop.controllers["arm"].submit(TrajectoryGoal(trajectory, **more), ticket)
-    return ticket
+    loop.controllers["arm"].submit(TrajectoryGoal(trajectory, **more), goal_handle)
+    return goal_handle
 
 
 def command(loop: Any, *rows: tuple[float, tuple[float, ...]], stamp_s: float = 0.0) -> None:
@@ -92,8 +92,8 @@ def test_a_random_trajectory_of_ten_points_is_tracked_to_a_millionth(make_loop: 
     times = np.cumsum(rng.uniform(0.4, 0.8, 10))
     states = rng.uniform(-0.3, 0.3, (10, 3, 3)) * np.array([1.0, 0.5, 0.5])[:, np.newaxis]
     sent = tuple(TrajectoryPoint(float(t), *map(tuple, state)) for t, state in zip(times, states, strict=True))
-    ticket = TrajectoryTicket()
-    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory(("a", "b", "c"), sent)), ticket)
+    goal_handle = TrajectoryGoalHandle()
+    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory(("a", "b", "c"), sent)), goal_handle)
     begun_s = loop.time_s
     knots = np.concatenate([[0.0], times])
     splines = [BPoly.from_derivatives(knots, np.concatenate([[ZEROS], states[:, :, joint]])) for joint in range(3)]
@@ -104,39 +104,39 @@ def test_a_random_trajectory_of_ten_points_is_tracked_to_a_millionth(make_loop: 
         loop.robot_hw.read(loop.time_s, loop.period_s)
         for handle, spline in zip(handles, splines, strict=True):
             assert abs(handle.position - float(spline(min(time_s - begun_s, times[-1])))) < 1e-6
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
 
 
 def test_success_is_told_with_its_code(loop: Any) -> None:
-    ticket = send(loop, (0.5, (0.3, 0.1, 0.1)))
+    goal_handle = send(loop, (0.5, (0.3, 0.1, 0.1)))
     loop.run(0.45)
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.run(0.1)
-    assert (ticket.status, ticket.result) == (GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL)
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL)
 
 
 def test_a_joint_off_its_path_aborts_and_the_arm_stops(loop: Any) -> None:
-    ticket = send(loop, (0.5, (0.3, 1.5, 0.1)))
+    goal_handle = send(loop, (0.5, (0.3, 1.5, 0.1)))
     loop.run(0.5)
-    assert (ticket.status, ticket.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED)
-    assert "joint 'b': position error 0.1" in ticket.text and "tolerance 0.1" in ticket.text
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED)
+    assert "joint 'b': position error 0.1" in goal_handle.text and "tolerance 0.1" in goal_handle.text
     desired = loop.controllers["arm"].desired_at(loop.time_s)
     assert not desired[1:].any() and desired[0, 0] < 0.3
 
 
 def test_a_joint_short_of_its_goal_aborts_after_goal_time(loop: Any) -> None:
-    ticket = send(loop, (0.5, (0.3, 1.5, 0.1)), path_tolerance={"b": JointTolerance(-1.0)})
+    goal_handle = send(loop, (0.5, (0.3, 1.5, 0.1)), path_tolerance={"b": JointTolerance(-1.0)})
     loop.run(0.65)
-    assert ticket.status is GoalStatus.ACTIVE
+    assert goal_handle.status is GoalStatus.ACTIVE
     loop.run(0.1)
-    assert (ticket.status, ticket.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED)
-    assert "joint 'b'" in ticket.text and "goal_time 0.2 s" in ticket.text
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED)
+    assert "joint 'b'" in goal_handle.text and "goal_time 0.2 s" in goal_handle.text
 
 
 def test_a_late_joint_within_goal_time_succeeds(loop: Any) -> None:
-    ticket = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)})
+    goal_handle = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)})
     loop.run(0.75)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
 
 
 def test_the_goal_may_lengthen_goal_time_widen_and_erase_tolerances(loop: Any) -> None:
@@ -150,17 +150,18 @@ def test_the_goal_may_lengthen_goal_time_widen_and_erase_tolerances(loop: Any) -
 
 
 def test_a_goal_with_no_goal_time_at_all_must_be_there_at_once(loop: Any) -> None:
-    ticket = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)}, goal_time_tolerance_s=-1.0)
+    goal_handle = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)},
+                       goal_time_tolerance_s=-1.0)
     loop.run(0.52)
-    assert ticket.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert goal_handle.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
 
 
 def test_a_joint_that_still_moves_has_not_reached_its_goal(start: Callable[..., Any]) -> None:
     loop = start(constraints={"goal_time": 0.05, "stopped_velocity_tolerance": 0.01})
-    ticket = send(loop, (0.5, (0.0, 1.0, 0.0)))
+    goal_handle = send(loop, (0.5, (0.0, 1.0, 0.0)))
     loop.run(0.6)
-    assert ticket.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
-    assert "joint 'b': velocity error" in ticket.text
+    assert goal_handle.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert "joint 'b': velocity error" in goal_handle.text
 
 
 @pytest.mark.parametrize(("names", "rows", "more", "code", "words"), [
@@ -187,16 +188,16 @@ def test_a_malformed_goal_is_refused_with_code_and_reason(
 
 def test_a_tolerance_of_a_joint_that_the_controller_does_not_have_is_left_out_with_a_warning(
         loop: Any, caplog: pytest.LogCaptureFixture) -> None:
-    ticket = send(loop, (0.5, (0.3, 0.1, 0.1)), goal_tolerance={"x": JointTolerance(1e-9)})
+    goal_handle = send(loop, (0.5, (0.3, 0.1, 0.1)), goal_tolerance={"x": JointTolerance(1e-9)})
     loop.run(0.6)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert "goal_tolerance of joint 'x', which the controller does not have; it has: a, b, c" in caplog.text
 
 
 def test_a_first_point_before_the_beginning_lies_in_the_past_and_is_left_out(loop: Any) -> None:
-    ticket = send(loop, (-0.1, (5.0, 5.0, 5.0)), (0.5, (0.3, 0.1, 0.1)))
+    goal_handle = send(loop, (-0.1, (5.0, 5.0, 5.0)), (0.5, (0.3, 0.1, 0.1)))
     loop.run(0.6)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert commands(loop) == pytest.approx([0.3, 0.1, 0.1])
     late = send(loop, (-0.2, ZEROS), (-0.1, ZEROS))
     loop.step()
@@ -206,16 +207,16 @@ def test_a_first_point_before_the_beginning_lies_in_the_past_and_is_left_out(loo
 @pytest.mark.parametrize(("rows", "stamp_back_s"), [([(0.0, ZEROS)], 0.0), ([(0.5, ZEROS), (1.0, ZEROS)], 1.5)])
 def test_a_goal_wholly_in_the_past_is_rejected(loop: Any, rows: list[Any], stamp_back_s: float) -> None:
     stamp_s = loop.time_s - stamp_back_s if stamp_back_s else 0.0
-    ticket = send(loop, *rows, stamp_s=stamp_s)
+    goal_handle = send(loop, *rows, stamp_s=stamp_s)
     loop.step()
-    assert (ticket.status, ticket.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
-    assert "in the past" in ticket.text
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
+    assert "in the past" in goal_handle.text
 
 
 def test_points_in_the_past_are_left_out(loop: Any) -> None:
-    ticket = send(loop, (0.1, (5.0, 5.0, 5.0)), (1.0, (0.2, 0.1, 0.1)), stamp_s=loop.time_s - 0.5)
+    goal_handle = send(loop, (0.1, (5.0, 5.0, 5.0)), (1.0, (0.2, 0.1, 0.1)), stamp_s=loop.time_s - 0.5)
     loop.run(0.55)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert commands(loop) == pytest.approx([0.2, 0.1, 0.1])
 
 
@@ -224,13 +225,13 @@ def test_a_stamp_in_the_future_lets_the_old_motion_go_on_until_then(loop: Any) -
     command(loop, (1.0, (1.0, 0.4, 0.0)))
     loop.run(0.2)
     old = loop.controllers["arm"].desired_at(begun_s + 0.49)
-    ticket = send(loop, (0.5, (0.0, 0.0, 0.0)), stamp_s=begun_s + 0.5)
+    goal_handle = send(loop, (0.5, (0.0, 0.0, 0.0)), stamp_s=begun_s + 0.5)
     loop.step()
     assert loop.controllers["arm"].desired_at(begun_s + 0.49) == pytest.approx(old)
     seen = [loop.controllers["arm"].desired_at(begun_s + t)[0] for t in np.linspace(0.3, 1.0, 400)]
     assert np.abs(np.diff(seen, axis=0)).max() < 0.01
     loop.run(0.9)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert commands(loop) == pytest.approx(ZEROS, abs=1e-9)
 
 
@@ -251,13 +252,13 @@ def test_a_new_goal_takes_over_without_a_jump_in_position_or_velocity(loop: Any)
 @pytest.mark.parametrize("duration_s", [0.0, 0.2])
 def test_cancel_comes_to_rest_within_the_stop_duration(start: Callable[..., Any], duration_s: float) -> None:
     loop = start(stop_trajectory_duration=duration_s)
-    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.0, 0.0, 0.0)))
     loop.run(0.5)
     velocity = loop.controllers["arm"].desired_at(loop.time_s)[1, 0]
-    loop.controllers["arm"].cancel(ticket)
+    loop.controllers["arm"].cancel(goal_handle)
     canceled_s = loop.time_s
     loop.step()
-    assert ticket.status is GoalStatus.CANCELED
+    assert goal_handle.status is GoalStatus.CANCELED
     at_cancel = loop.controllers["arm"].desired_at(canceled_s)
     end = loop.controllers["arm"].desired_at(canceled_s + duration_s + 1e-6)
     assert at_cancel[1, 0] == pytest.approx(velocity if duration_s else 0.0, rel=0.01)
@@ -278,9 +279,9 @@ def test_cancel_of_a_finished_goal_changes_nothing(loop: Any) -> None:
 def test_an_empty_goal_stops_and_succeeds_and_an_empty_command_stops(loop: Any) -> None:
     command(loop, (1.0, (1.0, 0.0, 0.0)))
     loop.run(0.5)
-    ticket = send(loop)
+    goal_handle = send(loop)
     loop.run(0.1)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     held = commands(loop)
     loop.run(0.3)
     assert commands(loop) == held
@@ -295,20 +296,20 @@ def test_a_partial_goal_moves_its_joints_and_lets_the_others_finish(start: Calla
     loop = start(allow_partial_joints_goal=True)
     command(loop, (1.0, (0.5, 0.3, 0.2)))
     loop.run(0.5)
-    ticket = send(loop, (0.3, (0.0,)), names=("a",))
+    goal_handle = send(loop, (0.3, (0.0,)), names=("a",))
     loop.run(0.4)
-    assert ticket.status is GoalStatus.ACTIVE, "the motion of the others has not ended"
+    assert goal_handle.status is GoalStatus.ACTIVE, "the motion of the others has not ended"
     loop.run(0.3)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert commands(loop) == pytest.approx([0.0, 0.3, 0.2], abs=1e-9)
 
 
 def test_a_partial_goal_may_have_values_for_more_joints_than_it_names(start: Callable[..., Any],
                                                                       caplog: pytest.LogCaptureFixture) -> None:
     loop = start(allow_partial_joints_goal=True)
-    ticket = send(loop, (0.5, (0.1, 0.4)), (1.0, (0.2, 0.3)), names=("b",))
+    goal_handle = send(loop, (0.5, (0.1, 0.4)), (1.0, (0.2, 0.3)), names=("b",))
     loop.run(1.1)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert commands(loop) == pytest.approx([0.0, 0.2, 0.0], abs=1e-9)
     assert "points have 2 values each, only the first 1 are used, for: b" in caplog.text
 
@@ -329,9 +330,9 @@ def test_joints_may_be_named_in_any_order(loop: Any) -> None:
 
 
 def test_a_continuous_joint_takes_the_short_way(loop: Any) -> None:
-    ticket = send(loop, (0.5, (0.0, 0.0, 2.0 * math.pi + 0.1)))
+    goal_handle = send(loop, (0.5, (0.0, 0.0, 2.0 * math.pi + 0.1)))
     loop.run(0.6)
-    assert ticket.status is GoalStatus.SUCCEEDED
+    assert goal_handle.status is GoalStatus.SUCCEEDED
     assert commands(loop)[2] == pytest.approx(0.1)
 
 
@@ -340,7 +341,7 @@ def test_states_and_feedback_come_at_their_rates(start: Callable[..., Any]) -> N
     states: list[Any] = []
     feedback: list[Any] = []
     loop.controllers["arm"].on_state = states.append
-    loop.controllers["arm"].on_feedback = lambda ticket, snapshot: feedback.append(snapshot)
+    loop.controllers["arm"].on_feedback = lambda goal_handle, snapshot: feedback.append(snapshot)
     send(loop, (0.95, (0.3, 0.1, 0.0)))
     loop.run(1.0)
     assert len(states) == pytest.approx(25, abs=1)
@@ -349,10 +350,10 @@ def test_states_and_feedback_come_at_their_rates(start: Callable[..., Any]) -> N
 
 
 def test_a_stopped_controller_ends_its_goals_and_takes_no_other(loop: Any) -> None:
-    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.0, 0.0, 0.0)))
     loop.run(0.1)
     assert loop.switch([], ["arm"]) is None
-    assert ticket.status is GoalStatus.CANCELED
+    assert goal_handle.status is GoalStatus.CANCELED
     with pytest.raises(GoalRejectedError, match="not running"):
         send(loop, (1.0, ZEROS))
 
@@ -365,12 +366,12 @@ def test_nothing_is_desired_before_the_first_start(make_loop: Callable[..., Any]
 
 
 def test_after_a_reset_of_time_the_arm_holds_and_its_goal_has_ended(loop: Any) -> None:
-    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.0, 0.0, 0.0)))
     loop.run(0.5)
     held = commands(loop)
     loop.time_s = 0.0
     loop.run(0.2)
-    assert ticket.status is GoalStatus.CANCELED
+    assert goal_handle.status is GoalStatus.CANCELED
     assert commands(loop) == pytest.approx(held, abs=0.03)
 
 
@@ -390,10 +391,10 @@ def test_a_goal_that_slips_in_while_the_controller_stops_is_not_followed_later(l
     controller = loop.controllers["arm"]
     assert loop.switch([], ["arm"]) is None
     controller._running = True
-    ticket = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.0, 0.0, 0.0)))
     assert loop.switch(["arm"], []) is None
     loop.run(0.2)
-    assert ticket.status is GoalStatus.REJECTED
+    assert goal_handle.status is GoalStatus.REJECTED
     assert commands(loop) == pytest.approx(ZEROS)
 
 
@@ -406,15 +407,15 @@ def test_a_goal_that_ends_with_the_cycle_it_arrives_in_does_no_harm(loop: Any) -
 
 def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_lost(
         loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    order_of = joint_trajectory_controller.order_of
+    validate_goal = joint_trajectory_controller.validate_goal
 
     def stop_meanwhile(*arguments: Any) -> Any:
         assert loop.switch([], ["arm"]) is None
-        return order_of(*arguments)
+        return validate_goal(*arguments)
 
-    monkeypatch.setattr(joint_trajectory_controller, "order_of", stop_meanwhile)
-    ticket = send(loop, (0.5, (0.3, 0.1, 0.1)))
-    assert (ticket.status, ticket.text) == (GoalStatus.REJECTED, "the controller was stopped")
+    monkeypatch.setattr(joint_trajectory_controller, "validate_goal", stop_meanwhile)
+    goal_handle = send(loop, (0.5, (0.3, 0.1, 0.1)))
+    assert (goal_handle.status, goal_handle.text) == (GoalStatus.REJECTED, "the controller was stopped")
     assert loop.switch(["arm"], []) is None
     before = commands(loop)
     loop.run(0.2)

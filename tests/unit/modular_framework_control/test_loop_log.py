@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from modular_framework_control.ros_loop_log import LoopLog
+from modular_framework_control.ros.loop_log import LoopLog
 
 LOGGER = logging.getLogger("rosout.test_of_the_loop_log")
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from modular_framework_control.conversions import joint_state_to_msg, trajectory_from_msg
-from modular_framework_control.joint_state_controller import JointStateSnapshot
-from modular_framework_control.loop_time import NOTICED_STEP_S, LoopTime
+from modular_framework_control.controllers.joint_state_controller import JointStateSnapshot
+from modular_framework_control.realtime.loop_time import NOTICED_STEP_S, LoopTime
+from modular_framework_control.ros.conversions import joint_state_to_msg, trajectory_from_msg
 
 
 class Clocks:

@@ -9,32 +9,32 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from modular_framework_control.mailbox import Mailbox
+from modular_framework_control.realtime.mailbox import Mailbox
 
-ORDERS = 1_000_000
+ITEMS = 1_000_000
 
 
 def test_orders_are_taken_in_sequence_those_put_in_meanwhile_included() -> None:
     mailbox: Mailbox[str] = Mailbox()
-    assert list(mailbox.taken()) == []
+    assert list(mailbox.drain()) == []
     mailbox.put("first")
     mailbox.put("second")
     taken = []
-    for order in mailbox.taken():
-        taken.append(order)
-        if order == "first":
+    for item in mailbox.drain():
+        taken.append(item)
+        if item == "first":
             mailbox.put("put in meanwhile")
     assert taken == ["first", "second", "put in meanwhile"]
-    assert list(mailbox.taken()) == []
+    assert list(mailbox.drain()) == []
 
 
 def test_an_order_that_cannot_be_carried_out_stays_before_those_that_wait() -> None:
     mailbox: Mailbox[int] = Mailbox()
-    for order in (0, 1, 2):
-        mailbox.put(order)
+    for item in (0, 1, 2):
+        mailbox.put(item)
     with pytest.raises(ZeroDivisionError):
-        mailbox.work_off(lambda order: None if order == 0 else print(order / 0))
-    assert list(mailbox.taken()) == [1, 2]
+        mailbox.process(lambda item: None if item == 0 else print(item / 0))
+    assert list(mailbox.drain()) == [1, 2]
 
 
 @pytest.fixture
@@ -52,17 +52,17 @@ def test_orders_that_two_threads_take_while_another_puts_are_each_taken_once() -
     all_are_in = threading.Event()
 
     def put() -> None:
-        for order in range(ORDERS):
-            mailbox.put(order)
+        for item in range(ITEMS):
+            mailbox.put(item)
         all_are_in.set()
 
     def take() -> list[int]:
         taken: list[int] = []
         while not all_are_in.is_set():
-            taken.extend(mailbox.taken())
+            taken.extend(mailbox.drain())
         return taken
 
     with ThreadPoolExecutor() as threads:
         takers = [threads.submit(take), threads.submit(take)]
         threads.submit(put).result(30.0)
-    assert sorted([*takers[0].result(), *takers[1].result(), *mailbox.taken()]) == list(range(ORDERS))
+    assert sorted([*takers[0].result(), *takers[1].result(), *mailbox.drain()]) == list(range(ITEMS))

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from modular_framework_control.planar_odometry import PlanarOdometry, arc
-from modular_framework_control.speed_limiter import SpeedLimiter, read_speed_limiter
-from modular_framework_control.wheel_geometry import WheelGeometry
+from modular_framework_control.mobile_base.planar_odometry import PlanarOdometry, arc
+from modular_framework_control.mobile_base.speed_limiter import SpeedLimiter, read_speed_limiter
+from modular_framework_control.mobile_base.wheel_geometry import WheelGeometry
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 
 NUMBERS = st.floats(-3.0, 3.0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.mock_robot_hw import MockRobotHW
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 URDF = """<robot name="r">

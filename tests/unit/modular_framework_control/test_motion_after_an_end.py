@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.goal_ticket import GoalStatus, GoalTicket
-from modular_framework_control.hardware_interface import COMMAND_INTERFACES
-from modular_framework_control.mock_robot_hw import MockRobotHW
-from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory_goal import (
+from modular_framework_control.hardware_interface.interfaces import COMMAND_INTERFACES
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
+from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.trajectory_goal import (
     GoalRejectedError,
     TrajectoryErrorCode,
     TrajectoryGoal,
-    TrajectoryTicket,
+    TrajectoryGoalHandle,
 )
 
 FASTEST = 3.15
@@ -72,17 +72,17 @@ def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     return starter
 
 
-def send(loop: Any, *points: tuple[float, Sequence[float], Sequence[float]]) -> TrajectoryTicket:
+def send(loop: Any, *points: tuple[float, Sequence[float], Sequence[float]]) -> TrajectoryGoalHandle:
     """Send a goal and let a cycle pass; a goal that is refused at once ends as rejected, too."""
-    ticket: TrajectoryTicket = GoalTicket()
+    goal_handle: TrajectoryGoalHandle = RealtimeGoalHandle()
     rows = tuple(TrajectoryPoint(time_s, tuple(position), tuple(velocity), (0.0, 0.0) if velocity else ())
                  for time_s, position, velocity in points)
     try:
-        loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(JOINTS, rows)), ticket)
+        loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(JOINTS, rows)), goal_handle)
     except GoalRejectedError as error:
-        ticket.finish(GoalStatus.REJECTED, error.code, str(error))
+        goal_handle.finish(GoalStatus.REJECTED, error.code, str(error))
     loop.step()
-    return ticket
+    return goal_handle
 
 
 def positions(loop: Any) -> list[float]:
@@ -100,9 +100,9 @@ def way_after(loop: Any, duration_s: float = 3.0) -> float:
 
 def assert_next_goal_succeeds(loop: Any) -> None:
     target = tuple(position + 0.05 for position in positions(loop))
-    ticket = send(loop, (1.0, target, (0.0, 0.0)))
+    goal_handle = send(loop, (1.0, target, (0.0, 0.0)))
     loop.run(2.0)
-    assert ticket.status is GoalStatus.SUCCEEDED, ticket.text
+    assert goal_handle.status is GoalStatus.SUCCEEDED, goal_handle.text
     assert positions(loop) == pytest.approx(target, abs=0.02)
 
 
@@ -118,9 +118,9 @@ def assert_next_goal_succeeds(loop: Any) -> None:
 def test_a_goal_beyond_known_limits_is_refused_with_point_and_joint_and_nothing_moves(
         start: Callable[..., Any], family: str, points: list[Any], words: str) -> None:
     loop = start(family, stop_s=0.5)
-    ticket = send(loop, *points)
-    assert (ticket.status, ticket.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
-    assert words in ticket.text
+    goal_handle = send(loop, *points)
+    assert (goal_handle.status, goal_handle.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
+    assert words in goal_handle.text
     assert way_after(loop) < 1e-6
     assert_next_goal_succeeds(loop)
 
@@ -131,24 +131,24 @@ def test_a_goal_beyond_known_limits_is_refused_with_point_and_joint_and_nothing_
 def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(start: Callable[..., Any], family: str,
                                                                        stop_s: float, end: str) -> None:
     loop = start(family, stop_s=stop_s, tolerance={"goal": 0.02})
-    ticket = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
     loop.run(0.5)
     speed = abs(loop.robot_hw.joints[0].state.velocity)
     assert speed > 1.5
     if end == "cancel":
-        loop.controllers["c"].cancel(ticket)
+        loop.controllers["c"].cancel(goal_handle)
     elif end == "switch":
         assert loop.switch([], ["c"]) is None
     else:
         names = JOINTS if end == "empty goal" else ()
         goal = TrajectoryGoal(JointTrajectory(names, ()))
-        loop.controllers["c"].submit(goal, GoalTicket() if end == "empty goal" else None)
+        loop.controllers["c"].submit(goal, RealtimeGoalHandle() if end == "empty goal" else None)
     if family == "effort" and end == "switch":
         return      # a body without friction rolls on when nothing brakes it
     way = way_after(loop)
     lag_s = 0.1 if family in GAINS else 0.03     # gains follow later
     assert way <= speed * (0.5 * stop_s + lag_s) + 1e-3
-    assert ticket.status is GoalStatus.CANCELED
+    assert goal_handle.status is GoalStatus.CANCELED
     if end == "switch":
         assert loop.switch(["c"], []) is None
     assert_next_goal_succeeds(loop)
@@ -160,14 +160,14 @@ def test_at_a_wall_the_actual_position_is_held_and_nothing_pushes(start: Callabl
                                                                    end: str) -> None:
     loop = start(family, tolerance=GOAL if end == "path" else {"goal": 0.02})
     loop.robot_hw.wall = 0.2
-    ticket = send(loop, (1.0, (1.0, 0.1), (0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.0, 0.1), (0.0, 0.0)))
     loop.run(0.7)
     if end == "cancel":
-        loop.controllers["c"].cancel(ticket)
+        loop.controllers["c"].cancel(goal_handle)
     elif end == "switch":
         assert loop.switch([], ["c"]) is None
     loop.run(1.5)
-    assert ticket.result is {"path": TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
+    assert goal_handle.result is {"path": TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
                              "goal": TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED}.get(
                                  end, TrajectoryErrorCode.INVALID_GOAL)
     rest = 0.0 if family in GAINS else 0.2
@@ -184,9 +184,9 @@ def test_no_goal_makes_a_controller_forget_where_its_joints_are(start: Callable[
     loop = start(family, limits=None, stop_s=0.5)
     loop.robot_hw.wall = 0.01
     for velocity in (1e6, -1e6, 1e9):
-        ticket = send(loop, (0.5, (0.5, 0.005), (velocity, 0.0)))
+        goal_handle = send(loop, (0.5, (0.5, 0.005), (velocity, 0.0)))
         loop.run(2.0)
-        assert ticket.status is GoalStatus.ABORTED
+        assert goal_handle.status is GoalStatus.ABORTED
         before = positions(loop)
         desired = loop.controllers["c"].desired_at(loop.time_s)
         assert abs(desired[0, 0] - before[0]) < 1e-3 or family in GAINS
@@ -249,13 +249,13 @@ def test_a_joint_that_is_measured_at_no_position_stops_and_takes_no_goals_until_
         start: Callable[..., Any], family: str, stop_s: float) -> None:
     hw = BlindRobotHW()
     loop = start(family, stop_s=stop_s, tolerance={"goal": 0.02}, hw=hw)
-    ticket = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
+    goal_handle = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
     loop.run(0.5)
     before, speed, hw.blind = hw.position, hw.joints[0].velocity, True
     refused = send(loop, (5.0, (0.1, 0.1), (0.0, 0.0)))
-    for lost in (ticket, refused):
+    for lost in (goal_handle, refused):
         assert "joint 'pan' is measured at nan; expected a position" in lost.text
-    assert (ticket.status, refused.status) == (GoalStatus.ABORTED, GoalStatus.REJECTED)
+    assert (goal_handle.status, refused.status) == (GoalStatus.ABORTED, GoalStatus.REJECTED)
     for _ in range(50):
         loop.step()
         assert all(math.isfinite(joint.command) for joint in hw.joints)
@@ -312,9 +312,9 @@ def late_loop(make_loop: Callable[..., Any]) -> Any:
 
 
 def test_on_a_ramp_a_joint_that_follows_late_never_turns_back(late_loop: Any) -> None:
-    ticket = send(late_loop, (4.0, (0.8, 0.0), (0.0, 0.0)))
+    goal_handle = send(late_loop, (4.0, (0.8, 0.0), (0.0, 0.0)))
     late_loop.run(2.0)
-    late_loop.controllers["c"].cancel(ticket)
+    late_loop.controllers["c"].cancel(goal_handle)
     seen = []
     for _ in range(40):
         late_loop.step()
@@ -325,9 +325,9 @@ def test_on_a_ramp_a_joint_that_follows_late_never_turns_back(late_loop: Any) ->
 
 def test_a_ramp_at_a_wall_begins_with_no_more_than_the_last_command(late_loop: Any) -> None:
     late_loop.robot_hw.wall = 0.26
-    ticket = send(late_loop, (1.0, (0.8, 0.0), (0.0, 0.0)))
+    goal_handle = send(late_loop, (1.0, (0.8, 0.0), (0.0, 0.0)))
     late_loop.run(0.5)
-    late_loop.controllers["c"].cancel(ticket)
+    late_loop.controllers["c"].cancel(goal_handle)
     late_loop.run(0.5)
     assert 0.26 < late_loop.controllers["c"].desired_at(late_loop.time_s)[0, 0] < 0.28
 
@@ -337,10 +337,10 @@ def test_a_joint_without_end_is_stopped_in_the_turn_in_which_it_is_commanded(lat
     assert name == "c" or late_loop.switch([name], ["c"]) is None
     late_loop.controllers["c"] = late_loop.controllers[name]
     for target in (3.0, 4.5):
-        ticket = send(late_loop, (2.0, (target, 0.0), (0.0, 0.0)))
+        goal_handle = send(late_loop, (2.0, (target, 0.0), (0.0, 0.0)))
         late_loop.run(2.1 if target == 3.0 else 1.0)
     assert positions(late_loop)[0] < -2.0, "measured a turn below its command"
-    late_loop.controllers["c"].cancel(ticket)
+    late_loop.controllers["c"].cancel(goal_handle)
     before = late_loop.robot_hw.joints[0].command
     late_loop.run(0.5)
     assert before > 3.5 and late_loop.robot_hw.joints[0].command == pytest.approx(before, abs=0.1)

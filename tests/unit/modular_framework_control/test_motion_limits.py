@@ -10,10 +10,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
-from modular_framework_control.joint_limit_parameters import JointLimits
-from modular_framework_control.trajectory import JointTrajectory, Spline, Track, TrajectoryPoint
-from modular_framework_control.trajectory_limits import MotionLimits, excesses_of
-from modular_framework_control.trajectory_stop import COMMAND_S, FOLLOWING_LAG_S, StopMotion
+from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, Spline, Track, TrajectoryPoint
+from modular_framework_control.trajectory.motion_limits import MotionLimits, limit_violations
+from modular_framework_control.trajectory.stop_motion import COMMAND_S, FOLLOWING_LAG_S, StopMotion
 
 FREE = MotionLimits.of([JointLimits()])
 BOUND = MotionLimits.of([JointLimits(-2.0, 2.0, 3.0, max_acceleration=20.0)])
@@ -28,7 +28,7 @@ def point(time_s: float, position: float, velocity: float | None = None,
 
 def refusal(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0, here: float = 0.0) -> str:
     spline = Spline(JointTrajectory(("a",), points))
-    return excesses_of(spline, ("a",), limits, np.array([here])).text(first, first + 1)
+    return limit_violations(spline, ("a",), limits, np.array([here])).text(first, first + 1)
 
 
 @pytest.mark.parametrize(("points", "words"), [

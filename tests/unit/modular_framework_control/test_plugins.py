@@ -7,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_control.combined_robot_hw import robot_hw_of_type
-from modular_framework_control.plugins import (
+from modular_framework_control.hardware_interface.combined_robot_hw import robot_hw_of_type
+from modular_framework_control.hardware_interface.plugins import (
     CONTROLLER_BASE,
     ROBOT_HW_BASE,
     PluginError,
     PluginIndex,
     read_description,
 )
-from modular_framework_control.robot_hw import RobotHW
-from modular_framework_control.ros_packages import packages_of_workspace
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.workspace_packages import packages_of_workspace
 
 CLASS = '<class name="{name}" type="{cls}" base_class_type="{base}"/>'
 MODULE = """
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 
 class LabArm(RobotHW):
     pass
@@ -77,7 +77,8 @@ def test_a_module_that_was_changed_is_imported_anew_after_a_reload(lab: Callable
 @pytest.mark.parametrize(("cls", "module", "words"), [
     ("Absent", "lab_arms_hw", "AttributeError"),
     ("LabArm", "lab_arms_absent", "ModuleNotFoundError"),
-    ("NoArm", "lab_arms_hw", "is no RobotHW; derive it from modular_framework_control.robot_hw.RobotHW"),
+    ("NoArm", "lab_arms_hw", "is no RobotHW; derive it from "
+     "modular_framework_control.hardware_interface.robot_hw.RobotHW"),
 ])
 def test_a_class_that_cannot_be_loaded_is_told_with_its_origin(lab: Callable[..., PluginIndex], cls: str, module: str,
                                                                words: str) -> None:

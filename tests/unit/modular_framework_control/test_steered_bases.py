@@ -11,17 +11,22 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from modular_framework_control.controller import ControllerError
-from modular_framework_control.four_wheel_kinematics import FASTEST_AXLE, FourWheelGeometry, PlanarTwist, axle_angle
-from modular_framework_control.four_wheel_steering_controller import SteeringCommand
-from modular_framework_control.handles import JointHandle, JointStateHandle
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
+from modular_framework_control.hardware_interface.interfaces import (
     JointStateInterface,
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.mobile_base_controller import BaseVelocity
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.mobile_base.four_wheel_kinematics import (
+    FASTEST_AXLE,
+    FourWheelGeometry,
+    PlanarTwist,
+    axle_angle,
+)
+from modular_framework_control.mobile_base.four_wheel_steering_controller import SteeringCommand
+from modular_framework_control.mobile_base.mobile_base_controller import BaseVelocity
 from modular_framework_ros.node_handle import NodeHandle
 
 TRACK, WHEEL_BASE, RADIUS, OFFSET = 1.2, 1.9, 0.28, 0.1

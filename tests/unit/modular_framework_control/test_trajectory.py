@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from modular_framework_control.trajectory import (
+from modular_framework_control.trajectory.joint_trajectory import (
     InvalidTrajectoryError,
     JointTrajectory,
     Spline,
@@ -18,7 +18,7 @@ from modular_framework_control.trajectory import (
     TrajectoryPoint,
     splice,
 )
-from modular_framework_control.trajectory_check import check_points
+from modular_framework_control.trajectory.point_checks import check_points
 
 RNG = np.random.default_rng(7)
 NAMES = ("a", "b", "c")

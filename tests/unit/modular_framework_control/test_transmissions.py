@@ -10,25 +10,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
     JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
     VelocityJointInterface,
 )
-from modular_framework_control.joint_limit_parameters import limits_from_urdf
-from modular_framework_control.robot_hw import RobotHW
-from modular_framework_control.robot_transmissions import RobotTransmissions
-from modular_framework_control.transmission_parser import read_transmissions
-from modular_framework_control.transmissions import (
+from modular_framework_control.hardware_interface.joint_limit_parameters import limits_from_urdf
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_transmissions import RobotTransmissions
+from modular_framework_control.hardware_interface.transmission_parser import read_transmissions
+from modular_framework_control.hardware_interface.transmissions import (
     DifferentialTransmission,
     FourBarLinkageTransmission,
     SimpleTransmission,
     Transmission,
     TransmissionError,
 )
-from modular_framework_control.urdf_xml import parse_description
+from modular_framework_control.hardware_interface.urdf_xml import parse_description
 from modular_framework_ros.node_handle import MappingNodeHandle, NodeHandle, ParameterError
 
 REDUCTIONS = st.floats(0.01, 1000.0).flatmap(lambda n: st.sampled_from([n, -n]))

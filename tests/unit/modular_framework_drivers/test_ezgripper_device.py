@@ -379,7 +379,7 @@ def test_a_control_loop_need_not_wait_for_the_thread_of_the_gripper(idle: EzGrip
     grip = idle._grip = SlowGrip()
     idle.command(1.0, 300)
     with ThreadPoolExecutor() as threads:
-        taking = threads.submit(idle._take_orders, 0.0, 0.0)
+        taking = threads.submit(idle._handle_request, 0.0, 0.0)
         assert grip.begun.wait(10.0)
         try:
             number = threads.submit(idle.command, 1.1, 300).result(1.0)
@@ -389,7 +389,7 @@ def test_a_control_loop_need_not_wait_for_the_thread_of_the_gripper(idle: EzGrip
             grip.go_on.set()
         taking.result(10.0)
     assert grip.goal.position == 1.0
-    idle._take_orders(0.0, 0.1)
+    idle._handle_request(0.0, 0.1)
     assert grip.goal.position == 1.1 and grip.goal.number > number
 
 
@@ -397,7 +397,7 @@ def test_the_same_goal_in_every_cycle_begins_nothing_anew(idle: EzGripper) -> No
     grip = idle._grip
     for cycle in range(20):
         number = idle.command(1.0, 300)
-        idle._take_orders(1.0, 0.1 * cycle)
+        idle._handle_request(1.0, 0.1 * cycle)
         grip.update(1.0, 0.1 * cycle)
         assert grip.goal.number == number
     assert grip.motion is Motion.REACHED
@@ -408,11 +408,11 @@ def test_a_goal_from_before_a_fault_is_void(idle: EzGripper) -> None:
     idle._report("the cable is out")
     idle.command(1.1, 300)
     idle._publish(idle.state().reading, time.monotonic(), "")
-    idle._take_orders(0.0, 0.0)
+    idle._handle_request(0.0, 0.0)
     assert idle._grip.goal.position == 0.0
     assert (idle.state().fault, idle.state().faults, idle.state().last_fault) == ("", 1, "EzGripper: the cable is out")
     idle.command(1.2, 300)
-    idle._take_orders(0.0, 0.0)
+    idle._handle_request(0.0, 0.0)
     assert idle._grip.goal.position == 1.2
 
 

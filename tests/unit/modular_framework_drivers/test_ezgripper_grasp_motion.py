@@ -25,11 +25,11 @@ class ObedientGripper(EzGripper):
 
     def torque(self) -> int:
         """Of the latest goal."""
-        assert self._wish.goal is not None
-        return self._wish.goal.torque
+        assert self._request.goal is not None
+        return self._request.goal.torque
 
     def state(self) -> GripperState:
-        goal = self._wish.goal
+        goal = self._request.goal
         assert goal is not None
         reading = replace(self._state.reading, position=goal.position)
         return replace(self._state, stamp_s=time.monotonic(), goal=goal, motion=Motion.REACHED, reading=reading)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_drivers.ezgripper.grip import Drive, Goal, Grip, GripRules, Motion, Standing
+from modular_framework_drivers.ezgripper.grip import Drive, Goal, Grip, GripRules, Motion, StandstillDetector
 from modular_framework_drivers.ezgripper.gripper_servos import joint_from_ticks, ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
@@ -146,8 +146,8 @@ def test_ticks_and_joint_positions_belong_together(position: float) -> None:
 
 def times_of_standing(velocities: list[float]) -> list[float]:
     """When fingers with these velocities, measured every PERIOD_S, are said to stand [s]."""
-    standing = Standing(0.05, 0.1)
-    return [round(i * PERIOD_S, 6) for i, v in enumerate(velocities) if standing.update(v, i * PERIOD_S)]
+    standstill = StandstillDetector(0.05, 0.1)
+    return [round(i * PERIOD_S, 6) for i, v in enumerate(velocities) if standstill.update(v, i * PERIOD_S)]
 
 
 def test_fingers_stand_when_they_have_been_slow_for_a_while() -> None:

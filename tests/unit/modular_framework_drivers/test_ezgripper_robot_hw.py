@@ -14,15 +14,15 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.combined_robot_hw import CombinedRobotHW
-from modular_framework_control.controller import Controller
-from modular_framework_control.controller_manager import ControllerManager
-from modular_framework_control.goal_ticket import GoalStatus
-from modular_framework_control.gripper_action_controller import GripperTicket
-from modular_framework_control.hardware_interface import PositionJointInterface
-from modular_framework_control.robot_hw import RobotHW
-from modular_framework_control.trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory_goal import TrajectoryGoal, TrajectoryTicket
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.controller_manager.controller_manager import ControllerManager
+from modular_framework_control.controllers.gripper_action_controller import GripperGoalHandle
+from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.realtime.goal_handle import GoalStatus
+from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.trajectory_goal import TrajectoryGoal, TrajectoryGoalHandle
 from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
@@ -99,11 +99,11 @@ def loop(line: DynamixelLine) -> Iterator[Loop]:
     robot_hw.close()
 
 
-def go(loop: Loop, position: float, max_effort: float = 0.0) -> GripperTicket:
-    ticket: GripperTicket = GripperTicket()
-    loop.controllers["grip"].submit(position, max_effort, ticket)
-    loop.run(lambda: not ticket.open)
-    return ticket
+def go(loop: Loop, position: float, max_effort: float = 0.0) -> GripperGoalHandle:
+    goal_handle: GripperGoalHandle = GripperGoalHandle()
+    loop.controllers["grip"].submit(position, max_effort, goal_handle)
+    loop.run(lambda: not goal_handle.open)
+    return goal_handle
 
 
 def test_the_gripper_controller_moves_it(line: DynamixelLine, loop: Loop) -> None:
@@ -116,10 +116,10 @@ def test_an_object_stalls_it_and_is_held_with_the_effort_asked_for(line: Dynamix
     line.remove_object()
     go(loop, 0.9)
     line.place_object(1.24)
-    ticket = go(loop, 1.9, max_effort=0.25)
-    assert ticket.status is GoalStatus.ABORTED
-    assert ticket.result is not None
-    assert ticket.result.stalled
+    goal_handle = go(loop, 1.9, max_effort=0.25)
+    assert goal_handle.status is GoalStatus.ABORTED
+    assert goal_handle.result is not None
+    assert goal_handle.result.stalled
     handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
     loop.run(lambda: handle.effort == pytest.approx(0.25, abs=0.01))
     assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
@@ -147,12 +147,12 @@ def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loo
     go(loop, 1.5)
     loop.manager.load_controller("swing")
     loop.switch(["swing"], ["grip"])
-    ticket: TrajectoryTicket = TrajectoryTicket()
+    goal_handle: TrajectoryGoalHandle = TrajectoryGoalHandle()
     points = (TrajectoryPoint(0.5, (1.2,)), TrajectoryPoint(1.0, (1.7,)))
-    loop.controllers["swing"].submit(TrajectoryGoal(JointTrajectory((JOINT,), points)), ticket)
-    loop.run(lambda: not ticket.open, 10.0)
+    loop.controllers["swing"].submit(TrajectoryGoal(JointTrajectory((JOINT,), points)), goal_handle)
+    loop.run(lambda: not goal_handle.open, 10.0)
     loop.switch(["grip"], ["swing"])
-    assert ticket.status is GoalStatus.SUCCEEDED, ticket.text
+    assert goal_handle.status is GoalStatus.SUCCEEDED, goal_handle.text
     assert line.fingers[0].opening == pytest.approx(2500 * (1 - 1.7 / 1.94), abs=60)
 
 
@@ -160,13 +160,13 @@ def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_
                                                                                      loop: Loop) -> None:
     line.remove_object()
     go(loop, 0.9)
-    ticket: GripperTicket = GripperTicket()
-    loop.controllers["grip"].submit(1.9, 0.1, ticket)
-    loop.run(lambda: ticket.status is GoalStatus.ACTIVE)
+    goal_handle: GripperGoalHandle = GripperGoalHandle()
+    loop.controllers["grip"].submit(1.9, 0.1, goal_handle)
+    loop.run(lambda: goal_handle.status is GoalStatus.ACTIVE)
     line.unplug()
-    loop.run(lambda: not ticket.open, 2.0)
-    assert ticket.status is GoalStatus.ABORTED
-    assert "EzGripper: port" in ticket.text
+    loop.run(lambda: not goal_handle.open, 2.0)
+    assert goal_handle.status is GoalStatus.ABORTED
+    assert "EzGripper: port" in goal_handle.text
     assert "EzGripper: port" in loop.robot_hw.fault()
     line.plug()
     loop.run(lambda: not loop.robot_hw.fault())
@@ -177,13 +177,13 @@ def test_an_overload_is_no_grasp(line: DynamixelLine, loop: Loop) -> None:
     line.remove_object()
     go(loop, 0.9)
     line.place_object(1.24)
-    ticket: GripperTicket = GripperTicket()
-    loop.controllers["grip"].submit(1.9, 0.5, ticket)
-    loop.run(lambda: ticket.status is GoalStatus.ACTIVE)
+    goal_handle: GripperGoalHandle = GripperGoalHandle()
+    loop.controllers["grip"].submit(1.9, 0.5, goal_handle)
+    loop.run(lambda: goal_handle.status is GoalStatus.ACTIVE)
     line.overload()
-    loop.run(lambda: not ticket.open)
-    assert ticket.status is GoalStatus.ABORTED
-    assert "overloaded" in ticket.text
+    loop.run(lambda: not goal_handle.open)
+    assert goal_handle.status is GoalStatus.ABORTED
+    assert "overloaded" in goal_handle.text
     loop.run(lambda: not loop.robot_hw.fault())
     line.remove_object()
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import pytest
 
-from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
 from modular_framework_drivers.ur import rtde_link, ur_arm_robot_hw
 from modular_framework_drivers.ur.arm_messages import READY, TAKEN, ArmState
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink

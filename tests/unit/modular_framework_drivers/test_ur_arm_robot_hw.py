@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     ForceTorqueSensorInterface,
     JointHandle,
     PositionJointInterface,
@@ -93,11 +93,11 @@ def make_rig(arm: EmulatedArm) -> Iterator[Callable[..., Rig]]:
     yield make
     for rig in rigs:
         rig.hw.close()
-    arm.order("restore")
-    arm.order("release_emergency_stop")
-    arm.order("unlock")
-    arm.order("power_on")
-    arm.order("slider", value=1.0)
+    arm.command("restore")
+    arm.command("release_emergency_stop")
+    arm.command("unlock")
+    arm.command("power_on")
+    arm.command("slider", value=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +114,9 @@ def running() -> Iterator[Rig]:
 @pytest.fixture
 def rig(running: Rig) -> Rig:
     """The shared driver, following an arm that is well."""
-    for order in ("restore", "release_emergency_stop", "unlock", "power_on"):
-        running.arm.order(order)
-    running.arm.order("slider", value=1.0)
+    for command in ("restore", "release_emergency_stop", "unlock", "power_on"):
+        running.arm.command(command)
+    running.arm.command("slider", value=1.0)
     running.cycle()
     running.until(lambda: running.resume() == "")    # what was ordered is known to the driver a little later
     running.until(lambda: running.hw.ready)
@@ -156,24 +156,24 @@ def test_it_follows_a_motion(rig: Rig) -> None:
 
 def test_the_wrench_at_the_tool_is_a_sensor(make_rig: Callable[..., Rig]) -> None:
     rig = make_rig(robot_id="left")
-    rig.arm.order("wrench", fx=1.0, fz=-9.5, ty=0.25)
+    rig.arm.command("wrench", fx=1.0, fz=-9.5, ty=0.25)
     sensor = rig.hw.get(ForceTorqueSensorInterface).get_handle("left_wrench")
     rig.until(lambda: sensor.force == (1.0, 0.0, -9.5))
     assert sensor.torque == (0.0, 0.25, 0.0) and sensor.frame_id == "left_base"
     assert rig.handles[0].name == "left_shoulder_pan_joint"
-    rig.arm.order("wrench")
+    rig.arm.command("wrench")
 
 
-@pytest.mark.parametrize(("order", "reason"), [
+@pytest.mark.parametrize(("command", "reason"), [
     ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
     ("stop_program", "the program on the arm was stopped"), ("cut", "link to the arm"), ("freeze", "link to the arm"),
     ("garbage", "link to the arm")])
-def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, order: str, reason: str) -> None:
+def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, command: str, reason: str) -> None:
     start = rig.positions
     commands = ([position + 0.001 * step for position in start] for step in itertools.count())
     for _ in range(40):
         rig.cycle(next(commands))
-    rig.arm.order(order)
+    rig.arm.command(command)
     deadline_s = time.monotonic() + PATIENCE_S
     while rig.hw.fault() == "":
         assert time.monotonic() < deadline_s
@@ -186,7 +186,7 @@ def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, order:
     rig.run(0.2)
     assert rig.hw.fault() != "" and rig.arm.positions() == pytest.approx(standing, abs=1e-4)
     for remedy in ("restore", "unlock", "release_emergency_stop", "power_on"):
-        rig.arm.order(remedy)
+        rig.arm.command(remedy)
     rig.until(lambda: "takes no commands" in rig.hw.fault() and "call resume" in rig.hw.fault())
     rig.run(0.2)
     assert "resume" in rig.hw.fault(), "it must not go on by itself"
@@ -200,11 +200,11 @@ def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, order:
 
 
 def test_resume_says_what_is_to_be_done_first(rig: Rig) -> None:
-    rig.arm.order("protective_stop")
+    rig.arm.command("protective_stop")
     rig.until(lambda: rig.hw.fault() != "")
     assert "unlock_protective_stop" in rig.resume()
-    rig.arm.order("unlock")
-    rig.arm.order("emergency_stop")
+    rig.arm.command("unlock")
+    rig.arm.command("emergency_stop")
     rig.until(lambda: "emergency" in rig.hw.fault())
     assert "power_on" in rig.resume()
 
@@ -214,42 +214,42 @@ def test_resume_does_not_raise_a_slider_that_was_lowered_but_lowers_one_that_was
     rig = make_rig(speed_scale=0.5)
     scaling = rig.hw.get(SpeedScalingInterface).handles[0]
     for value, expected in ((0.1, 0.1), (1.0, 0.5)):
-        rig.arm.order("slider", value=value)
+        rig.arm.command("slider", value=value)
         rig.until(lambda value=value: scaling.factor == pytest.approx(value))
-        rig.arm.order("protective_stop")
+        rig.arm.command("protective_stop")
         rig.until(lambda: rig.hw.fault() != "")
-        rig.arm.order("unlock")
+        rig.arm.command("unlock")
         rig.until(lambda: rig.resume() == "")
         assert float(rig.arm.state()["slider"]) == pytest.approx(expected)
 
 
 def test_an_arm_that_is_switched_on_later_is_waited_for(make_rig: Callable[..., Rig], arm: EmulatedArm) -> None:
-    arm.order("emergency_stop")
-    arm.order("release_emergency_stop")
+    arm.command("emergency_stop")
+    arm.command("release_emergency_stop")
     rig = make_rig(ready=False)
     rig.until(lambda: "has no power" in rig.hw.fault())
-    arm.order("power_on")
+    arm.command("power_on")
     rig.until(lambda: rig.hw.ready)
 
 
 def test_an_arm_that_cannot_be_reached_is_named_and_waited_for(make_rig: Callable[..., Rig], arm: EmulatedArm) -> None:
-    arm.order("cut")
+    arm.command("cut")
     rig = make_rig(ready=False)
     rig.until(lambda: "Could not connect" in rig.hw.fault())
     assert arm.address in rig.hw.fault()
-    arm.order("restore")
+    arm.command("restore")
     rig.until(lambda: rig.hw.ready)
 
 
 def test_a_pause_is_no_fault_but_stops_the_clock(rig: Rig) -> None:
     scaling = rig.hw.get(SpeedScalingInterface).handles[0]
     assert scaling.factor == 1.0 and scaling.joints == tuple(handle.name for handle in rig.handles)
-    rig.arm.order("slider", value=0.1)
+    rig.arm.command("slider", value=0.1)
     rig.until(lambda: scaling.factor == pytest.approx(0.1))
-    rig.arm.order("pause")
+    rig.arm.command("pause")
     rig.until(lambda: scaling.factor == 0.0)
     assert rig.hw.fault() == ""
-    rig.arm.order("play")
+    rig.arm.command("play")
     rig.until(lambda: scaling.factor == pytest.approx(0.1))
     start = rig.positions
     rig.run(1.0, [position + 0.05 for position in start])
@@ -260,9 +260,9 @@ def test_a_pause_in_the_midst_of_commands_is_none_either(rig: Rig) -> None:
     start = rig.positions
     for step in range(300):
         if step % 30 == 10:
-            rig.arm.order("pause")
+            rig.arm.command("pause")
         elif step % 30 == 20:
-            rig.arm.order("play")
+            rig.arm.command("play")
         rig.cycle([position + 0.0003 * step for position in start])
         assert rig.hw.fault() == ""
     rig.run(0.5, [position + 0.09 for position in start])
@@ -296,9 +296,9 @@ def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitt
 
     rig = make_rig()
     check(state=60, control=60, emulator=30)
-    rig.arm.order("cut")
+    rig.arm.command("cut")
     rig.until(lambda: rig.hw.fault() != "")
-    rig.arm.order("restore")
+    rig.arm.command("restore")
     rig.until(lambda: rig.resume() == "")
     check(state=60, control=60, emulator=30)
     rig.hw.close()
@@ -320,14 +320,14 @@ def test_a_command_that_cannot_be_meant_is_refused_and_the_arm_holds(rig: Rig, c
 
 def test_packages_that_come_late_or_not_at_all_do_not_move_the_arm_elsewhere(rig: Rig) -> None:
     start = rig.positions
-    rig.arm.order("lose", every=3)
-    rig.arm.order("delay", seconds=0.05)
+    rig.arm.command("lose", every=3)
+    rig.arm.command("delay", seconds=0.05)
     for step in range(100):
         rig.cycle([position + 0.2 * step / 99.0 for position in start])
     rig.run(0.5, [position + 0.2 for position in start])
     assert rig.hw.fault() == ""
     assert rig.arm.positions() == pytest.approx([position + 0.2 for position in start], abs=1e-3)
-    rig.arm.order("restore")
+    rig.arm.command("restore")
     rig.run(1.0, start)
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modular_framework_control.joint_limits import JointLimits, SoftJointLimits
-from modular_framework_control.trajectory_limits import POINT_MARGIN
+from modular_framework_control.hardware_interface.joint_limits import JointLimits, SoftJointLimits
+from modular_framework_control.trajectory.motion_limits import POINT_MARGIN
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints
 from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError

@@ -64,7 +64,7 @@ def test_the_client_reads_every_variable_it_asks_for_by_default(model: str) -> N
 
 def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm, tmp_path: Path) -> None:
     log = tmp_path / "path.csv"
-    arm.order("log", path=log)
+    arm.command("log", path=log)
     before, moved, after, stopped, running = client(arm, """
         arm, control = RTDEReceiveInterface(address), RTDEControlInterface(address)
         before = control.isProgramRunning()
@@ -83,7 +83,7 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
         control.stopScript()
         answer = [before, moved, after, stopped, control.isProgramRunning()]
         """)
-    arm.order("end_log")
+    arm.command("end_log")
     assert before is True and stopped is True and running is False
     assert moved == pytest.approx(0.4, abs=1e-3)
     assert max(map(abs, after)) < 1e-3
@@ -98,9 +98,9 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
 def test_the_log_tells_of_every_cycle_when_asked_to_and_else_of_streamed_positions(arm: EmulatedArm,
                                                                                    tmp_path: Path) -> None:
     def lines(**arguments: object) -> list[str]:
-        arm.order("log", path=tmp_path / "log.csv", **arguments)
+        arm.command("log", path=tmp_path / "log.csv", **arguments)
         time.sleep(0.3)
-        arm.order("end_log")
+        arm.command("end_log")
         return (tmp_path / "log.csv").read_text().splitlines()[1:]
 
     assert lines() == []
@@ -150,11 +150,11 @@ def test_a_protective_stop_ends_the_program_and_is_unlocked(arm: EmulatedArm) ->
 
 
 def test_after_an_emergency_stop_the_arm_is_powered_on_from_the_dashboard(arm: EmulatedArm) -> None:
-    arm.order("emergency_stop")
+    arm.command("emergency_stop")
     assert ask_dashboard(arm.address, "safetymode") == "Safetymode: ROBOT_EMERGENCY_STOP"
     assert ask_dashboard(arm.address, "brake release") == "Brake releasing"
     assert arm.state()["robot_mode"] == "POWER_OFF"
-    arm.order("release_emergency_stop")
+    arm.command("release_emergency_stop")
     ask_dashboard(arm.address, "power on")
     assert arm.state()["robot_mode"] == "IDLE"
     ask_dashboard(arm.address, "brake release")
@@ -193,27 +193,27 @@ def test_it_says_what_it_does_not_run(arm: EmulatedArm) -> None:
 
 
 def test_a_lost_link_refuses_connections_until_it_is_restored(arm: EmulatedArm) -> None:
-    arm.order("cut")
+    arm.command("cut")
     with pytest.raises(DashboardError, match="got no answer"):
         ask_dashboard(arm.address, "robotmode", 1.0)
-    arm.order("restore")
+    arm.command("restore")
     assert ask_dashboard(arm.address, "robotmode") == "Robotmode: RUNNING"
 
 
 def test_a_frozen_link_lets_nothing_through_though_connections_open(arm: EmulatedArm) -> None:
-    arm.order("freeze")
+    arm.command("freeze")
     with pytest.raises(DashboardError, match="timed out"):
         ask_dashboard(arm.address, "robotmode", 0.3)
-    arm.order("restore")
+    arm.command("restore")
     assert ask_dashboard(arm.address, "robotmode") == "Robotmode: RUNNING"
 
 
 def test_delayed_packages_come_late(arm: EmulatedArm) -> None:
-    arm.order("delay", seconds=0.3)
+    arm.command("delay", seconds=0.3)
     begun_s = time.monotonic()
     ask_dashboard(arm.address, "robotmode")
     assert time.monotonic() - begun_s >= 0.6      # the greeting and the answer
-    arm.order("restore")
+    arm.command("restore")
 
 
 @pytest.mark.parametrize(("command", "arguments", "allowed"), [
@@ -222,4 +222,4 @@ def test_delayed_packages_come_late(arm: EmulatedArm) -> None:
 def test_an_order_that_cannot_be_carried_out_says_what_can(arm: EmulatedArm, command: str, arguments: dict[str, float],
                                                            allowed: str) -> None:
     with pytest.raises(CommandError, match=allowed):
-        arm.order(command, **arguments)
+        arm.command(command, **arguments)

@@ -13,7 +13,7 @@ from modular_framework_drivers.emulators.ur_motion import (
     MAX_VELOCITY,
     ArmMotion,
     Drive,
-    Order,
+    MotionCommand,
     flange_pose,
 )
 
@@ -23,13 +23,13 @@ DRIVES = st.sampled_from([Drive.SERVO, Drive.MOVE, Drive.SPEED, Drive.STOP, Driv
 
 
 @settings(deadline=None)
-@given(start=POSITIONS, orders=st.lists(st.tuples(DRIVES, POSITIONS, st.integers(1, 30)), max_size=6),
+@given(start=POSITIONS, commands=st.lists(st.tuples(DRIVES, POSITIONS, st.integers(1, 30)), max_size=6),
        speed=st.floats(0.0, 1.0))
 def test_no_joint_is_ever_faster_than_the_arm_or_accelerates_more(
-        start: tuple[float, ...], orders: list[tuple[Drive, tuple[float, ...], int]], speed: float) -> None:
+        start: tuple[float, ...], commands: list[tuple[Drive, tuple[float, ...], int]], speed: float) -> None:
     motion = ArmMotion(start)
-    for drive, target, cycles in orders:
-        motion.tell(Order(drive, target))
+    for drive, target, cycles in commands:
+        motion.set_command(MotionCommand(drive, target))
         for _ in range(cycles):
             before, positions = list(motion.velocities), list(motion.positions)
             motion.step(DT_S, speed)
@@ -43,7 +43,7 @@ def test_no_joint_is_ever_faster_than_the_arm_or_accelerates_more(
 @given(start=POSITIONS, target=POSITIONS)
 def test_a_move_arrives_and_rests(start: tuple[float, ...], target: tuple[float, ...]) -> None:
     motion = ArmMotion(start)
-    motion.tell(Order(Drive.MOVE, target, velocity=2.0, acceleration=10.0))
+    motion.set_command(MotionCommand(Drive.MOVE, target, velocity=2.0, acceleration=10.0))
     for _ in range(2_000):
         motion.step(DT_S, 1.0)
         if motion.finished:
@@ -55,14 +55,14 @@ def test_a_servo_target_is_followed_within_its_lookahead() -> None:
     motion = ArmMotion((0.0,) * 6)
     for cycle in range(250):
         target = 0.5 * (1.0 - math.cos(cycle * DT_S * math.pi))
-        motion.tell(Order(Drive.SERVO, (target,) * 6, lookahead_s=0.03))
+        motion.set_command(MotionCommand(Drive.SERVO, (target,) * 6, lookahead_s=0.03))
         motion.step(DT_S, 1.0)
         assert motion.servo_error <= 0.03 * 0.5 * math.pi + 0.01
 
 
 def test_at_a_slider_of_nothing_the_arm_rests() -> None:
     motion = ArmMotion((0.0,) * 6)
-    motion.tell(Order(Drive.SERVO, (0.3,) * 6))
+    motion.set_command(MotionCommand(Drive.SERVO, (0.3,) * 6))
     for _ in range(50):
         motion.step(DT_S, 0.0)
     assert motion.positions == [0.0] * 6

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modular_framework_drivers.ur.arm_messages import ArmState
-from modular_framework_drivers.ur.state_watch import SilenceWatch, follows
+from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
 
 SIX = (0.1,) * 6
 STATE = ArmState(100.0, 5.0, SIX, SIX, SIX, SIX, 1.0, 1.0, 7, 1, 2)
@@ -24,9 +24,9 @@ def test_silence_is_the_time_since_something_was_heard_for_who_listens_all_the_t
     watch, now_s = SilenceWatch(0.0), 0.0
     for _ in range(120):
         now_s += 0.001
-        silent_s = watch.look(now_s, heard=False)
+        silent_s = watch.update(now_s, heard=False)
     assert silent_s == pytest.approx(0.12)
-    assert watch.look(now_s + 0.001, heard=True) == 0.0
+    assert watch.update(now_s + 0.001, heard=True) == 0.0
 
 
 @given(st.lists(st.floats(0.0, 30.0), max_size=5))
@@ -34,22 +34,22 @@ def test_time_in_which_nobody_listened_is_no_silence(absences: list[float]) -> N
     watch, now_s = SilenceWatch(0.0), 0.0
     for absence_s in absences:
         now_s += absence_s
-        silent_s = watch.look(now_s, heard=False)
+        silent_s = watch.update(now_s, heard=False)
         assert silent_s <= 0.02 * len(absences)
 
 
 def test_a_state_a_cycle_later_follows() -> None:
-    assert follows(STATE, None)
-    assert follows(next_state(positions=(0.12,) * 6), STATE)
+    assert is_plausible(STATE, None)
+    assert is_plausible(next_state(positions=(0.12,) * 6), STATE)
 
 
 def test_a_joint_that_turns_without_end_has_turned_often() -> None:
-    assert follows(next_state(positions=(*SIX[1:], 50.0)), None)
-    assert follows(next_state(positions=(*SIX[1:], 50.02)), replace(STATE, positions=(*SIX[1:], 50.0)))
+    assert is_plausible(next_state(positions=(*SIX[1:], 50.0)), None)
+    assert is_plausible(next_state(positions=(*SIX[1:], 50.02)), replace(STATE, positions=(*SIX[1:], 50.0)))
 
 
 @pytest.mark.parametrize("changes", [
     {"timestamp_s": math.nan}, {"timestamp_s": 4.9},
     {"positions": (math.nan, *SIX[1:])}, {"positions": (101.0, *SIX[1:])}, {"positions": (0.3, *SIX[1:])}])
 def test_garbage_does_not_follow(changes: dict[str, object]) -> None:
-    assert not follows(next_state(**changes), STATE)
+    assert not is_plausible(next_state(**changes), STATE)

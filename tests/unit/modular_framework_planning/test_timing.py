@@ -51,7 +51,8 @@ def test_limits_hold_at_every_millisecond_of_the_controllers_curve() -> None:
 
 
 def test_curve_is_the_one_a_joint_trajectory_controller_runs() -> None:
-    control = pytest.importorskip("modular_framework_control.trajectory", reason="source the workspace")
+    control = pytest.importorskip("modular_framework_control.trajectory.joint_trajectory",
+                                  reason="source the workspace")
     rng = np.random.default_rng(2)
     vertices, blends = random_polyline(rng)
     motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)

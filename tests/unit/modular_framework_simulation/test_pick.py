@@ -12,7 +12,7 @@ import rospkg
 from simulated_samples import solid
 from xacro_rospkg import expand
 
-from modular_framework_control.hardware_interface import PositionJointInterface
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
 from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from simulated_samples import lift_robot_urdf, solid
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     EffortJointInterface,
     HardwareInterfaceError,

@@ -44,13 +44,13 @@ def _planning_srdf(text: str, _folder: Path) -> None:
 
 
 def _control(text: str, _folder: Path) -> None:
-    from modular_framework_control.urdf_xml import parse_description
+    from modular_framework_control.hardware_interface.urdf_xml import parse_description
 
     parse_description(text)
 
 
 def _plugins(text: str, folder: Path) -> None:
-    from modular_framework_control.plugins import read_description
+    from modular_framework_control.hardware_interface.plugins import read_description
 
     read_description(_file(folder, "plugins.xml", text))
 

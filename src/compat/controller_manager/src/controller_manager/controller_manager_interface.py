@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Asks the controller manager of the node's namespace, prints the answer and returns whether it did what was asked."""
-from modular_framework_control.ros_controller_manager_interface import (
+from modular_framework_control.ros.controller_manager_interface import (
     list_controller_types,
     list_controllers,
     load_controller,

@@ -10,7 +10,7 @@ from modular_framework_drivers.emulators.command_port import CommandPort
 from modular_framework_drivers.emulators.dynamixel_finger import Finger
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-from modular_framework_drivers.emulators.ros_orders import offer_orders
+from modular_framework_drivers.emulators.ros_commands import offer_commands
 from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
 from modular_framework_ros.node_handle import ParameterError, read_number
@@ -51,7 +51,7 @@ class EzGripperEmulatorNode:
         """
         self._commands.connect()
         self._line.connect()
-        self._services = offer_orders(self._line.commands)
+        self._services = offer_commands(self._line.commands)
         rospy.loginfo("emulated gripper at %s; orders at TCP port %d (`help` lists them)", self._line.link,
                       self._commands.port)
 

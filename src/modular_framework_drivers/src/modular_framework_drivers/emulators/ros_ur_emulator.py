@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rospy
 
-from modular_framework_drivers.emulators.ros_orders import offer_orders
+from modular_framework_drivers.emulators.ros_commands import offer_commands
 from modular_framework_drivers.emulators.ur_controller import HOME
 from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT, UrEmulator
 
@@ -37,7 +37,7 @@ class UrEmulatorNode:
         log = str(rospy.get_param("~log", ""))
         if log:
             self._emulator.commands["log"](path=log)
-        offer_orders(self._emulator.commands)
+        offer_commands(self._emulator.commands)
 
     def run(self) -> None:
         """Serve until the node is shut down."""

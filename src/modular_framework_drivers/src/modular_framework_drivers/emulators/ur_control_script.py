@@ -13,7 +13,7 @@ import re
 from enum import IntEnum
 
 from modular_framework_drivers.emulators.ur_controller import UrController
-from modular_framework_drivers.emulators.ur_motion import JOINTS, Drive, Order
+from modular_framework_drivers.emulators.ur_motion import JOINTS, Drive, MotionCommand
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 _MARK = "RTDE Control Script Loaded"
@@ -66,8 +66,8 @@ class ControlScript:
         self._executing = False
         self._moving = False
         self._watchdog_s = 0.0
-        self._last_order_s = controller.time_s
-        self._say(READY)
+        self._last_command_s = controller.time_s
+        self._report(READY)
 
     @classmethod
     def from_text(cls, controller: UrController, text: str) -> ControlScript:
@@ -89,24 +89,24 @@ class ControlScript:
             if not self._controller.motion.finished:
                 return True
             self._moving = False
-            self._controller.motion.tell(Order(Drive.HOLD))
-            self._say(DONE)
+            self._controller.motion.set_command(MotionCommand(Drive.HOLD))
+            self._report(DONE)
         command = self._controller.inputs.ints[self._offset]
         if command != Command.NONE:
-            self._last_order_s = self._controller.time_s
-        elif 0.0 < self._watchdog_s < self._controller.time_s - self._last_order_s:
+            self._last_command_s = self._controller.time_s
+        elif 0.0 < self._watchdog_s < self._controller.time_s - self._last_command_s:
             LOGGER.warning("no order for %.3f s: the watchdog ends the program", self._watchdog_s)
             return False
         if command == Command.NONE or command in _STREAMED:
             self._executing = False
             self._stream(command)
-            self._say(READY)
+            self._report(READY)
         elif not self._executing:
             self._executing = True
             return self._execute(command)
         return True
 
-    def _say(self, state: int) -> None:
+    def _report(self, state: int) -> None:
         self._controller.outputs.ints[self._offset] = state
 
     def _doubles(self, first: int, count: int) -> tuple[float, ...]:
@@ -117,10 +117,10 @@ class ControlScript:
         motion = self._controller.motion
         if command == Command.SERVOJ:
             (lookahead_s,) = self._doubles(9, 1)
-            motion.tell(Order(Drive.SERVO, self._doubles(0, JOINTS), lookahead_s=max(lookahead_s, 0.03)))
+            motion.set_command(MotionCommand(Drive.SERVO, self._doubles(0, JOINTS), lookahead_s=max(lookahead_s, 0.03)))
         elif command == Command.SPEEDJ:
             (acceleration,) = self._doubles(6, 1)
-            motion.tell(Order(Drive.SPEED, self._doubles(0, JOINTS), acceleration=acceleration))
+            motion.set_command(MotionCommand(Drive.SPEED, self._doubles(0, JOINTS), acceleration=acceleration))
         elif command == Command.GET_STEPTIME:
             self._controller.outputs.doubles[self._offset] = self._controller.period_s
 
@@ -132,12 +132,13 @@ class ControlScript:
                 return False
             case Command.MOVEJ:
                 velocity, acceleration = self._doubles(6, 2)
-                controller.motion.tell(Order(Drive.MOVE, self._doubles(0, JOINTS), velocity, acceleration))
+                controller.motion.set_command(
+                    MotionCommand(Drive.MOVE, self._doubles(0, JOINTS), velocity, acceleration))
                 self._moving = True
                 return True
             case Command.SPEED_STOP | Command.SERVO_STOP | Command.STOPL | Command.STOPJ:
                 (deceleration,) = self._doubles(0, 1)
-                controller.motion.tell(Order(Drive.STOP, acceleration=deceleration))
+                controller.motion.set_command(MotionCommand(Drive.STOP, acceleration=deceleration))
                 self._moving = True
                 return True
             case Command.SET_PAYLOAD:
@@ -158,7 +159,7 @@ class ControlScript:
             case _:
                 LOGGER.error("order %d of the control script is not emulated: the program ends", command)
                 return False
-        self._say(DONE)
+        self._report(DONE)
         return True
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
-from modular_framework_drivers.emulators.ur_motion import MAX_SERVO_ERROR, ArmMotion, Drive, Order
+from modular_framework_drivers.emulators.ur_motion import MAX_SERVO_ERROR, ArmMotion, Drive, MotionCommand
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 REGISTERS = 48
@@ -115,13 +115,13 @@ class UrController:
     @property
     def target_positions(self) -> Sequence[float]:
         """Where the joints are told to be [rad]."""
-        order = self.motion.order
-        return order.target if order.drive in (Drive.SERVO, Drive.MOVE) else self.motion.positions
+        command = self.motion.command
+        return command.target if command.drive in (Drive.SERVO, Drive.MOVE) else self.motion.positions
 
     @property
     def streamed(self) -> bool:
         """Whether the joints follow positions that a client streams."""
-        return self.motion.order.drive is Drive.SERVO
+        return self.motion.command.drive is Drive.SERVO
 
     @property
     def speed_scaling(self) -> float:
@@ -167,7 +167,7 @@ class UrController:
         """End the program; the arm comes to rest."""
         self.program = None
         self.runtime_state = RuntimeState.STOPPED
-        self.motion.tell(Order(Drive.STOP, acceleration=PROTECTIVE_STOP_DECELERATION))
+        self.motion.set_command(MotionCommand(Drive.STOP, acceleration=PROTECTIVE_STOP_DECELERATION))
 
     def pause(self) -> bool:
         """Pause the program; False when none plays."""

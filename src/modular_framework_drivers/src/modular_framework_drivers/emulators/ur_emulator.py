@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import IO
 
-from modular_framework_control.real_time import run_in_real_time
+from modular_framework_control.realtime.scheduling import run_in_real_time
 from modular_framework_drivers.emulators.command_port import CommandPort
 from modular_framework_drivers.emulators.ur_control_script import ProgramReceiver
 from modular_framework_drivers.emulators.ur_controller import HOME, MODELS, UrController
@@ -101,13 +101,13 @@ class UrEmulator:
             self._links.close()
             self._end_log()
 
-    def _locked(self, order: Callable[..., str | None]) -> Callable[..., str | None]:
+    def _locked(self, command: Callable[..., str | None]) -> Callable[..., str | None]:
         def run(*arguments: object, **keywords: object) -> str | None:
             with self._lock:
-                return order(*arguments, **keywords)
+                return command(*arguments, **keywords)
 
-        run.__doc__ = order.__doc__
-        run.__wrapped__ = order  # type: ignore[attr-defined]
+        run.__doc__ = command.__doc__
+        run.__wrapped__ = command  # type: ignore[attr-defined]
         return run
 
     def _rtde_session(self) -> Session:
@@ -126,83 +126,83 @@ class UrEmulator:
     def _dashboard(self) -> Session:
         return Session(DashboardReceiver(self.controller).receive, greeting=BANNER.encode())
 
-    def order_cut(self) -> None:
+    def inject_cut(self) -> None:
         """Close all connections and refuse new ones, until `restore`."""
         self._links.close()
 
-    def order_freeze(self) -> None:
+    def inject_freeze(self) -> None:
         """Let nothing through though connections stay open (half-open sockets), until `restore`."""
         self._links.faults.frozen = True
 
-    def order_delay(self, seconds: float) -> None:
+    def inject_delay(self, seconds: float) -> None:
         """Send everything late by this much [s]."""
         if seconds < 0.0:
             raise ValueError(f"seconds={seconds}: expected a number of at least 0")
         self._links.faults.delay_s = float(seconds)
 
-    def order_lose(self, every: int) -> None:
+    def inject_lose(self, every: int) -> None:
         """Lose each `every`-th data package; 0 for none."""
         if every < 0:
             raise ValueError(f"every={every}: expected a whole number of at least 0")
         self._links.faults.lose_every = int(every)
 
-    def order_garbage(self, count: int = 64) -> None:
+    def inject_garbage(self, count: int = 64) -> None:
         """Send this many random bytes between the data packages."""
         self._links.send_to_all(os.urandom(int(count)), time.monotonic())
 
-    def order_restore(self) -> None:
+    def command_restore(self) -> None:
         """End all faults of the network."""
         self._links.faults = LinkFaults()
         self._links.connect()
 
-    def order_protective_stop(self) -> None:
+    def inject_protective_stop(self) -> None:
         """Stop as for a collision."""
         self.controller.protective_stop()
 
-    def order_unlock(self) -> str:
+    def command_unlock(self) -> str:
         """Unlock the protective stop, as a person at the robot does."""
         return "unlocked" if self.controller.unlock() else "too early"
 
-    def order_emergency_stop(self) -> None:
+    def inject_emergency_stop(self) -> None:
         """Press the red button."""
         self.controller.emergency_stop()
 
-    def order_release_emergency_stop(self) -> None:
+    def command_release_emergency_stop(self) -> None:
         """Pull the red button; the arm must be powered on and its brakes released afterwards."""
         self.controller.release_emergency_stop()
 
-    def order_power_off(self) -> None:
+    def inject_power_off(self) -> None:
         """Switch the arm off."""
         self.controller.power_off()
 
-    def order_power_on(self) -> None:
+    def command_power_on(self) -> None:
         """Power the arm and release its brakes."""
         self.controller.brake_release()
 
-    def order_slider(self, value: float) -> None:
+    def command_slider(self, value: float) -> None:
         """Set the speed slider, from 0 to 1."""
         if not 0.0 <= value <= 1.0:
             raise ValueError(f"value={value}: expected a number from 0 to 1")
         self.controller.speed_slider = float(value)
 
-    def order_pause(self) -> str:
+    def command_pause(self) -> str:
         """Pause the program."""
         return "paused" if self.controller.pause() else "nothing plays"
 
-    def order_play(self) -> str:
+    def command_play(self) -> str:
         """Go on with the paused program."""
         return "plays" if self.controller.play() else "nothing is paused"
 
-    def order_stop_program(self) -> None:
+    def command_stop_program(self) -> None:
         """End the program, as a person at the robot does."""
         self.controller.stop_program()
 
-    def order_wrench(self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0,
+    def command_wrench(self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0,
                      tz: float = 0.0) -> None:
         """Set the measured wrench [N, Nm]."""
         self.controller.wrench = (float(fx), float(fy), float(fz), float(tx), float(ty), float(tz))
 
-    def order_state(self) -> str:
+    def command_state(self) -> str:
         """Modes, slider, connections, payload and joint positions."""
         controller = self.controller
         return (f"robot_mode={controller.robot_mode.name} safety_mode={controller.safety_mode.name} "
@@ -210,7 +210,7 @@ class UrEmulator:
                 f"connections={self._links.connections} payload_kg={controller.payload_kg:g} "
                 f"q={','.join(f'{position:.6f}' for position in controller.motion.positions)}")
 
-    def order_log(self, path: str, always: bool = False) -> None:
+    def command_log(self, path: str, always: bool = False) -> None:
         """Write streamed positions, `always` every cycle, to a file: wall, controller time [s], commanded, actual q."""
         self._end_log()
         self._log = open(path, "w", encoding="utf-8")  # noqa: SIM115  closed by _end_log
@@ -218,7 +218,7 @@ class UrEmulator:
                                                            for joint in range(JOINTS)) + "\n")
         self.controller.on_cycle = partial(self._write_log, self._log, always)
 
-    def order_end_log(self) -> None:
+    def command_end_log(self) -> None:
         """Finish the file of `log`."""
         self._end_log()
 

@@ -41,13 +41,13 @@ class EmulatedArm:
         if self._process.stdout is None or self._process.stdout.readline() != "ready\n":
             raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")
 
-    def order(self, command: str, **arguments: Any) -> str:
+    def command(self, command: str, **arguments: Any) -> str:
         """Give an order at the command port."""
         return send_command(COMMAND_PORT, command, self.address, **arguments)
 
     def state(self) -> dict[str, str]:
         """What the order `state` tells, by name."""
-        return dict(pair.split("=") for pair in self.order("state").split())
+        return dict(pair.split("=") for pair in self.command("state").split())
 
     def positions(self) -> list[float]:
         """Where the joints are [rad]."""

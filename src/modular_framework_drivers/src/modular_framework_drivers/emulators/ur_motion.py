@@ -31,7 +31,7 @@ class Drive(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class MotionCommand:
     """One motion.
 
     Attributes:
@@ -59,33 +59,33 @@ class ArmMotion:
     def __init__(self, positions: Sequence[float]) -> None:
         self.positions = list(positions)
         self.velocities = [0.0] * JOINTS
-        self.order = Order(Drive.HOLD)
+        self.command = MotionCommand(Drive.HOLD)
 
-    def tell(self, order: Order) -> None:
+    def set_command(self, command: MotionCommand) -> None:
         """Replace what the joints are doing."""
-        self.order = order
+        self.command = command
 
     @property
     def servo_error(self) -> float:
         """How far the joint that is most behind is from its servo target [rad]; 0 when there is none."""
-        if self.order.drive is not Drive.SERVO:
+        if self.command.drive is not Drive.SERVO:
             return 0.0
-        return max(abs(goal - position) for goal, position in zip(self.order.target, self.positions, strict=True))
+        return max(abs(goal - position) for goal, position in zip(self.command.target, self.positions, strict=True))
 
     @property
     def finished(self) -> bool:
         """Whether a MOVE has arrived or a STOP has come to rest."""
         at_rest = max(map(abs, self.velocities)) <= _ARRIVED
-        if self.order.drive is Drive.MOVE:
+        if self.command.drive is Drive.MOVE:
             return at_rest and all(abs(goal - position) <= _ARRIVED
-                                   for goal, position in zip(self.order.target, self.positions, strict=True))
+                                   for goal, position in zip(self.command.target, self.positions, strict=True))
         return at_rest
 
     def step(self, dt_s: float, speed_fraction: float) -> None:
         """Move on by `dt_s` [s]; `speed_fraction` in [0, 1] scales every speed, as the speed slider does."""
-        order = self.order
-        wanted = self._wanted_velocities(order, dt_s)
-        limit = order.acceleration if order.drive in (Drive.SPEED, Drive.MOVE, Drive.STOP) else MAX_ACCELERATION
+        command = self.command
+        wanted = self._wanted_velocities(command, dt_s)
+        limit = command.acceleration if command.drive in (Drive.SPEED, Drive.MOVE, Drive.STOP) else MAX_ACCELERATION
         change = min(limit, MAX_ACCELERATION) * dt_s
         top = MAX_VELOCITY * speed_fraction
         for joint, velocity in enumerate(self.velocities):
@@ -94,19 +94,19 @@ class ArmMotion:
             self.velocities[joint] = velocity
             self.positions[joint] += velocity * dt_s
 
-    def _wanted_velocities(self, order: Order, dt_s: float) -> Sequence[float]:
-        match order.drive:
+    def _wanted_velocities(self, command: MotionCommand, dt_s: float) -> Sequence[float]:
+        match command.drive:
             case Drive.HOLD | Drive.STOP:
                 return (0.0,) * JOINTS
             case Drive.SPEED:
-                return order.target
+                return command.target
             case Drive.SERVO:
-                return self._towards(order.target, order.lookahead_s, MAX_ACCELERATION, [MAX_VELOCITY] * JOINTS)
+                return self._towards(command.target, command.lookahead_s, MAX_ACCELERATION, [MAX_VELOCITY] * JOINTS)
             case Drive.MOVE:
-                errors = [abs(goal - position) for goal, position in zip(order.target, self.positions, strict=True)]
+                errors = [abs(goal - position) for goal, position in zip(command.target, self.positions, strict=True)]
                 longest = max(max(errors), 1e-12)
-                tops = [order.velocity * error / longest for error in errors]
-                return self._towards(order.target, dt_s, order.acceleration, tops)
+                tops = [command.velocity * error / longest for error in errors]
+                return self._towards(command.target, dt_s, command.acceleration, tops)
 
     def _towards(self, target: Sequence[float], time_constant_s: float, acceleration: float,
                  tops: Sequence[float]) -> list[float]:

@@ -61,7 +61,7 @@ class GripperState:
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
+class _Request:
     """What was asked for last: a goal, or with None to stop.
 
     Attributes:
@@ -90,7 +90,7 @@ class EzGripper:
         self._thread: threading.Thread | None = None
         first = Goal(0, settings.start_position, settings.start_torque)
         self._numbers = itertools.count(1)
-        self._wish = self._taken = _Wish(first, 0)
+        self._request = self._handled_request = _Request(first, 0)
         self._grip = Grip(settings.rules, first)
         self._bus = DynamixelBus(settings.port_name, settings.baudrate, settings.link_timeout_s)
         self._servos = GripperServos(self._bus, settings.servo_ids, self._wait)
@@ -143,12 +143,12 @@ class EzGripper:
             raise ValueError(f"{self.settings.name}: torque {torque} is outside [0, {TORQUE_MAX}]")
         state, goal = self._state, Goal(next(self._numbers), position, torque)
         if not state.fault:
-            self._wish = _Wish(goal, state.faults)
+            self._request = _Request(goal, state.faults)
         return goal.number
 
     def stop(self) -> None:
         """Stop the fingers where they are; what they hold they go on holding."""
-        self._wish = _Wish(None, self._state.faults)
+        self._request = _Request(None, self._state.faults)
 
     # ---- the gripper's thread ----
 
@@ -166,14 +166,14 @@ class EzGripper:
                     self._bus.close()
                     self._wait(self.settings.reconnect_period_s)
         except _Ended:
-            self._calm_down()
+            self._hold_safely()
         except Exception:
             LOGGER.exception("%s: unexpected error; the gripper is out of use", self.settings.name)
             self._report("internal error, told in the log; the gripper is out of use until the node is started again")
         finally:
             self._bus.close()
 
-    def _calm_down(self) -> None:
+    def _hold_safely(self) -> None:
         """Leave the fingers where they are, with a torque that the motor endures without anybody looking after it."""
         if not self._ready or self._state.fault:
             return
@@ -226,22 +226,22 @@ class EzGripper:
             self._servos.forget()
             self._follow_anew(reading.position)
         self._warn_of_heat(reading.temperature)
-        self._take_orders(reading.position, now_s)
+        self._handle_request(reading.position, now_s)
         self._servos.drive(self._grip.update(reading.position, now_s))
         self._ready |= self._grip.motion is not Motion.MOVING
         self._publish(reading, now_s, "")
 
-    def _take_orders(self, position: float, time_s: float) -> None:
-        wish = self._wish
-        if wish is self._taken or wish.faults != self._state.faults:
+    def _handle_request(self, position: float, time_s: float) -> None:
+        request = self._request
+        if request is self._handled_request or request.faults != self._state.faults:
             return
-        self._taken, before = wish, self._grip.goal
-        if wish.goal is None:
+        self._handled_request, before = request, self._grip.goal
+        if request.goal is None:
             self._grip.stop(position)
-        elif (wish.goal.position, wish.goal.torque) == (before.position, before.torque):
-            self._grip.goal = wish.goal
+        elif (request.goal.position, request.goal.torque) == (before.position, before.torque):
+            self._grip.goal = request.goal
         else:
-            self._grip.retarget(wish.goal, position, time_s)
+            self._grip.retarget(request.goal, position, time_s)
 
     def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
         """Say it, and let the fingers stay, for not every fault switches every motor off; after a pause give the torque
@@ -270,7 +270,7 @@ class EzGripper:
         state = replace(self._state, stamp_s=now_s, reading=reading, motion=self._grip.motion, goal=self._grip.goal,
                         ready=self._ready, fault="")
         if fault:
-            self._tell(state, fault)
+            self._set_fault(state, fault)
         else:
             self._state = state
         if recovered:
@@ -281,7 +281,7 @@ class EzGripper:
         text = f"{self.settings.name}: {problem}"
         if text != self._state.fault:
             LOGGER.log(level, "%s", text)
-        self._tell(self._state, text)
+        self._set_fault(self._state, text)
 
-    def _tell(self, state: GripperState, fault: str) -> None:
+    def _set_fault(self, state: GripperState, fault: str) -> None:
         self._state = replace(state, fault=fault, faults=state.faults + 1, last_fault=fault)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 import time
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     JointHandle,
     JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
 )
-from modular_framework_control.joint_limits import JointLimitGuard
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings

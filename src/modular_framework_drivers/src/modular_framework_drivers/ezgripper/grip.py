@@ -147,7 +147,7 @@ class Grip:
         raise ValueError(f"unknown motion {self.motion}")
 
 
-class Standing:
+class StandstillDetector:
     """Whether fingers stand; that they are slow once is not enough, so they are where they turn round too.
 
     Args:

@@ -122,22 +122,22 @@ class GripperServos:
             self._write(servo, mx64.GOAL_TORQUE, mx64.direction_word(-CALIBRATION_TORQUE))
             self._write(servo, mx64.TORQUE_CONTROL_MODE, 1)
             self._write(servo, mx64.TORQUE_ENABLE, 1)
-        self._wait_until_standing()
+        self._wait_for_standstill()
         for servo in self._servos:
             self._write(servo, mx64.GOAL_TORQUE, mx64.direction_word(-RELAXED_TORQUE))
         self._wait(0.1)
         for servo in self._servos:
             servo.zero = self._reading(servo).position
 
-    def _wait_until_standing(self) -> None:
-        standing_s = passed_s = 0.0
+    def _wait_for_standstill(self) -> None:
+        standstill_s = passed_s = 0.0
         last: list[int] = []
-        while standing_s < STANDS_AFTER_S:
+        while standstill_s < STANDS_AFTER_S:
             readings = [self._reading(servo) for servo in self._servos]
             self._refuse_errors(readings)
             now = [reading.position for reading in readings]
             stands = bool(last) and all(abs(a - b) <= STANDS_WITHIN_TICKS for a, b in zip(now, last, strict=True))
-            standing_s = standing_s + 0.1 if stands else 0.0
+            standstill_s = standstill_s + 0.1 if stands else 0.0
             last = now
             if passed_s > CALIBRATION_TIMEOUT_S:
                 raise GripperError(f"calibration: the fingers still moved after {CALIBRATION_TIMEOUT_S:.0f} s of "

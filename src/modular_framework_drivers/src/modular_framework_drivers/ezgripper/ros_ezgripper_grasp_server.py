@@ -15,7 +15,7 @@ from modular_framework_core.grasping.ros_grasp_server import GraspServer
 from modular_framework_core.grasping.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT
-from modular_framework_drivers.ezgripper.grip import Motion, Standing
+from modular_framework_drivers.ezgripper.grip import Motion, StandstillDetector
 from modular_framework_drivers.ezgripper.gripper_servos import CALIBRATION_TORQUE, CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
@@ -26,7 +26,7 @@ from modular_framework_ros.ros_node_handle import RosNodeHandle
 ACTION_NAME = "moveit_grasp_action_server"
 POLL_S = 0.01
 STOP_TIMEOUT_S = 1.0
-STANDING_SPEED, STANDING_S = 0.05, 0.1
+STANDSTILL_SPEED, STANDSTILL_S = 0.05, 0.1
 PRESSING_SHARE = 0.5
 """Of the torque allowed; motors that give less do not press."""
 
@@ -71,7 +71,8 @@ class EzGripperManipulator:
         position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # what was rounded is forgiven
         number = self._gripper.command(position, torque)
         end_s = time.monotonic() + motion.timeout_s
-        standing = Standing(STANDING_SPEED, STANDING_S)    # what they held may give way to the new torque
+        # an object that the fingers hold may give way to the new torque
+        standstill = StandstillDetector(STANDSTILL_SPEED, STANDSTILL_S)
         while True:
             state = self._gripper.state()
             self._refuse_fault(state)
@@ -81,7 +82,7 @@ class EzGripperManipulator:
             if motion.stop_requested():
                 self._stop()
                 raise GraspCommandError("stopped on request")
-            stands = state.goal.number == number and standing.update(state.reading.velocity, state.stamp_s)
+            stands = state.goal.number == number and standstill.update(state.reading.velocity, state.stamp_s)
             if stands and state.motion is not Motion.MOVING:
                 return self._outcome(state)
             if time.monotonic() > end_s:
@@ -107,10 +108,10 @@ class EzGripperManipulator:
         """Stop the servo, and see that it stands."""
         self._gripper.stop()
         asked_s = time.monotonic()
-        standing = Standing(STANDING_SPEED, STANDING_S)
+        standstill = StandstillDetector(STANDSTILL_SPEED, STANDSTILL_S)
         while time.monotonic() < asked_s + STOP_TIMEOUT_S:
             state = self._gripper.state()
-            if state.fault or (state.stamp_s > asked_s and standing.update(state.reading.velocity, state.stamp_s)):
+            if state.fault or (state.stamp_s > asked_s and standstill.update(state.reading.velocity, state.stamp_s)):
                 return
             time.sleep(POLL_S)
         rospy.logwarn("%s: told to stop, the fingers still moved after %.1f s", self._gripper.settings.name,

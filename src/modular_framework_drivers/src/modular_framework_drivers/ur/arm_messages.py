@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 JOINTS = 6
-CONNECTING, STATE, ALIVE, READY, TAKEN, FAILED, SERVO = b"C", b"S", b"A", b"R", b"T", b"F", b"Q"
+CONNECTING, STATE, ALIVE, READY, ACCEPTED, FAILED, SERVO = b"C", b"S", b"A", b"R", b"T", b"F", b"Q"
 _STATE = struct.Struct("=cdd26dii I".replace(" ", ""))
 _SERVO = struct.Struct("=c7d")
 MESSAGE_SIZE = 1024

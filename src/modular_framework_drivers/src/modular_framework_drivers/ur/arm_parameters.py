@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from modular_framework_control.joint_limit_parameters import (
+from modular_framework_control.hardware_interface.joint_limit_parameters import (
     JointLimits,
     limits_from_urdf,
     limits_with_parameters,

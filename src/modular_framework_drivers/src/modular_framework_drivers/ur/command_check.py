@@ -6,9 +6,9 @@ holds. One that is only faster, or accelerates more, than a joint may is followe
 beyond a soft limit, or by as little beyond the range as trajectory controllers allow, up to that limit. A joint that
 stands outside its range may stay there and come back.
 
-The limits are those of every hardware (modular_framework_control.joint_limits), but a guard that makes any command the
-nearest allowed one does not do here: a real arm must not drive to the end of its range because a controller went
-wrong, and it stops itself hard when it is told to change its speed at once.
+The limits are those of all hardware (modular_framework_control.hardware_interface.joint_limits). Their guard replaces a
+command by the nearest one allowed, which does not do here: a real arm must not drive to the end of its range because a
+controller went wrong, and it stops itself hard when its speed is to change at once.
 """
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from modular_framework_control.joint_limit_parameters import JointLimits, SoftJointLimits
-from modular_framework_control.joint_limits import soft_velocities
-from modular_framework_control.trajectory_limits import WAY_MARGIN
+from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits, SoftJointLimits
+from modular_framework_control.hardware_interface.joint_limits import soft_velocities
+from modular_framework_control.trajectory.motion_limits import CURVE_MARGIN
 
 _SLACK = 1e-6     # rounding that is forgiven [rad], and as a share of a limit
 
@@ -89,7 +89,7 @@ class CommandCheck:
         Returns:
             "", or why the commands were refused; `sent` then brings the arm to rest.
         """
-        reason = self._why_not(commands)
+        reason = self._reason_to_refuse(commands)
         if period_s <= 0.0:
             return reason
         for index, joint in enumerate(self._joints):
@@ -101,13 +101,13 @@ class CommandCheck:
                 self._approach(index, min(max(commands[index], lowest), highest), joint, period_s)
         return reason
 
-    def _why_not(self, commands: Sequence[float]) -> str:
+    def _reason_to_refuse(self, commands: Sequence[float]) -> str:
         for command, sent, joint in zip(commands, self.sent, self._joints, strict=True):
             limits = joint.limits
             if not math.isfinite(command):
                 return f"joint '{joint.name}': command {command} is no position; the arm holds"
             lowest, highest = joint.range_from(sent)
-            if not lowest - WAY_MARGIN <= command <= highest + WAY_MARGIN:
+            if not lowest - CURVE_MARGIN <= command <= highest + CURVE_MARGIN:
                 return (f"joint '{joint.name}': command {command:.6g} rad is outside its range "
                         f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds")
             if abs(command - sent) > self._max_jump:

@@ -68,17 +68,17 @@ class UrArmRobotHW(UrArmHardware):
         self._services.append(rospy.Service(name, Trigger, callback))
 
     def _watch(self) -> None:
-        told: bool | None = None
+        published: bool | None = None
         while not self._closing.wait(_WATCH_PERIOD_S):
             ready = self.ready
-            if ready != told and self._publisher is not None:
+            if ready != published and self._publisher is not None:
                 publish(self._publisher, Bool(ready))
-                told = ready
+                published = ready
 
     def _on_resume(self, request: Any) -> TriggerResponse:
         del request
-        trouble = self.resume()
-        return TriggerResponse(success=not trouble, message=trouble or "the arm follows commands")
+        fault = self.resume()
+        return TriggerResponse(success=not fault, message=fault or "the arm follows commands")
 
     def _asker(self, name: str) -> Callable[[Any], TriggerResponse]:
         line, done = DASHBOARD_SERVICES[name]

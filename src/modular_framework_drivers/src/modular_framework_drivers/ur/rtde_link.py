@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from modular_framework_drivers.ur.arm_messages import (
+    ACCEPTED,
     CONNECTING,
     FAILED,
     READY,
     STATE,
-    TAKEN,
     ArmState,
     servo_message,
 )
@@ -33,9 +33,9 @@ _RETRY_S = 0.5                  # between two attempts to connect
 _START_TIMEOUT_S = 30.0         # for a process to start; a busy computer takes its time
 _CONNECT_TIMEOUT_S = 5.0        # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0       # from then until the program is uploaded and runs
-_MUTE_S = 0.5                   # a process that says nothing for so long does nothing either
+_SILENCE_TIMEOUT_S = 0.5                   # a process that says nothing for so long does nothing either
 _STOP_PATIENCE_S = 1.5          # for the arm to come to rest when the link is closed
-_LAST_WORD_S = 0.1              # for a given up process to send its stop, behind all commands still on their way
+_FINAL_STOP_S = 0.1              # for a given up process to send its stop, behind all commands still on their way
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class LinkSettings:
     real_time: bool = True
 
 
-class _Helper:
+class _RtdeProcess:
     """A process that holds ur-rtde.
 
     Attributes:
@@ -75,11 +75,11 @@ class _Helper:
         owes: whether it owes one.
     """
 
-    __slots__ = ("process", "works", "failed", "silence", "owes", "_patience_s", "_since_s")
+    __slots__ = ("process", "working", "failed", "silence", "awaits_message", "_patience_s", "_since_s")
 
     def __init__(self, process: ChildProcess, now_s: float) -> None:
         self.process = process
-        self.works = self.failed = self.owes = False
+        self.working = self.failed = self.awaits_message = False
         self.silence = SilenceWatch(now_s)
         self._since_s, self._patience_s = now_s, _START_TIMEOUT_S
 
@@ -89,7 +89,7 @@ class _Helper:
 
     def too_late(self, now_s: float) -> str:
         """Why it takes too long to work; "" when it does not."""
-        if self.works or self.failed or now_s - self._since_s <= self._patience_s:
+        if self.working or self.failed or now_s - self._since_s <= self._patience_s:
             return ""
         return f"within {self._patience_s:g} s"
 
@@ -107,8 +107,8 @@ class RtdeLink:
         self._settings = settings
         self._closing = threading.Event()
         self._keeper: threading.Thread | None = None
-        self._states: _Helper | None = None
-        self._control: _Helper | None = None
+        self._states: _RtdeProcess | None = None
+        self._control: _RtdeProcess | None = None
         self._program_wanted = False
         self._has_commanded = False
         self.state: ArmState | None = None
@@ -132,7 +132,7 @@ class RtdeLink:
     def request_program(self) -> None:
         """Have the program that takes commands uploaded, anew if it was, as soon as the arm is connected."""
         control = self._control
-        if control is not None and control.works:    # its program may have ended before the arm followed it
+        if control is not None and control.working:    # its program may have ended before the arm followed it
             control.failed, self.commanding = True, False
         self.program_failure = ""
         self._program_wanted = True
@@ -155,18 +155,18 @@ class RtdeLink:
         now_s = time.monotonic()
         states, control = self._states, self._control
         if states is not None:
-            self._take_states(states, now_s)
+            self._read_states(states, now_s)
         if control is not None:
-            self._take_answers(control, now_s)
+            self._read_replies(control, now_s)
 
     def servo(self, positions: Sequence[float], time_s: float) -> None:
         """Send the joints to `positions` [rad] within `time_s` [s]."""
         control = self._control
         if self.commanding and control is not None:
             control.process.send(servo_message(positions, time_s))
-            control.owes = True
+            control.awaits_message = True
 
-    def _take_states(self, states: _Helper, now_s: float) -> None:
+    def _read_states(self, states: _RtdeProcess, now_s: float) -> None:
         newest, heard = b"", False
         for message in states.process.messages():
             heard = True
@@ -176,19 +176,19 @@ class RtdeLink:
                 states.connects(now_s, _CONNECT_TIMEOUT_S)
             elif message[:1] == FAILED:
                 self._lose(states, message[1:].decode(errors="replace"))
-        silent_s = states.silence.look(now_s, heard)
+        silent_s = states.silence.update(now_s, heard)
         if states.failed:
             return
         if newest:
             if self.lost:
                 LOGGER.info("arm at %s: connected", self._settings.address)
-            self.state, self.lost, states.works = ArmState.unpacked(newest), "", True
+            self.state, self.lost, states.working = ArmState.unpacked(newest), "", True
         if states.process.ended:
             self._lose(states, "the process that reads the arm's state ended")
-        elif states.works and silent_s > _MUTE_S:
-            self._lose(states, f"the process that reads the arm's state has said nothing for {_MUTE_S:g} s")
+        elif states.working and silent_s > _SILENCE_TIMEOUT_S:
+            self._lose(states, f"the process that reads the arm's state has said nothing for {_SILENCE_TIMEOUT_S:g} s")
 
-    def _lose(self, states: _Helper, reason: str) -> None:
+    def _lose(self, states: _RtdeProcess, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
             if self._has_commanded:    # before that nothing has moved, and nobody needs to be asked to begin again
@@ -197,16 +197,16 @@ class RtdeLink:
             states.failed = True
             self.lost = reason
 
-    def _take_answers(self, control: _Helper, now_s: float) -> None:
+    def _read_replies(self, control: _RtdeProcess, now_s: float) -> None:
         playing = self.state is not None and self.state.runtime_state == PROGRAM_PLAYING
-        answered = not control.owes or not playing
+        answered = not control.awaits_message or not playing
         for message in control.process.messages():
-            if message == TAKEN:
-                answered, control.owes = True, False
+            if message == ACCEPTED:
+                answered, control.awaits_message = True, False
             elif message == CONNECTING:
                 control.connects(now_s, _PROGRAM_TIMEOUT_S)
             elif message == READY:
-                control.works = True
+                control.working = True
                 self.commanding = self._program_wanted and not control.failed and not self.lost
                 self._has_commanded |= self.commanding
             elif message[:1] == FAILED and not control.failed:
@@ -215,8 +215,8 @@ class RtdeLink:
             return
         if control.process.ended:
             self.drop_program("the process that commands the arm ended")
-        elif control.silence.look(now_s, answered) > _MUTE_S:
-            self.drop_program(f"the process that commands the arm has taken no command for {_MUTE_S:g} s")
+        elif control.silence.update(now_s, answered) > _SILENCE_TIMEOUT_S:
+            self.drop_program(f"the process that commands the arm has taken no command for {_SILENCE_TIMEOUT_S:g} s")
 
     def _keep(self) -> None:
         next_attempt_s = 0.0
@@ -232,21 +232,21 @@ class RtdeLink:
                     next_attempt_s = now_s + _RETRY_S
                 self._keep_program(now_s)
             except OSError as error:
-                self._tell_not_started(error)
+                self._log_start_failure(error)
         if self._states is not None:
             self._states.process.end()
         if self._control is not None:
             self._control.process.end(_STOP_PATIENCE_S)
         self._states = self._control = None
 
-    def _tell_not_started(self, error: OSError) -> None:
+    def _log_start_failure(self, error: OSError) -> None:
         reason = f"a process for it cannot be started: {error}; free memory, processes or open files of this computer"
         if self._states is None:
             self.lost = reason
         else:
             self.drop_program(reason)
 
-    def _is_over(self, states: _Helper, now_s: float) -> bool:
+    def _is_over(self, states: _RtdeProcess, now_s: float) -> bool:
         late = states.too_late(now_s)
         if late:
             states.failed = True
@@ -261,7 +261,7 @@ class RtdeLink:
                 self._control = self._start("control", self._control_arguments(), now_s)
         elif not wanted or control.failed:
             self._control, control.failed = None, True
-            control.process.end(_LAST_WORD_S)
+            control.process.end(_FINAL_STOP_S)
         elif late := control.too_late(now_s):
             self.drop_program(f"the program was not accepted {late}")
 
@@ -274,9 +274,9 @@ class RtdeLink:
                 "--payload-centre", *map(_written, settings.payload_centre_m),
                 "--lookahead", _written(settings.lookahead_s), "--gain", _written(settings.gain)]
 
-    def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _Helper:
+    def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _RtdeProcess:
         real_time = ["--real-time"] if self._settings.real_time else []
-        return _Helper(ChildProcess(_MODULE, [role, self._settings.address, *real_time, *arguments]), now_s)
+        return _RtdeProcess(ChildProcess(_MODULE, [role, self._settings.address, *real_time, *arguments]), now_s)
 
 
 def _written(number: float) -> str:

@@ -19,19 +19,19 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from modular_framework_control.real_time import run_in_real_time
+from modular_framework_control.realtime.scheduling import run_in_real_time
 from modular_framework_drivers.ur.arm_messages import (
+    ACCEPTED,
     ALIVE,
     CONNECTING,
     FAILED,
     MESSAGE_SIZE,
     READY,
     SERVO,
-    TAKEN,
     ArmState,
     read_servo_message,
 )
-from modular_framework_drivers.ur.state_watch import SilenceWatch, follows
+from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
 
 _PRIORITY = 60               # the control loop has 80
 _POLL_PERIOD_S = 0.002
@@ -62,22 +62,22 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
     arm = RTDEReceiveInterface(options.address, -1.0, _VARIABLES)
     _take_priority(options)
     last: ArmState | None = None
-    last_timestamp_s, last_said_s = float("nan"), 0.0
+    last_timestamp_s, last_sent_s = float("nan"), 0.0
     silence = SilenceWatch(time.monotonic())
     while True:
         now_s, timestamp_s, heard = time.monotonic(), arm.getTimestamp(), False
         if timestamp_s != last_timestamp_s:
             last_timestamp_s = timestamp_s
             state = _state_of(arm, now_s, timestamp_s)
-            if heard := follows(state, last):
-                last, last_said_s = state, now_s
+            if heard := is_plausible(state, last):
+                last, last_sent_s = state, now_s
                 _send(channel, state.packed())
         if not heard and not arm.isConnected():
             raise ConnectionEndedError("the arm closed the connection")
-        if silence.look(now_s, heard) > options.timeout:
+        if silence.update(now_s, heard) > options.timeout:
             raise ConnectionEndedError(f"nothing new from the arm for {options.timeout:g} s")
-        if now_s - last_said_s > _ALIVE_PERIOD_S:
-            last_said_s = now_s
+        if now_s - last_sent_s > _ALIVE_PERIOD_S:
+            last_sent_s = now_s
             _send(channel, ALIVE)
         time.sleep(_POLL_PERIOD_S)
 
@@ -134,7 +134,7 @@ def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
             # a program that is paused or stopped takes none; which of them it is the state of the arm tells
             if arm.servoJ(positions, 0.0, 0.0, time_s, options.lookahead, options.gain):
                 with contextlib.suppress(BrokenPipeError):   # nobody is there any more; the next message says so
-                    _send(channel, TAKEN)
+                    _send(channel, ACCEPTED)
     arm.servoStop(_STOP_DECELERATION)
     arm.stopScript()
 

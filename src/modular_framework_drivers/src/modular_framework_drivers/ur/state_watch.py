@@ -6,7 +6,7 @@ import math
 
 from modular_framework_drivers.ur.arm_messages import ArmState
 
-_LONGEST_LOOK_S = 0.02
+_LONGEST_STEP_S = 0.02
 _MAX_POSITION = 100.0           # some joints, as wrist 3 of a UR3, turn without end [rad]
 _MAX_SPEED = 2.0 * math.pi      # of a measured joint; twice what a UR5's does [rad/s]
 _SLACK = 0.05                   # rounding and jitter of the clock [rad]
@@ -28,14 +28,14 @@ class SilenceWatch:
         self._last_s = now_s
         self._silent_s = 0.0
 
-    def look(self, now_s: float, heard: bool) -> float:
+    def update(self, now_s: float, heard: bool) -> float:
         """Note whether something was heard since the last look; returns how long nothing was [s]."""
-        self._silent_s = 0.0 if heard else self._silent_s + min(now_s - self._last_s, _LONGEST_LOOK_S)
+        self._silent_s = 0.0 if heard else self._silent_s + min(now_s - self._last_s, _LONGEST_STEP_S)
         self._last_s = now_s
         return self._silent_s
 
 
-def follows(state: ArmState, last: ArmState | None) -> bool:
+def is_plausible(state: ArmState, last: ArmState | None) -> bool:
     """Whether an arm can be in that state after the last one; garbage on the line, read as a state, cannot."""
     if not math.isfinite(state.timestamp_s) or not all(abs(position) <= _MAX_POSITION for position in state.positions):
         return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     ForceTorqueSensorHandle,
     ForceTorqueSensorInterface,
     JointHandle,
@@ -15,7 +15,7 @@ from modular_framework_control.hardware_interface import (
     SpeedScalingHandle,
     SpeedScalingInterface,
 )
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, PROGRAM_STOPPED, robot_fault
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints, read_link_settings, read_prefix
@@ -58,7 +58,7 @@ class UrArmHardware(RobotHW):
         self._check: CommandCheck | None = None
         self._servo_time_s = 0.008
         self._refused = ""
-        self._trouble = "no state of the arm yet"
+        self._robot_fault = "no state of the arm yet"
         self._fault = "not initialised"
         self._following = False
 
@@ -112,7 +112,7 @@ class UrArmHardware(RobotHW):
         if state is not None:
             self._take(state)
         self._stop_with_the_program(state)
-        following = self._link.commanding and not self._trouble and self._program_runs(state)
+        following = self._link.commanding and not self._robot_fault and self._program_runs(state)
         if not following or not self._following:
             for handle in self._handles:
                 handle.command = handle.position
@@ -121,7 +121,7 @@ class UrArmHardware(RobotHW):
         self._fault = self._current_fault()
 
     def _take(self, state: ArmState) -> None:
-        self._trouble = robot_fault(state, self.address)
+        self._robot_fault = robot_fault(state, self.address)
         known = self._link is not None and not self._link.lost
         for handle, position, velocity, current in zip(self._handles, state.positions, state.velocities,
                                                        state.currents, strict=True):
@@ -136,7 +136,7 @@ class UrArmHardware(RobotHW):
         """A program that was ended, by whomever, is not started again until somebody says so."""
         if self._link is None or not self._link.commanding or not self._following:
             return
-        fault = self._trouble.partition(";")[0]
+        fault = self._robot_fault.partition(";")[0]
         if fault or not self._program_runs(state):
             self._link.drop_program(fault or "the program on the arm was stopped")
 
@@ -187,9 +187,9 @@ class UrArmHardware(RobotHW):
             return "the arm is not initialised"
         if self._following:
             return ""
-        trouble = self._link_fault() or self._trouble
-        if trouble:
-            return trouble
+        fault = self._link_fault() or self._robot_fault
+        if fault:
+            return fault
         self._link.request_program()
         deadline_s = time.monotonic() + timeout_s
         while time.monotonic() < deadline_s:
@@ -201,7 +201,7 @@ class UrArmHardware(RobotHW):
         return self.fault() or f"the program on the arm did not start within {timeout_s:g} s"
 
     def _current_fault(self) -> str:
-        return self._link_fault() or self._trouble or self._program_fault()
+        return self._link_fault() or self._robot_fault or self._program_fault()
 
     def _link_fault(self) -> str:
         link = self._link

@@ -10,8 +10,8 @@ from pathlib import Path
 import rospkg
 import rospy
 
-from modular_framework_control.hardware_interface import HardwareInterfaceError
-from modular_framework_control.ros_controller_manager import RosControllerManager
+from modular_framework_control.hardware_interface.interfaces import HardwareInterfaceError
+from modular_framework_control.ros.ros_controller_manager import RosControllerManager
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError

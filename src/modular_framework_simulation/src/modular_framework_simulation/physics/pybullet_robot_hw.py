@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from modular_framework_control.hardware_interface import (
+from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     EffortJointInterface,
     JointHandle,
@@ -18,7 +18,7 @@ from modular_framework_control.hardware_interface import (
     VelocityJointInterface,
     interface_from_name,
 )
-from modular_framework_control.joint_limits import (
+from modular_framework_control.hardware_interface.joint_limits import (
     JointLimiter,
     JointLimits,
     SoftJointLimits,
@@ -27,7 +27,7 @@ from modular_framework_control.joint_limits import (
     soft_limits_from_urdf,
     soft_limits_with_parameters,
 )
-from modular_framework_control.robot_hw import RobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle
 from modular_framework_simulation.models.robot_description import RobotJoint
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody

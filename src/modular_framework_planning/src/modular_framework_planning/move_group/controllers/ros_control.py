@@ -10,7 +10,7 @@ import rosgraph
 import rospy
 from controller_manager_msgs.msg import ControllerState
 
-from modular_framework_control.ros_controller_manager_client import (
+from modular_framework_control.ros.controller_manager_client import (
     ControllerManagerClient,
     ControllerManagerClientError,
 )

@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loads, starts, updates, stops and unloads controllers on one `RobotHW`, with the rules of ros_control.
+
+Two sides meet here. Threads that may wait (services) load, unload and ask for switches; the control loop calls
+`update`, which never waits for them: the list of controllers is replaced as a whole, and a switch is handed over in
+one slot.
+"""
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_manager.controller_statistics import StatisticsSnapshot
+from modular_framework_control.controller_manager.controller_switch import (
+    LOGGER,
+    ControllerState,
+    LoadedController,
+    Strictness,
+    SwitchRequest,
+    plan_switch,
+)
+from modular_framework_control.controller_manager.controller_types import BASE_CLASS, ControllerTypes
+from modular_framework_control.controller_manager.fault_watch import FaultWatch
+from modular_framework_control.hardware_interface.interfaces import ControllerInfo, InterfaceResources
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, join_names
+
+Detach = Callable[[], None]
+Attach = Callable[[str, Controller], Detach]
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerReport:
+    """One line of `list_controllers`.
+
+    Attributes:
+        info: name, type and claimed joints.
+        state: initialized, running, stopped, waiting or aborted.
+        failure: why the controller was stopped by the manager; "" when it was not.
+        statistics: its update times since it was started last.
+    """
+
+    info: ControllerInfo
+    state: ControllerState
+    failure: str
+    statistics: StatisticsSnapshot
+
+
+def _attach_nothing(name: str, controller: Controller) -> Detach:
+    del name, controller
+    return lambda: None
+
+
+class ControllerManager:
+    """The controllers of one robot.
+
+    Args:
+        robot_hw: initialised hardware.
+        root_nh: namespace below which each controller's parameters are found under its name.
+        types: known controller types.
+        attach: called for each loaded controller; opens its topics and actions and returns what closes them.
+        update_wait_s: how long a switch waits for the next cycle of the control loop [s of real time].
+        clock: real time [s], for the statistics.
+    """
+
+    def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle, types: ControllerTypes | None = None,
+                 attach: Attach = _attach_nothing, update_wait_s: float = 10.0,
+                 clock: Callable[[], float] = time.perf_counter) -> None:
+        self._robot_hw = robot_hw
+        self._root_nh = root_nh
+        self.types = types if types is not None else ControllerTypes()
+        self._attach = attach
+        self._update_wait_s = update_wait_s
+        self._clock = clock
+        self._services = threading.RLock()
+        self._slot_lock = threading.Lock()
+        self._pending: SwitchRequest | None = None
+        self._ended = False
+        self._loaded: tuple[LoadedController, ...] = ()
+        self._detach: dict[str, Detach] = {}
+        self._last_time_s = float("-inf")
+        self._watch = FaultWatch(robot_hw)
+
+    @property
+    def fault(self) -> str:
+        """Why the hardware could not follow in the last cycle; "" when it could."""
+        return self._watch.text
+
+    # ---- control loop ----
+
+    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
+        """Update every running controller, then carry out a pending switch. Never raises, never waits.
+
+        Args:
+            time_s: time of this cycle [s].
+            period_s: time since the last cycle [s].
+            reset_controllers: restart the running controllers first (after a reset of the simulation); a time before
+                that of the last cycle does the same.
+        """
+        reset = reset_controllers or time_s < self._last_time_s
+        self._last_time_s = time_s
+        faults = self._watch.faults()
+        begun_s = self._clock()
+        late_s = begun_s + period_s if period_s > 0.0 else math.inf
+        for entry in self._loaded:
+            if entry.state is not ControllerState.RUNNING:
+                continue
+            if reset:
+                entry.stop(time_s)
+                if entry.start(time_s):
+                    continue
+            if faults or entry.fault:
+                entry.notify_fault(time_s, faults)
+                if not entry.running:
+                    continue
+            try:
+                entry.controller.update(time_s, period_s)
+            except Exception as error:  # one controller's fault must not stop the others
+                entry.fail(time_s, f"update() raised {type(error).__name__}: {error}")
+            ended_s = self._clock()
+            entry.statistics.add(time_s, ended_s - begun_s, begun_s <= late_s < ended_s)
+            begun_s = ended_s
+        if self._pending is not None:
+            self._step_switch(time_s)
+
+    def _step_switch(self, time_s: float) -> None:
+        if not self._slot_lock.acquire(blocking=False):
+            return
+        try:
+            request = self._pending
+            if request is None:
+                return
+            try:
+                finished = request.step(self._robot_hw, time_s)
+            except Exception as error:
+                LOGGER.exception("switch_controller: the hardware raised")
+                request.errors.append(f"hardware raised {type(error).__name__}: {error}")
+                request.give_up(time_s)
+                finished = True
+            if finished:
+                self._pending = None
+                request.done.set()
+        finally:
+            self._slot_lock.release()
+
+    # ---- threads that may wait ----
+
+    def load_controller(self, name: str) -> None:
+        """Make and initialise the controller whose parameters are below `name`.
+
+        Raises:
+            ControllerError: already loaded, no or unknown type, its `init` failed, or its topics and actions cannot be
+                opened; says which.
+        """
+        with self._services:
+            if any(entry.name == name for entry in self._loaded):
+                raise ControllerError(f"cannot load controller '{name}': one of that name is already loaded")
+            controller_nh = self._root_nh.child(name)
+            controller_type = controller_nh.get_param("type")
+            if not isinstance(controller_type, str) or not controller_type:
+                where = join_names(controller_nh.namespace, "type")
+                raise ControllerError(f"cannot load controller '{name}': parameter {where} is {controller_type!r}; "
+                                      f"expected one of: {', '.join(self.types.names)}. Is the controller file loaded?")
+            controller = self.types.create(controller_type)
+            info = ControllerInfo(name, controller_type, self._init_controller(name, controller, controller_nh))
+            try:
+                detach = self._attach(name, controller)
+            except Exception as error:  # somebody else's code may raise anything
+                _close(name, controller, lambda: None)
+                raise ControllerError(f"cannot load controller '{name}': opening its topics and actions raised "
+                                      f"{type(error).__name__}: {error}") from error
+            self._detach[name] = lambda: _close(name, controller, detach)
+            self._loaded = (*self._loaded, LoadedController(info, controller))
+
+    def _init_controller(self, name: str, controller: Controller,
+                         controller_nh: NodeHandle) -> tuple[InterfaceResources, ...]:
+        for interface in self._robot_hw.interfaces:
+            interface.take_claims()
+        try:
+            main = self._robot_hw.get(controller.interface_class)
+            controller.robot_hw = self._robot_hw
+            if controller.init(main, self._root_nh, controller_nh) is not True:
+                raise ControllerError("init() returned False")
+        except Exception as error:  # a user's controller may raise anything
+            raise ControllerError(f"cannot load controller '{name}': {error}") from error
+        others = [interface for interface in self._robot_hw.interfaces if interface is not main]
+        claims = [InterfaceResources(interface.type_name, interface.take_claims()) for interface in (main, *others)]
+        return tuple(claim for claim in claims if claim.resources or claim is claims[0])
+
+    def unload_controller(self, name: str) -> None:
+        """Forget a controller that is not running.
+
+        Raises:
+            ControllerError: not loaded, or running.
+        """
+        with self._services:
+            entry = next((entry for entry in self._loaded if entry.name == name), None)
+            if entry is None:
+                raise ControllerError(f"cannot unload controller '{name}': not loaded; loaded: {self._names()}")
+            if entry.running:
+                raise ControllerError(f"cannot unload controller '{name}': it is running; stop it first")
+            self._loaded = tuple(other for other in self._loaded if other is not entry)
+            self._detach.pop(name)()
+
+    def switch_controller(self, start: Sequence[str], stop: Sequence[str], strictness: int = Strictness.STRICT,
+                          start_asap: bool = False, timeout_s: float = 0.0) -> None:
+        """Stop and start controllers in one cycle of the control loop; returns when that is done.
+
+        Args:
+            start: names to start.
+            stop: names to stop.
+            strictness: BEST_EFFORT (1) leaves out what cannot be done, STRICT (2) refuses; 0 means BEST_EFFORT.
+            start_asap: start each controller as soon as the hardware is ready for it.
+            timeout_s: how long the hardware may take to get ready [s of the loop's time]; 0 for no bound.
+
+        Raises:
+            ControllerError: refused, in conflict over a joint, refused by the hardware, which may also raise, not
+                started, or not carried out because the control loop did not run or has ended.
+        """
+        with self._services:
+            plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop,
+                               Strictness.of(strictness))
+            if not plan.start and not plan.stop:
+                return
+            request = SwitchRequest(plan, start_asap, timeout_s)
+            self._prepare(request)
+            self._hand_over(request)
+            if request.errors:
+                raise ControllerError("; ".join(request.errors))
+
+    def _prepare(self, request: SwitchRequest) -> None:
+        """Ask the hardware whether it can do the switch."""
+        try:
+            conflict = self._robot_hw.check_for_conflict(request.plan.resulting)
+            prepared = not conflict and self._robot_hw.prepare_switch(*request.hardware_lists)
+        except Exception as error:  # a user's hardware may raise anything
+            raise ControllerError("cannot switch controllers: check_for_conflict() or prepare_switch() of the hardware "
+                                  f"raised {type(error).__name__}: {error}") from error
+        if conflict:
+            raise ControllerError(f"cannot switch controllers: {conflict}")
+        if not prepared:
+            raise ControllerError("cannot switch controllers: the hardware refused to prepare for it")
+
+    def _hand_over(self, request: SwitchRequest) -> None:
+        """Put `request` into the slot of the loop and wait until it is done, as long as the loop runs."""
+        with self._slot_lock:
+            if self._ended:
+                raise ControllerError("cannot switch controllers: the control loop has ended; start its node again")
+            self._pending = request
+        seen = -1
+        while seen != request.cycles:
+            seen = request.cycles
+            if request.done.wait(self._update_wait_s):
+                return
+        with self._slot_lock:
+            self._pending = None
+            request.give_up(self._last_time_s)
+        if not request.done.is_set():
+            raise ControllerError(f"the control loop did not carry out the switch: it made no cycle for "
+                                  f"{self._update_wait_s:.1f} s; is it running, or paused?")
+
+    def list_controllers(self) -> list[ControllerReport]:
+        """All loaded controllers in the order they were loaded."""
+        return [ControllerReport(entry.info, entry.state, entry.failure, entry.statistics.snapshot())
+                for entry in self._loaded]
+
+    def list_controller_types(self) -> list[tuple[str, str]]:
+        """Known type names, each with the base class it is reported under."""
+        return [(name, BASE_CLASS) for name in self.types.names]
+
+    def reload_controller_libraries(self, force_kill: bool = False) -> None:
+        """Look again for controller classes; with `force_kill`, stop and unload all controllers first.
+
+        Raises:
+            ControllerError: controllers are loaded and `force_kill` is False.
+        """
+        with self._services:
+            names = [entry.name for entry in self._loaded]
+            if names and not force_kill:
+                raise ControllerError(f"cannot reload controller libraries: loaded controllers: {self._names()}; "
+                                      "unload them or ask for force_kill")
+            self.switch_controller([], names, Strictness.BEST_EFFORT)
+            for name in reversed(names):
+                self.unload_controller(name)
+            self.types.reload()
+
+    def stop_all(self) -> None:
+        """Stop every running controller, which ends their goals, and refuse switches from now on, a pending one too.
+
+        The control loop must have ended. May be called twice.
+        """
+        with self._slot_lock:
+            self._ended = True
+            request, self._pending = self._pending, None
+            if request is not None:
+                request.errors.append("the switch was not carried out: the control loop has ended")
+                request.give_up(self._last_time_s)
+                request.done.set()
+        for entry in self._loaded:
+            if entry.running:
+                entry.stop(self._last_time_s)
+
+    def close(self) -> None:
+        """Stop and forget all controllers; the control loop must have ended. May be called twice."""
+        with self._services:
+            self.stop_all()
+            self._loaded = ()
+            while self._detach:
+                self._detach.popitem()[1]()
+
+    def _names(self) -> str:
+        return ", ".join(entry.name for entry in self._loaded) or "none"
+
+
+def _close(name: str, controller: Controller, detach: Detach) -> None:
+    detach()
+    try:
+        controller.close()
+    except Exception as error:  # a user's controller may raise anything; it is gone all the same
+        LOGGER.exception("controller '%s': close() raised %s: %s", name, type(error).__name__, error)

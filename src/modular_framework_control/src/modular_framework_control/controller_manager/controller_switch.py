@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One switch of controllers: checked on a thread that may wait, carried out cycle by cycle in the control loop."""
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_manager.controller_statistics import UpdateStatistics
+from modular_framework_control.hardware_interface.interfaces import ControllerInfo
+from modular_framework_control.hardware_interface.robot_hw import HardwareFault, RobotHW, SwitchState
+
+# Below rospy's logger "rosout", so that messages also reach /rosout when rospy runs; plain logging otherwise.
+LOGGER = logging.getLogger("rosout.controller_manager")
+
+
+class ControllerState(Enum):
+    """States of a loaded controller, by the names `list_controllers` reports.
+
+    One that is to start is waiting until the hardware is ready for it, and aborted when it does not get ready.
+    """
+
+    INITIALIZED = "initialized"
+    RUNNING = "running"
+    STOPPED = "stopped"
+    WAITING = "waiting"
+    ABORTED = "aborted"
+
+
+class Strictness(IntEnum):
+    """What a switch does with an item that cannot be done: leave it out, or refuse the whole."""
+
+    BEST_EFFORT = 1
+    STRICT = 2
+
+    @classmethod
+    def of(cls, number: int) -> Strictness:
+        """The strictness a request asks for by its number; 0, as ros_control has it, means BEST_EFFORT.
+
+        Raises:
+            ControllerError: there is none of this number.
+        """
+        if number == 0:
+            LOGGER.warning("switch_controller: strictness 0 is not defined; using BEST_EFFORT (1)")
+            return cls.BEST_EFFORT
+        try:
+            return cls(number)
+        except ValueError:
+            raise ControllerError(f"strictness {number} is not known; use BEST_EFFORT (1) or STRICT (2)") from None
+
+
+@dataclass(slots=True)
+class LoadedController:
+    """A controller and what the manager knows of it; the control loop writes `state` and `fault`.
+
+    Attributes:
+        failure: why the manager stopped it; "" when it did not.
+        fault: the hardware's fault it was told last; "" when it knows of none.
+        joints: the joints it claims, whatever the interface.
+    """
+
+    info: ControllerInfo
+    controller: Controller
+    state: ControllerState = ControllerState.INITIALIZED
+    failure: str = ""
+    fault: str = ""
+    statistics: UpdateStatistics = field(default_factory=UpdateStatistics)
+    joints: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.joints = frozenset(name for claim in self.info.claimed_resources for name in claim.resources)
+
+    @property
+    def name(self) -> str:
+        return self.info.name
+
+    @property
+    def running(self) -> bool:
+        return self.state is ControllerState.RUNNING
+
+    def start(self, time_s: float) -> str:
+        """Start it; returns why it failed, or ""."""
+        try:
+            self.controller.starting(time_s)
+        except Exception as error:  # a user's controller may raise anything; the loop must go on
+            return self.fail(time_s, f"starting() raised {type(error).__name__}: {error}")
+        self.failure = self.fault = ""
+        self.statistics.reset()
+        self.state = ControllerState.RUNNING
+        return ""
+
+    def wait(self, time_s: float) -> str:
+        """One cycle of waiting for the hardware; returns why it cannot go on waiting, or ""."""
+        self.state = ControllerState.WAITING
+        try:
+            self.controller.waiting(time_s)
+        except Exception as error:  # a user's controller may raise anything; the loop must go on
+            return self.fail(time_s, f"waiting() raised {type(error).__name__}: {error}")
+        return ""
+
+    def abort(self, time_s: float) -> None:
+        """Start it no more; a failure while aborting is reported and leaves it aborted."""
+        self.state = ControllerState.ABORTED
+        try:
+            self.controller.aborting(time_s)
+        except Exception as error:
+            self.failure = f"aborting() raised {type(error).__name__}: {error}"
+            LOGGER.exception("controller '%s': %s", self.name, self.failure)
+
+    def stop(self, time_s: float) -> None:
+        """Stop it; a failure while stopping is reported and leaves it stopped."""
+        self.state = ControllerState.STOPPED
+        try:
+            self.controller.stopping(time_s)
+        except Exception as error:
+            self.failure = f"stopping() raised {type(error).__name__}: {error}"
+            LOGGER.exception("controller '%s': %s", self.name, self.failure)
+
+    def notify_fault(self, time_s: float, faults: Sequence[HardwareFault]) -> None:
+        """Tell it what the hardware of its joints suffers from, when that is news to it."""
+        reason = "; ".join(fault.reason for fault in faults if not fault.joints.isdisjoint(self.joints))
+        if reason == self.fault:
+            return
+        self.fault = reason
+        told = "on_hardware_fault()" if reason else "on_hardware_recovered()"
+        try:
+            if reason:
+                self.controller.on_hardware_fault(time_s, reason)
+            else:
+                self.controller.on_hardware_recovered(time_s)
+        except Exception as error:  # a user's controller may raise anything; the loop must go on
+            self.fail(time_s, f"{told} raised {type(error).__name__}: {error}")
+
+    def fail(self, time_s: float, reason: str) -> str:
+        """Stop it because it raised; call from the except block. Returns `reason`."""
+        self.failure = reason
+        self.state = ControllerState.STOPPED
+        LOGGER.exception("controller '%s' is stopped: %s", self.name, reason)
+        try:
+            self.controller.failed(time_s, reason)
+        except Exception as error:
+            LOGGER.exception("controller '%s': failed() raised %s: %s", self.name, type(error).__name__, error)
+        return reason
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchPlan:
+    """What a switch will do, after the rules of its strictness.
+
+    Attributes:
+        start: controllers to start.
+        stop: controllers to stop first; one that is in both is restarted.
+        resulting: infos of all controllers that run afterwards.
+    """
+
+    start: tuple[LoadedController, ...]
+    stop: tuple[LoadedController, ...]
+    resulting: tuple[ControllerInfo, ...]
+
+
+def plan_switch(loaded: Mapping[str, LoadedController], start: Sequence[str], stop: Sequence[str],
+                strictness: Strictness) -> SwitchPlan:
+    """Apply the rules of STRICT and BEST_EFFORT to a request.
+
+    A controller that runs and is named in both lists is restarted. Named in both while it does not run, it cannot be
+    stopped, which STRICT refuses and BEST_EFFORT leaves out.
+
+    Args:
+        loaded: all loaded controllers by name.
+        start: names to start.
+        stop: names to stop.
+        strictness: what to do with an item that cannot be done.
+
+    Raises:
+        ControllerError: STRICT, and an item cannot be done; all of them are listed.
+    """
+    faults: list[str] = []
+    kept_stop: list[str] = []
+    kept_start: list[str] = []
+    for name in dict.fromkeys(stop):
+        if name not in loaded:
+            faults.append(f"cannot stop '{name}': no controller of that name is loaded")
+        elif not loaded[name].running:
+            faults.append(f"cannot stop '{name}': it is {loaded[name].state.value}, not running")
+        else:
+            kept_stop.append(name)
+    for name in dict.fromkeys(start):
+        if name not in loaded:
+            faults.append(f"cannot start '{name}': no controller of that name is loaded")
+        elif loaded[name].running and name not in kept_stop:
+            faults.append(f"cannot start '{name}': it is already running")
+        else:
+            kept_start.append(name)
+    if faults and strictness is Strictness.STRICT:
+        names = ", ".join(sorted(loaded)) or "none"
+        raise ControllerError(f"{'; '.join(faults)} (strictness STRICT; loaded controllers: {names})")
+    for fault in faults:
+        LOGGER.warning("switch_controller: left out: %s", fault)
+    resulting = tuple(entry.info for entry in loaded.values()
+                      if entry.name in kept_start or (entry.running and entry.name not in kept_stop))
+    return SwitchPlan(tuple(loaded[name] for name in kept_start), tuple(loaded[name] for name in kept_stop), resulting)
+
+
+@dataclass(slots=True)
+class SwitchRequest:
+    """A planned switch on its way through the control loop.
+
+    Attributes:
+        plan: what to do.
+        start_asap: start each controller as soon as the hardware is ready for it, not all together.
+        timeout_s: how long the hardware may take [s of the loop's time]; 0 for no bound.
+        cycles: how many the loop has spent on it.
+        done: set by the loop when nothing is left to do.
+        errors: what went wrong, filled by the loop before `done`.
+    """
+
+    plan: SwitchPlan
+    start_asap: bool = False
+    timeout_s: float = 0.0
+    cycles: int = 0
+    done: threading.Event = field(default_factory=threading.Event)
+    errors: list[str] = field(default_factory=list)
+    _begun_s: float | None = None
+    _waiting: list[LoadedController] = field(default_factory=list)
+
+    @property
+    def hardware_lists(self) -> tuple[list[ControllerInfo], list[ControllerInfo]]:
+        """Infos of what newly starts and what really stops; restarts do not concern the hardware."""
+        start, stop = self.plan.start, self.plan.stop
+        return ([entry.info for entry in start if entry not in stop],
+                [entry.info for entry in stop if entry not in start])
+
+    def step(self, robot_hw: RobotHW, time_s: float) -> bool:
+        """One cycle of the switch, in the control loop; True when it is finished."""
+        self.cycles += 1
+        if self._begun_s is None:
+            self._begin(robot_hw, time_s)
+        if self.start_asap:
+            for entry in list(self._waiting):
+                self._advance([entry], robot_hw.switch_result(entry.info), time_s)
+        elif self._waiting:
+            self._advance(list(self._waiting), robot_hw.switch_result(), time_s)
+        begun_s = time_s if self._begun_s is None else self._begun_s
+        if self._waiting and 0.0 < self.timeout_s < time_s - begun_s:
+            names = ", ".join(entry.name for entry in self._waiting)
+            self.errors.append(f"hardware was not ready within {self.timeout_s} s to start: {names}")
+            self.give_up(time_s)
+        return not self._waiting
+
+    def give_up(self, time_s: float) -> None:
+        """Start no more of the controllers that still wait."""
+        while self._waiting:
+            self._waiting.pop(0).abort(time_s)
+
+    def _begin(self, robot_hw: RobotHW, time_s: float) -> None:
+        self._begun_s = time_s
+        robot_hw.do_switch(*self.hardware_lists)
+        for entry in self.plan.stop:
+            if entry.running:
+                entry.stop(time_s)
+        self._waiting = list(self.plan.start)
+
+    def _advance(self, entries: list[LoadedController], result: SwitchState, time_s: float) -> None:
+        for entry in entries:
+            failure = ""
+            match result:
+                case SwitchState.ONGOING:
+                    failure = entry.wait(time_s)
+                    if not failure:
+                        continue
+                case SwitchState.ERROR:
+                    entry.abort(time_s)
+                    self.errors.append(f"hardware refused to switch for '{entry.name}'")
+                case SwitchState.DONE:
+                    failure = entry.start(time_s)
+                case _:
+                    raise ValueError(f"switch_result() answered {result!r}; expected a SwitchState")
+            self._waiting.remove(entry)
+            if failure:
+                self.errors.append(f"'{entry.name}' did not start: {failure}")

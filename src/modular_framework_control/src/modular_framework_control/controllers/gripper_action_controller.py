@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Moves a gripper of one joint to a position with bounded effort, and notices when something is in its way.
+
+A grasp ends in a *stall*: the fingers cannot go on because they hold something. As in ros_controllers the goal is then
+aborted with `stalled` set, and the command stays, so that the fingers go on squeezing.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.hardware_interface.handles import unmeasured
+from modular_framework_control.hardware_interface.interfaces import (
+    HardwareInterface,
+    JointHandle,
+    PositionJointInterface,
+)
+from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
+from modular_framework_control.realtime.mailbox import Mailbox
+from modular_framework_control.realtime.rates import next_due, period_of
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+
+
+@dataclass(frozen=True, slots=True)
+class GripperState:
+    """Feedback and result of a gripper goal.
+
+    Attributes:
+        position: measured [rad|m].
+        effort: measured [Nm|N].
+        stalled: the joint does not move and is not at its goal.
+        reached_goal: the joint is within `goal_tolerance` of its goal.
+    """
+
+    position: float
+    effort: float
+    stalled: bool
+    reached_goal: bool
+
+
+GripperGoalHandle = RealtimeGoalHandle[GripperState]
+
+
+class GripperGoalError(Exception):
+    """A gripper goal that cannot be taken up."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    position: float
+    max_effort: float
+    goal_handle: GripperGoalHandle
+
+
+class GripperActionController(Controller):
+    """position_controllers/GripperActionController.
+
+    A joint counts as standing still when it has stayed within `stall_velocity_threshold * stall_timeout` of one place
+    for `stall_timeout`: the mean velocity over that time, rather than the velocity of one cycle, so that the trembling
+    of a contact does not hide a stall. The time counts from the beginning of the goal at the earliest.
+
+    While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason. When
+    the measured position is not a number the goal is aborted, and the joint is held where it was measured last.
+
+    Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, used for
+    goals that give none, 0 = the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
+    1.0; `action_monitor_rate` [1/s] 20.
+
+    Attributes:
+        on_feedback: called in the control loop at `action_monitor_rate` with the active goal handle and the state.
+    """
+
+    interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
+
+    def __init__(self) -> None:
+        self.on_feedback: Callable[[GripperGoalHandle, GripperState], None] | None = None
+        self._mailbox: Mailbox[_Goal | GripperGoalHandle] = Mailbox()
+        self._active: _Goal | None = None
+        self._running = False
+        self._command = 0.0
+        self._max_effort = 0.0
+        self._measured = 0.0
+        self._fault = ""
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        names = read_names(controller_nh, "joint")
+        if len(names) != 1:
+            where = join_names(controller_nh.namespace, "joint")
+            raise ParameterError(f"parameter {where}: got {names!r}; expected the name of one joint")
+        self._handle: JointHandle = hw.get_handle(names[0])
+        self._goal_tolerance = read_number(controller_nh, "goal_tolerance", 0.01)
+        self._default_max_effort = abs(read_number(controller_nh, "max_effort", 0.0, None))
+        self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
+        threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
+        self._stall_distance = threshold * self._stall_timeout_s
+        self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
+        return True
+
+    # ---- any thread ----
+
+    def submit(self, position: float, max_effort: float, goal_handle: GripperGoalHandle) -> None:
+        """Hand a goal to the control loop.
+
+        Args:
+            position: where to go [rad|m].
+            max_effort: bound on the effort, whose sign does not count [Nm|N]; 0 for the controller's default.
+            goal_handle: gets the status of the goal.
+
+        Raises:
+            GripperGoalError: not a number, or the controller does not run. If it is stopped meanwhile, the goal handle
+                ends as rejected.
+        """
+        if not self._running:
+            raise GripperGoalError("the controller is not running; start it first")
+        if not math.isfinite(position) or not math.isfinite(max_effort):
+            raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers (effort "
+                                   "0 = default)")
+        self._mailbox.put(_Goal(position, abs(max_effort), goal_handle))
+        if not self._running:
+            self._reject_waiting("the controller was stopped")
+
+    def cancel(self, goal_handle: GripperGoalHandle) -> None:
+        """Ask the control loop to stop working on the goal of `goal_handle`."""
+        self._mailbox.put(goal_handle)
+
+    # ---- control loop ----
+
+    def starting(self, time_s: float) -> None:
+        self._reject_waiting("the goal was sent while the controller was being stopped")
+        self._active, self._fault = None, ""
+        missing = unmeasured([self._handle])
+        if missing:
+            raise ControllerError(missing)
+        self._max_effort = self._default_max_effort
+        self._hold()
+        self._apply(0.0)
+        self._running = True
+
+    def stopping(self, time_s: float) -> None:
+        self._end_all(GoalStatus.CANCELED, "the controller was stopped")
+
+    def failed(self, time_s: float, reason: str) -> None:
+        self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._fault = f"hardware fault: {reason}"
+        self._finish(GoalStatus.ABORTED, self._state(False, False), self._fault)
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._fault = ""
+        self._hold()
+
+    def _end_all(self, status: GoalStatus, text: str) -> None:
+        self._running = False
+        if self._active is not None:    # a gripper that has come to its end goes on squeezing, one on its way stops
+            self._hold()
+            self._apply(0.0)
+        self._finish(status, self._state(False, False), text)
+        self._reject_waiting(text)
+
+    def _reject_waiting(self, text: str) -> None:
+        for goal in self._mailbox.drain():
+            if isinstance(goal, _Goal):
+                goal.goal_handle.finish(GoalStatus.REJECTED, self._state(False, False), text)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        self._mailbox.process(lambda goal: self._carry_out(goal, time_s))
+        missing = unmeasured([self._handle])
+        if missing and self._active is not None:
+            self._finish(GoalStatus.ABORTED, self._state(False, False), missing)
+            self._hold()
+        elif not missing:
+            self._measured = self._handle.position
+        if self._fault:
+            self._hold()
+        self._apply(period_s)
+        if self._active is not None:
+            self._check(self._active, time_s)
+
+    def _carry_out(self, goal: _Goal | GripperGoalHandle, time_s: float) -> None:
+        if isinstance(goal, _Goal) and self._fault:
+            goal.goal_handle.finish(GoalStatus.REJECTED, self._state(False, False), self._fault)
+        elif isinstance(goal, _Goal):
+            self._take_up(goal, time_s)
+        elif self._active is not None and self._active.goal_handle is goal:
+            self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
+            self._hold()
+
+    def _take_up(self, goal: _Goal, time_s: float) -> None:
+        self._finish(GoalStatus.CANCELED, self._state(False, False), "preempted by a new goal")
+        self._active = goal
+        self._command = goal.position
+        self._max_effort = goal.max_effort if goal.max_effort > 0.0 else self._default_max_effort
+        self._rest_position = self._handle.position
+        self._rest_since_s = time_s
+        self._next_feedback_s = time_s
+        goal.goal_handle.activate()
+
+    def _check(self, goal: _Goal, time_s: float) -> None:
+        position = self._handle.position
+        error = goal.position - position
+        if abs(error) <= self._goal_tolerance:
+            self._finish(GoalStatus.SUCCEEDED, self._state(False, True), "goal position reached")
+            return
+        if not abs(position - self._rest_position) <= self._stall_distance:
+            self._rest_position = position
+            self._rest_since_s = time_s
+        elif time_s - self._rest_since_s > self._stall_timeout_s:
+            self._finish(GoalStatus.ABORTED, self._state(True, False),
+                         f"stalled: joint '{self._handle.name}' stands at {position:.6g}, {error:+.6g} short of its "
+                         f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s")
+            return
+        if self.on_feedback is not None and time_s >= self._next_feedback_s:
+            self._next_feedback_s = next_due(self._next_feedback_s, self._monitor_period_s, time_s)
+            self.on_feedback(goal.goal_handle, self._state(False, False))
+
+    def _hold(self) -> None:
+        """Stay, with no more effort than before: there may be something between the fingers."""
+        if math.isfinite(self._handle.position):
+            self._measured = self._handle.position
+        self._command = self._measured
+        self._handle.held = True
+
+    def _apply(self, period_s: float) -> None:
+        """Command the joint; `period_s` [s] is the time since the last call, 0 at a start."""
+        del period_s
+        self._handle.command = self._command
+        self._handle.max_effort = self._max_effort
+
+    def _state(self, stalled: bool, reached_goal: bool) -> GripperState:
+        return GripperState(self._handle.position, self._handle.effort, stalled, reached_goal)
+
+    def _finish(self, status: GoalStatus, state: GripperState, text: str) -> None:
+        goal, self._active = self._active, None
+        if goal is not None:
+            goal.goal_handle.finish(status, state, text)

@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that do at once what one topic says: a position, velocity or effort for one joint or for several.
+
+Where the hardware takes what is commanded, it is passed on; where it takes something else, gains make it that.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_interface.pid import PidGains, read_pid
+from modular_framework_control.hardware_interface.interfaces import (
+    EffortJointInterface,
+    JointHandle,
+    PositionJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.hardware_interface.joint_limits import limits_of
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names
+
+CYCLES_PER_REPORT = 10
+
+
+@dataclass(frozen=True, slots=True)
+class JointControlSnapshot:
+    """What a controller with gains of one joint saw and did in a cycle.
+
+    Attributes:
+        time_s: time of the cycle [s].
+        period_s: time since the one before [s].
+        set_point: what is wanted.
+        process_value: what is measured of it.
+        process_value_dot: how fast that changes; 0 where it is not measured.
+        error: what the gains made the command of.
+        command: to the joint.
+        gains: what the command was made with.
+    """
+
+    time_s: float
+    period_s: float
+    set_point: float
+    process_value: float
+    process_value_dot: float
+    error: float
+    command: float
+    gains: PidGains
+
+
+class JointCommandController(Controller):
+    """Base: commands arrive from any thread as a whole and are in force from the next cycle on.
+
+    While the hardware has a fault the joints are kept where they are, and commands are refused with its reason.
+
+    Parameters, below the controller's name: `joints`, or `joint` for controllers of one.
+
+    Attributes:
+        single: whether it controls one joint, and its topic `command` holds one number.
+        joint_names: the joints, in the order of the numbers of a command.
+    """
+
+    single = True
+
+    def __init__(self) -> None:
+        self.joint_names: list[str] = []
+        self._handles: list[JointHandle] = []
+        self._wanted: tuple[float, ...] = ()
+        self._fault = ""
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        key = "joint" if self.single else "joints"
+        self.joint_names = read_names(controller_nh, key)
+        if self.single and len(self.joint_names) != 1:
+            raise ParameterError(f"parameter {join_names(controller_nh.namespace, key)}: got {self.joint_names!r}; "
+                                 "expected the name of one joint")
+        self._handles = [hw.get_handle(name) for name in self.joint_names]
+        return True
+
+    def submit(self, values: Sequence[float]) -> None:
+        """Take a command, from any thread.
+
+        Args:
+            values: one number a joint, in the unit of what is controlled.
+
+        Raises:
+            ControllerError: not as many as joints, not finite, or the hardware has a fault; what was in force stays.
+        """
+        if self._fault:
+            raise ControllerError(self._fault)
+        if len(values) != len(self.joint_names) or not all(map(math.isfinite, values)):
+            raise ControllerError(f"got {list(values)!r}; expected {len(self.joint_names)} finite numbers, for: "
+                                  f"{', '.join(self.joint_names)}")
+        self._wanted = tuple(values)
+
+    def starting(self, time_s: float) -> None:
+        self._fault = ""
+        self._rest()
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._fault = f"hardware fault: {reason}"
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._rest()
+        self._fault = ""
+
+    def update(self, time_s: float, period_s: float) -> None:
+        if self._fault:
+            self._rest()
+        else:
+            self._command(period_s)
+
+    def _rest(self) -> None:
+        """Keep the joints where they are."""
+        self._wanted = self._resting()
+        self._command(0.0)
+
+    def _resting(self) -> tuple[float, ...]:
+        """What keeps the joints where they are."""
+        return (0.0,) * len(self._handles)
+
+    def _command(self, period_s: float) -> None:
+        """Command the joints what is wanted; `period_s` [s] is the time since the last call, 0 at a start."""
+        for handle, value in zip(self._handles, self._wanted, strict=True):
+            handle.command = value
+
+
+class _ZeroedWhenStopped(JointCommandController):
+    """One whose joints take velocities or efforts: they get none when it does not run."""
+
+    def stopping(self, time_s: float) -> None:
+        for handle in self._handles:
+            handle.command = 0.0
+
+
+class PositionJointPositionController(JointCommandController):
+    """position_controllers/JointPositionController: positions [rad|m] for joints that take positions."""
+
+    interface_class = PositionJointInterface
+
+    def stopping(self, time_s: float) -> None:
+        self._rest()
+
+    def _rest(self) -> None:
+        super()._rest()
+        for handle in self._handles:
+            handle.hold(handle.position)
+
+    def _resting(self) -> tuple[float, ...]:
+        return tuple(handle.position if math.isfinite(handle.position) else handle.command for handle in self._handles)
+
+
+class PositionJointGroupPositionController(PositionJointPositionController):
+    """position_controllers/JointGroupPositionController."""
+
+    single = False
+
+
+class VelocityJointVelocityController(_ZeroedWhenStopped):
+    """velocity_controllers/JointVelocityController: velocities [rad/s|m/s] for joints that take velocities."""
+
+    interface_class = VelocityJointInterface
+
+
+class VelocityJointGroupVelocityController(VelocityJointVelocityController):
+    """velocity_controllers/JointGroupVelocityController."""
+
+    single = False
+
+
+class EffortJointEffortController(_ZeroedWhenStopped):
+    """effort_controllers/JointEffortController: efforts [Nm|N] for joints that take efforts."""
+
+    interface_class = EffortJointInterface
+
+
+class EffortJointGroupEffortController(EffortJointEffortController):
+    """effort_controllers/JointGroupEffortController."""
+
+    single = False
+
+
+class GainsController(_ZeroedWhenStopped):
+    """Base of those with gains.
+
+    Parameters besides: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several.
+
+    Attributes:
+        on_state: called in the control loop every CYCLES_PER_REPORT cycles, by controllers of one joint; must not
+            block.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.on_state: Callable[[JointControlSnapshot], None] | None = None
+        self._error = 0.0
+        self._cycles = 0
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        super().init(hw, root_nh, controller_nh)
+        where = ["pid"] if self.single else [f"{name}/pid" for name in self.joint_names]
+        self.pids = {name: read_pid(controller_nh.child(name)) for name in where}
+        self._pids = list(self.pids.values())
+        return True
+
+    def update(self, time_s: float, period_s: float) -> None:
+        super().update(time_s, period_s)
+        self._cycles += 1
+        if self.single and self.on_state is not None and self._cycles % CYCLES_PER_REPORT == 0:
+            value, rate = self._measured()
+            self.on_state(JointControlSnapshot(time_s, period_s, self._wanted[0], value, rate, self._error,
+                                               self._handles[0].command, self._pids[0].gains))
+
+    def _measured(self) -> tuple[float, float]:
+        """What is controlled of the first joint, and how fast it changes."""
+        return self._handles[0].position, self._handles[0].velocity
+
+    def _rest(self) -> None:
+        for pid in self._pids:
+            pid.reset()
+        super()._rest()
+
+
+class _PositionByGains(GainsController):
+    """Positions [rad|m], kept within the limits that are known, for joints that take something else."""
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        super().init(hw, root_nh, controller_nh)
+        self._limits = limits_of(self._handles, root_nh)
+        return True
+
+    def _resting(self) -> tuple[float, ...]:
+        return tuple(handle.position for handle in self._handles)
+
+    def _command(self, period_s: float) -> None:
+        for handle, value, limits, pid in zip(self._handles, self._wanted, self._limits, self._pids, strict=True):
+            if limits.continuous:
+                error = math.remainder(value - handle.position, 2.0 * math.pi)
+            else:
+                error = min(max(value, limits.min_position), limits.max_position) - handle.position
+            self._error = error
+            handle.command = pid.command(error, -handle.velocity, period_s)
+
+
+class VelocityJointPositionController(_PositionByGains):
+    """velocity_controllers/JointPositionController: a position for a joint that takes velocities."""
+
+    interface_class = VelocityJointInterface
+
+
+class EffortJointPositionController(_PositionByGains):
+    """effort_controllers/JointPositionController: a position for a joint that takes efforts."""
+
+    interface_class = EffortJointInterface
+
+
+class EffortJointGroupPositionController(EffortJointPositionController):
+    """effort_controllers/JointGroupPositionController."""
+
+    single = False
+
+
+class EffortJointVelocityController(GainsController):
+    """effort_controllers/JointVelocityController: a velocity [rad/s|m/s] for a joint that takes efforts."""
+
+    interface_class = EffortJointInterface
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._last_error = math.nan
+
+    def _measured(self) -> tuple[float, float]:
+        return self._handles[0].velocity, 0.0
+
+    def _rest(self) -> None:
+        self._last_error = math.nan
+        super()._rest()
+
+    def _command(self, period_s: float) -> None:
+        error = self._wanted[0] - self._handles[0].velocity
+        known = period_s > 0.0 and math.isfinite(self._last_error)
+        rate = (error - self._last_error) / period_s if known else 0.0
+        self._last_error = self._error = error
+        self._handles[0].command = self._pids[0].command(error, rate, period_s)

@@ -1,0 +1,366 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes joints follow trajectories, with tolerances, under the parameters of ros_controllers' trajectory controller.
+
+Goals, commands and cancellations arrive from any thread in a mailbox that `update` empties; whatever depends on time is
+decided in `update`, by the time given there. A trajectory is followed by a clock of its own, which slows down and
+stands still with the robot.
+"""
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.hardware_interface.handles import unmeasured
+from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
+from modular_framework_control.hardware_interface.joint_limits import limits_of
+from modular_framework_control.hardware_interface.robot_hw import speed_scaling_handles
+from modular_framework_control.realtime.goal_handle import GoalStatus
+from modular_framework_control.realtime.mailbox import Mailbox
+from modular_framework_control.realtime.rates import next_due, period_of
+from modular_framework_control.trajectory.goal_validation import GoalRules, ValidatedGoal, validate_goal
+from modular_framework_control.trajectory.joint_trajectory import (
+    POSITION,
+    SHORTEST_SEGMENT_S,
+    Array,
+    Track,
+    splice,
+)
+from modular_framework_control.trajectory.motion_limits import MotionLimits, first_segment_violations
+from modular_framework_control.trajectory.point_checks import drop_surplus_values
+from modular_framework_control.trajectory.stop_motion import StopMotion
+from modular_framework_control.trajectory.tolerances import foreign_tolerances, read_tolerances, violations
+from modular_framework_control.trajectory.trajectory_clock import TrajectoryClock
+from modular_framework_control.trajectory.trajectory_goal import (
+    GoalRejectedError,
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectoryGoalHandle,
+    TrajectorySnapshot,
+)
+from modular_framework_control.trajectory.trajectory_plan import TrajectoryPlan
+from modular_framework_ros.node_handle import NodeHandle, read_bool, read_names, read_number
+
+LOGGER = logging.getLogger("rosout.joint_trajectory_controller")
+
+
+class JointTrajectoryController(Controller):
+    """position_controllers/JointTrajectoryController.
+
+    Parameters, below the controller's name: `joints`; `constraints/{goal_time [s] 0.0, stopped_velocity_tolerance
+    [rad/s] 0.01, <joint>/{trajectory, goal} [rad] 0 = not checked}`; `stop_trajectory_duration` [s] 0.0;
+    `state_publish_rate` [1/s] 50; `action_monitor_rate` [1/s] 20; `allow_partial_joints_goal` false.
+
+    A goal beyond the limits of its joints, where they are known, is refused. Whatever ends a motion before its goal
+    (cancel, abort, a trajectory without points) stops it from where the joints are measured, within their limits:
+    with `stop_trajectory_duration` 0 they are held there.
+
+    While the hardware has a fault the joints are held where they are measured, and goals are refused with its reason.
+    When a measured position is not a number the goal is aborted, the joints stop, and goals are refused until it is.
+
+    Attributes:
+        joint_names: the joints, in the order of all arrays.
+        on_state: called in the control loop at `state_publish_rate` with a snapshot; must not block.
+        on_feedback: called in the control loop at `action_monitor_rate` with the active goal handle and a snapshot.
+    """
+
+    interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
+
+    def __init__(self) -> None:
+        self.joint_names: list[str] = []
+        self.on_state: Callable[[TrajectorySnapshot], None] | None = None
+        self.on_feedback: Callable[[TrajectoryGoalHandle, TrajectorySnapshot], None] | None = None
+        self._handles: list[Any] = []
+        self._mailbox: Mailbox[ValidatedGoal | TrajectoryGoalHandle] = Mailbox()
+        self._running = False
+        self._active: ValidatedGoal | None = None
+        self._fault = ""
+        self._unmeasured = ""
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        self._namespace = controller_nh.namespace
+        self.joint_names = read_names(controller_nh, "joints")
+        self._handles = [hw.get_handle(name) for name in self.joint_names]
+        known = limits_of(self._handles, root_nh)
+        self._limits = MotionLimits.of(known)
+        self._rules = GoalRules(tuple(self.joint_names), read_tolerances(controller_nh, self.joint_names), self._limits,
+                                read_bool(controller_nh, "allow_partial_joints_goal", False))
+        self._stop_motion = StopMotion(read_number(controller_nh, "stop_trajectory_duration", 0.0), self._limits)
+        self._state_period_s = period_of(read_number(controller_nh, "state_publish_rate", 50.0))
+        self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
+        self._continuous = np.array([limits.continuous for limits in known])
+        self._any_continuous = bool(self._continuous.any())
+        self._clock = TrajectoryClock(speed_scaling_handles(self.robot_hw, self.joint_names))
+        self._plan = TrajectoryPlan(len(self.joint_names))
+        self._actual = np.zeros((2, len(self.joint_names)))
+        return True
+
+    # ---- any thread ----
+
+    def submit(self, goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None = None) -> None:
+        """Hand a goal (with a goal handle) or a command (without) to the control loop.
+
+        Raises:
+            GoalRejectedError: it is malformed or the controller does not run; the goal handle is not changed. If the
+                controller is stopped meanwhile, the goal handle ends as rejected.
+        """
+        if not self._running:
+            raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
+        warnings = [foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance)]
+        if self._rules.allow_partial:
+            trajectory, surplus = drop_surplus_values(goal.trajectory)
+            goal = replace(goal, trajectory=trajectory)
+            warnings.append(surplus)
+        for warning in filter(None, warnings):
+            LOGGER.warning("%s: %s", self._namespace, warning)
+        here = np.array([handle.position for handle in self._handles])
+        self._mailbox.put(validate_goal(goal, goal_handle, self._rules, here))
+        if not self._running:
+            self._reject_waiting("the controller was stopped")
+
+    def cancel(self, goal_handle: TrajectoryGoalHandle) -> None:
+        """Ask the control loop to stop following the goal of `goal_handle`."""
+        self._mailbox.put(goal_handle)
+
+    def desired_at(self, time_s: float) -> Array:
+        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), if the robot lets itself be
+        moved as fast as now.
+
+        Raises:
+            ControllerError: the controller does not run, or the motion that far back is forgotten.
+        """
+        if not self._running:
+            raise ControllerError("the controller is not running; nothing is desired")
+        asked_s, known_from_s = self._clock.expected_at(time_s), self._plan.known_from_s
+        if known_from_s is not None and asked_s < known_from_s - SHORTEST_SEGMENT_S:
+            raise ControllerError(f"got {time_s:.9g} s, which is before the motion under way began, by "
+                                  f"{known_from_s - asked_s:.6g} s of its trajectory; ask for a later time")
+        return self._clock.slowed(self._plan.sample(asked_s))
+
+    # ---- control loop ----
+
+    def starting(self, time_s: float) -> None:
+        self._reject_waiting("the goal was sent while the controller was being stopped")
+        self._active, self._fault = None, ""
+        self._clock.start(time_s)
+        self._next_state_s = self._next_feedback_s = time_s
+        self._read_actual()
+        self._unmeasured = unmeasured(self._handles)
+        if self._unmeasured:
+            raise ControllerError(self._unmeasured)
+        self._plan.hold(self._actual[POSITION], time_s)
+        self._rest()
+        self._running = True
+
+    def stopping(self, time_s: float) -> None:
+        del time_s
+        self._end_all(GoalStatus.CANCELED, "the controller was stopped")
+
+    def failed(self, time_s: float, reason: str) -> None:
+        del time_s
+        self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._fault = f"hardware fault: {reason}"
+        self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL, self._fault)
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._fault = ""
+        self._clock.advance(time_s)
+        self._read_actual()
+        self._rest()
+
+    def _end_all(self, status: GoalStatus, text: str) -> None:
+        self._running = False
+        self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
+        self._reject_waiting(text)
+        self._read_actual()
+        if self._plan.known_from_s is not None:
+            self._command_rest()
+
+    def _reject_waiting(self, text: str) -> None:
+        for goal in self._mailbox.drain():
+            if isinstance(goal, ValidatedGoal) and goal.goal_handle is not None:
+                goal.goal_handle.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        self._clock.advance(time_s)
+        self._read_actual()
+        self._watch_positions()
+        self._mailbox.process(self._carry_out)
+        if self._fault:
+            self._rest()
+        self._plan.forget_before(self._clock.now_s)
+        desired, error = self._desired_and_error()
+        if self._active is not None and self._check(self._active, self._clock.now_s, error):
+            self._stop()
+            desired, error = self._desired_and_error()
+        if not self._fault:
+            self._command(desired, error, period_s)
+        self._report(time_s, desired, error)
+
+    def _watch_positions(self) -> None:
+        """Stop when a position is no longer a number, and again, from where the joints are, when all are numbers."""
+        missing = "" if np.isfinite(self._actual[POSITION]).all() else unmeasured(self._handles)
+        if bool(missing) != bool(self._unmeasured):
+            self._unmeasured = missing
+            self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL, missing)
+            self._stop()
+
+    def _desired_and_error(self) -> tuple[Array, Array]:
+        """Position, velocity and acceleration desired now, and how far the joints are from the first two."""
+        desired = self._clock.slowed(self._plan.sample(self._clock.now_s))
+        error = desired[:2] - self._actual
+        if self._any_continuous:
+            turned = error[POSITION, self._continuous]
+            error[POSITION, self._continuous] = turned - 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
+        return desired, error
+
+    def _desired_and_measured(self) -> tuple[Array, Array]:
+        """The state desired now, and positions and velocities measured, in the turn in which the joints are commanded;
+        those desired in place of what is not a number."""
+        desired, error = self._desired_and_error()
+        actual = desired[:2] - error
+        return desired, np.where(np.isfinite(actual), actual, desired[:2])
+
+    def _command(self, desired: Array, error: Array, period_s: float) -> None:
+        """Command the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
+        del error, period_s
+        for handle, position in zip(self._handles, desired[POSITION].tolist(), strict=True):
+            handle.command = position
+
+    def _command_rest(self) -> None:
+        """Command what keeps the joints where they are measured; it stays in force while the controller is stopped."""
+        _, actual = self._desired_and_measured()
+        for handle, position in zip(self._handles, actual[POSITION].tolist(), strict=True):
+            handle.hold(position)
+
+    def _read_actual(self) -> None:
+        states = [handle.state for handle in self._handles]
+        self._actual[0] = [state.position for state in states]
+        self._actual[1] = [state.velocity for state in states]
+
+    def _rest(self) -> None:
+        _, actual = self._desired_and_measured()
+        self._plan.hold(actual[POSITION], self._clock.now_s)
+        self._command_rest()
+
+    def _carry_out(self, goal: ValidatedGoal | TrajectoryGoalHandle) -> None:
+        if isinstance(goal, ValidatedGoal):
+            refusal = self._fault or self._unmeasured or self._take_up(goal)
+            if refusal:
+                self._refuse(goal, refusal)
+        elif self._active is not None and self._active.goal_handle is goal:
+            self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
+            self._stop()
+
+    def _take_up(self, goal: ValidatedGoal) -> str:
+        """Begin to follow a goal: it replaces the goal before it, and its motion from the start of the new one on.
+
+        Returns:
+            Why it cannot be followed, or "".
+        """
+        if goal.spline is None:
+            self._replace_active(goal)
+            self._stop()
+            return ""
+        now_s = self._clock.now_s
+        origin_s = self._clock.at(goal.stamp_s) if goal.stamp_s != 0.0 else now_s
+        end_s = origin_s + float(goal.spline.times_s[-1])
+        if end_s <= now_s + SHORTEST_SEGMENT_S:
+            return (f"all {len(goal.spline.times_s)} points lie in the past: the last one was due "
+                    f"{now_s - end_s:.6g} s before the goal was taken up; give a later header stamp or time_from_start")
+        splice_s = max(now_s, origin_s)
+        if end_s <= splice_s + SHORTEST_SEGMENT_S:
+            splice_s = now_s
+        joints = list(goal.joints)
+        track = splice(goal.spline, joints, origin_s, splice_s, self._plan.sample(splice_s)[:, joints],
+                       self._continuous[joints].tolist())
+        refusal = self._beyond_limits(goal, track, splice_s - origin_s)
+        if refusal:
+            return refusal
+        self._warn_of_late_points(goal, splice_s - origin_s)
+        self._replace_active(goal)
+        self._plan.follow([track], splice_s)
+        return ""
+
+    def _beyond_limits(self, goal: ValidatedGoal, track: Track, late_s: float) -> str:
+        """What a goal, joined to the motion so far, asks beyond the limits of its joints; "" for nothing."""
+        if goal.spline is None or goal.violations is None:
+            return ""
+        first = int(np.searchsorted(goal.spline.times_s, late_s, side="right"))
+        joints = list(goal.joints)
+        return goal.violations.text(first, first + 1) or first_segment_violations(
+            track, [self.joint_names[joint] for joint in joints], self._limits.of_joints(joints),
+            self._actual[POSITION, joints], first)
+
+    def _warn_of_late_points(self, goal: ValidatedGoal, late_s: float) -> None:
+        times_s = goal.spline.times_s if goal.spline is not None else np.zeros(0)
+        late = int(np.searchsorted(times_s, late_s, side="right"))
+        if late > 1 or (late == 1 and late_s > 0.0):
+            LOGGER.warning("%s: the first %d of %d points are left out, they lie in the past; the next one is due in "
+                           "%.3f s", self._namespace, late, len(times_s), times_s[late] - late_s)
+
+    def _refuse(self, goal: ValidatedGoal, reason: str) -> None:
+        if goal.goal_handle is None:
+            LOGGER.warning("%s/command ignored: %s", self._namespace, reason)
+        else:
+            goal.goal_handle.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, reason)
+
+    def _replace_active(self, goal: ValidatedGoal) -> None:
+        self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "preempted by a new goal")
+        if goal.goal_handle is not None:
+            self._active = goal
+            goal.goal_handle.activate()
+
+    def _stop(self) -> None:
+        """Come to rest from where the joints are measured."""
+        desired, actual = self._desired_and_measured()
+        self._plan.follow(self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate),
+                          self._clock.now_s)
+        for handle in self._handles:
+            handle.held = self._stop_motion.holds(self._clock.rate)
+
+    def _check(self, goal: ValidatedGoal, now_s: float, error: Array) -> bool:
+        """End a goal that is reached or whose tolerances are violated; returns whether the motion is to stop."""
+        tolerances, late_s = goal.tolerances, now_s - self._plan.end_s
+        if late_s < 0.0:
+            outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""
+            if outside:
+                self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
+                             f"path tolerance violated: {outside}")
+            return bool(outside)
+        outside = violations(error, tolerances.goal, self.joint_names)
+        if not outside:
+            self._finish(GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL, "goal reached")
+        elif late_s >= tolerances.goal_time_s:
+            self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
+                         f"goal tolerance violated {late_s:.6g} s after the end of the trajectory (goal_time "
+                         f"{tolerances.goal_time_s:.6g} s): {outside}")
+            return True
+        return False
+
+    def _finish(self, status: GoalStatus, code: TrajectoryErrorCode, text: str) -> None:
+        goal, self._active = self._active, None
+        if goal is not None and goal.goal_handle is not None:
+            goal.goal_handle.finish(status, code, text)
+
+    def _report(self, time_s: float, desired: Array, error: Array) -> None:
+        state_due = self.on_state is not None and time_s >= self._next_state_s
+        feedback_due = self._active is not None and self.on_feedback is not None and time_s >= self._next_feedback_s
+        if not state_due and not feedback_due:
+            return
+        elapsed_s = self._plan.elapsed_s(self._clock.now_s)
+        snapshot = TrajectorySnapshot(time_s, desired, self._actual.copy(), error, elapsed_s)
+        if state_due and self.on_state is not None:
+            self._next_state_s = next_due(self._next_state_s, self._state_period_s, time_s)
+            self.on_state(snapshot)
+        goal_handle = self._active.goal_handle if self._active is not None else None
+        if feedback_due and self.on_feedback is not None and goal_handle is not None:
+            self._next_feedback_s = next_due(self._next_feedback_s, self._monitor_period_s, time_s)
+            self.on_feedback(goal_handle, snapshot)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that command nothing: they report what force-torque sensors and inertial units measure, and how fast a
+robot lets itself be moved."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from modular_framework_control.controller_interface.controller import Controller
+from modular_framework_control.hardware_interface.interfaces import (
+    ForceTorqueSensorInterface,
+    ImuSensorInterface,
+    SpeedScalingInterface,
+)
+from modular_framework_control.realtime.rates import first_due, next_due, period_of
+from modular_framework_ros.node_handle import NodeHandle, read_number
+
+
+class SensorController(Controller):
+    """Base: every sensor of one kind is reported at a fixed rate.
+
+    Parameters, below the controller's name: `publish_rate` [1/s] 50; with 0 nothing is published.
+
+    Attributes:
+        sensor_names: the sensors, in the order of the hardware.
+        on_reading: called in the control loop with the time [s] and one sensor's handle; must copy what it needs and
+            not block.
+    """
+
+    def __init__(self) -> None:
+        self.sensor_names: list[str] = []
+        self.on_reading: Callable[[float, Any], None] | None = None
+        self._handles: list[Any] = []
+        self._next_s = -math.inf
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        self._period_s = period_of(read_number(controller_nh, "publish_rate", 50.0))
+        self.sensor_names = list(hw.names)
+        self._handles = [hw.get_handle(name) for name in self.sensor_names]
+        return True
+
+    def starting(self, time_s: float) -> None:
+        self._next_s = first_due(self._period_s, time_s)
+
+    def update(self, time_s: float, period_s: float) -> None:
+        if time_s < self._next_s or self.on_reading is None:
+            return
+        self._next_s = next_due(self._next_s, self._period_s, time_s)
+        for handle in self._handles:
+            self.on_reading(time_s, handle)
+
+
+class ForceTorqueSensorController(SensorController):
+    """force_torque_sensor_controller/ForceTorqueSensorController."""
+
+    interface_class = ForceTorqueSensorInterface
+
+
+class ImuSensorController(SensorController):
+    """imu_sensor_controller/ImuSensorController."""
+
+    interface_class = ImuSensorInterface
+
+
+class SpeedScalingStateController(SensorController):
+    """scaled_controllers/SpeedScalingStateController."""
+
+    interface_class = SpeedScalingInterface

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a robot offers to controllers: handles, interfaces, limits, transmissions, and the hardware itself."""

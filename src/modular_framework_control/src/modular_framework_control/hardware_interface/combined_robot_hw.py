@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Several pieces of hardware that controllers see as one robot: an arm and its gripper, two arms, ..."""
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_control.hardware_interface.interfaces import (
+    ControllerInfo,
+    HardwareInterface,
+    HardwareInterfaceError,
+    InterfaceResources,
+)
+from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginError, PluginIndex
+from modular_framework_control.hardware_interface.robot_hw import HardwareFault, RobotHW, SwitchState
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+
+LOGGER = logging.getLogger("rosout.combined_robot_hw")
+
+
+@dataclass(frozen=True, slots=True)
+class HardwarePart:
+    """One entry of `robot_hardware`.
+
+    Attributes:
+        name: its name in the list, which is also the namespace of its parameters.
+        hardware: what was made of its `type`.
+        resources: its joints by the type name of the interface.
+    """
+
+    name: str
+    hardware: RobotHW
+    resources: dict[str, frozenset[str]]
+
+    def concerned(self, controllers: Iterable[ControllerInfo]) -> list[ControllerInfo]:
+        """The controllers that claim something of this hardware, with those claims only."""
+        kept: list[ControllerInfo] = []
+        for controller in controllers:
+            claims = [InterfaceResources(claim.hardware_interface, tuple(
+                          name for name in claim.resources if name in self.resources.get(claim.hardware_interface, ())))
+                      for claim in controller.claimed_resources]
+            mine = tuple(claim for claim in claims if claim.resources)
+            if mine:
+                kept.append(ControllerInfo(controller.name, controller.type, mine))
+        return kept
+
+
+class CombinedRobotHW(RobotHW):
+    """The hardware of a list, as one.
+
+    Parameters, in the namespace given to `init`: `robot_hardware`, a list of names; for each name a namespace with
+    `type` (package/Class, see plugins.py) and whatever that hardware reads.
+
+    The interfaces of all parts are combined class by class. A joint may be in different interfaces of different parts;
+    two parts may not command it through the same interface. When two parts measure it, the later one in the list is
+    the one whose state is seen, and a warning says so. Each part decides about the claims on its own joints only; of a
+    joint that several parts command, one controller may claim one interface.
+
+    Args:
+        make: makes hardware of a type name; looks among the plugins of the workspace when not given.
+    """
+
+    def __init__(self, make: Callable[[str], RobotHW] | None = None) -> None:
+        super().__init__()
+        self._make = make if make is not None else robot_hw_of_type
+        self._parts: list[HardwarePart] = []
+        self._raised: dict[tuple[str, str], str] = {}
+
+    @property
+    def parts(self) -> tuple[HardwarePart, ...]:
+        """The hardware in the order of the list."""
+        return tuple(self._parts)
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        try:
+            names = read_hardware_list(robot_hw_nh)
+            for name in names:
+                self._parts.append(self._make_part(name, root_nh, robot_hw_nh.child(name)))
+            self._combine_interfaces()
+        except (ParameterError, HardwareInterfaceError) as error:
+            LOGGER.error("%s", error)
+            self.close()
+            return False
+        return True
+
+    def close(self) -> None:
+        for part in reversed(self._parts):
+            try:
+                part.hardware.close()
+            except Exception as error:  # a user's hardware may raise anything; the others must be closed all the same
+                LOGGER.exception("hardware '%s': close() raised %s: %s", part.name, type(error).__name__, error)
+
+    def fault(self) -> str:
+        return "; ".join(fault.reason for fault in self.faults())
+
+    def faults(self) -> Sequence[HardwareFault]:
+        if self._raised:
+            return [*self._raised_faults(), *self._reported_faults()]
+        return self._reported_faults()
+
+    def _raised_faults(self) -> Iterator[HardwareFault]:
+        for part in self._parts:
+            for what in ("read", "write"):
+                if (part.name, what) in self._raised:
+                    yield HardwareFault(f"hardware '{part.name}': {self._raised[part.name, what]}",
+                                        part.hardware.commanded_joints)
+
+    def _reported_faults(self) -> list[HardwareFault]:
+        return [HardwareFault(f"hardware '{part.name}': {fault.reason}", fault.joints)
+                for part in self._parts for fault in part.hardware.faults()]
+
+    def _make_part(self, name: str, root_nh: NodeHandle, part_nh: NodeHandle) -> HardwarePart:
+        where = f"entry '{name}' of robot_hardware"
+        type_name = part_nh.get_param("type")
+        if not isinstance(type_name, str) or not type_name:
+            raise ParameterError(f"{where}: parameter {join_names(part_nh.namespace, 'type')} is {type_name!r}; "
+                                 "expected the name of a hardware class, package/Class")
+        try:
+            hardware = self._make(type_name)
+            initialised = hardware.init(root_nh, part_nh)
+        except PluginError as error:
+            raise ParameterError(f"{where}: type '{type_name}': {error}") from error
+        except Exception as error:  # a user's hardware may raise anything
+            raise ParameterError(f"{where}: type '{type_name}' raised {type(error).__name__}: {error}") from error
+        if initialised is not True:
+            raise ParameterError(f"{where}: type '{type_name}' did not initialise; its own message above says why")
+        resources = {interface.type_name: frozenset(interface.names) for interface in hardware.interfaces}
+        return HardwarePart(name, hardware, resources)
+
+    def _combine_interfaces(self) -> None:
+        offered: dict[type[HardwareInterface[Any]], list[tuple[HardwarePart, HardwareInterface[Any]]]] = {}
+        for part in self._parts:
+            for interface in part.hardware.interfaces:
+                offered.setdefault(type(interface), []).append((part, interface))
+        for interface_class, offers in offered.items():
+            if len(offers) == 1:
+                self.register_interface(offers[0][1])
+            else:
+                self.register_interface(_combined(interface_class, offers))
+
+    def read(self, time_s: float, period_s: float) -> None:
+        for part in self._parts:
+            self._cycle(part, "read", part.hardware.read, time_s, period_s)
+
+    def write(self, time_s: float, period_s: float) -> None:
+        for part in self._parts:
+            self._cycle(part, "write", part.hardware.write, time_s, period_s)
+
+    def _cycle(self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float,
+               period_s: float) -> None:
+        """Read or write one part; that it raised is a fault of this part until the same step succeeds again."""
+        try:
+            step(time_s, period_s)
+        except Exception as error:  # a user's hardware may raise anything; the others must go on
+            self._raised[part.name, what] = f"{what}() raised {type(error).__name__}: {error}"
+        else:
+            if self._raised:
+                self._raised.pop((part.name, what), None)
+
+    def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
+        everything = list(controllers)
+        answers = ((part.name, part.hardware.check_for_conflict(part.concerned(everything))) for part in self._parts)
+        within = "; ".join(f"{name}: {answer}" for name, answer in answers if answer)
+        return within or super().check_for_conflict(self._claims_on_shared_joints(everything))
+
+    def _claims_on_shared_joints(self, controllers: Iterable[ControllerInfo]) -> Iterator[ControllerInfo]:
+        """The controllers with their claims on joints that several parts command, which no part sees as a whole."""
+        commanded = Counter(name for part in self._parts for name in part.hardware.commanded_joints)
+        for controller in controllers:
+            yield ControllerInfo(controller.name, controller.type, tuple(
+                InterfaceResources(claim.hardware_interface, tuple(n for n in claim.resources if commanded[n] > 1))
+                for claim in controller.claimed_resources))
+
+    def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
+        for part, mine in self._concerned_by(start, stop):
+            if part.hardware.prepare_switch(*mine) is not True:
+                LOGGER.error("hardware '%s' refused to prepare a switch (start: %s; stop: %s)", part.name,
+                             *(", ".join(controller.name for controller in side) or "none" for side in mine))
+                return False
+        return True
+
+    def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
+        for part, mine in self._concerned_by(start, stop):
+            part.hardware.do_switch(*mine)
+
+    def _concerned_by(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]
+                      ) -> Iterator[tuple[HardwarePart, tuple[list[ControllerInfo], list[ControllerInfo]]]]:
+        for part in self._parts:
+            mine = part.concerned(start), part.concerned(stop)
+            if any(mine):
+                yield part, mine
+
+    def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
+        results: set[SwitchState] = set()
+        for part in self._parts:
+            if controller is None:
+                results.add(part.hardware.switch_result())
+            else:
+                results.update(part.hardware.switch_result(mine) for mine in part.concerned([controller]))
+        for state in (SwitchState.ERROR, SwitchState.ONGOING):
+            if state in results:
+                return state
+        return SwitchState.DONE
+
+
+def _combined(interface_class: type[HardwareInterface[Any]],
+              offers: Sequence[tuple[HardwarePart, HardwareInterface[Any]]]) -> HardwareInterface[Any]:
+    """One interface with the handles of several parts."""
+    handles: dict[str, Any] = {}
+    owners: dict[str, str] = {}
+    for part, interface in offers:
+        for handle in interface.handles:
+            if handle.name in owners:
+                both = (f"{interface_class.type_name}: joint '{handle.name}' is in hardware '{owners[handle.name]}' "
+                        f"and in '{part.name}'")
+                if interface_class.claims_resources:
+                    raise HardwareInterfaceError(f"robot_hardware: {both}; only one of them may command it")
+                LOGGER.warning("%s; the latter is used", both)
+            owners[handle.name] = part.name
+            handles[handle.name] = handle
+    combined = interface_class()
+    for handle in handles.values():
+        combined.register_handle(handle)
+    return combined
+
+
+def read_hardware_list(robot_hw_nh: NodeHandle) -> list[str]:
+    """The names of `robot_hardware`.
+
+    Raises:
+        ParameterError: not set, or not a list of distinct names.
+    """
+    names = robot_hw_nh.get_param("robot_hardware")
+    where = join_names(robot_hw_nh.namespace, "robot_hardware")
+    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(name, str) and name for name in names):
+        raise ParameterError(f"parameter {where}: got {names!r}; expected a list of names of hardware")
+    if len(set(names)) != len(names):
+        raise ParameterError(f"parameter {where}: got {names!r}; each hardware may be named once")
+    return list(names)
+
+
+def robot_hw_of_type(type_name: str, index: PluginIndex | None = None) -> RobotHW:
+    """New hardware of a class that a package offers, not yet initialised.
+
+    Raises:
+        PluginError: no such class, or it cannot be loaded; says what is known.
+    """
+    hardware: RobotHW = (index or PluginIndex(ROBOT_HW_BASE)).load(type_name, RobotHW)()
+    return hardware

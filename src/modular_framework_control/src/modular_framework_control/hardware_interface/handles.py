@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Handles: plain objects through which hardware and controllers see the same joint, sensor or speed.
+
+The `RobotHW` makes one handle per thing and keeps it; reading and writing it is reading and writing attributes.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits
+
+Vector = tuple[float, float, float]
+
+
+class JointStateHandle:
+    """Measured state of one joint; the `RobotHW` writes it in `read()`, everybody else reads it.
+
+    Attributes:
+        name: joint name as in the robot description.
+        position: [rad] or [m].
+        velocity: [rad/s] or [m/s].
+        effort: [Nm] or [N].
+    """
+
+    __slots__ = ("name", "position", "velocity", "effort")
+
+    def __init__(self, name: str, position: float = 0.0, velocity: float = 0.0, effort: float = 0.0) -> None:
+        self.name = name
+        self.position = position
+        self.velocity = velocity
+        self.effort = effort
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, position={self.position:.6g})"
+
+
+class JointHandle:
+    """A joint that can be commanded: the measured state seen through `state`, and one command beside it.
+
+    Attributes:
+        state: the handle registered with the JointStateInterface (shared, not copied).
+        command: in the unit of the interface: position [rad|m], velocity [rad/s|m/s] or effort [Nm|N].
+        max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
+            Only hardware that says so (`supports_max_effort`) heeds it.
+        supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
+        limits: what the hardware keeps the joint within, set by what enforces limits. None: the hardware enforces none.
+        held: set by `hold`; what enforces limits goes on from that command, and clears it.
+    """
+
+    __slots__ = ("state", "command", "max_effort", "supports_max_effort", "limits", "held")
+
+    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
+        self.state = state
+        self.command = command
+        self.max_effort = 0.0
+        self.supports_max_effort = supports_max_effort
+        self.limits: JointLimits | None = None
+        self.held = False
+
+    @property
+    def name(self) -> str:
+        return self.state.name
+
+    @property
+    def position(self) -> float:
+        return self.state.position
+
+    @property
+    def velocity(self) -> float:
+        return self.state.velocity
+
+    @property
+    def effort(self) -> float:
+        return self.state.effort
+
+    def hold(self, position: float) -> None:
+        """Command a joint that takes positions to stay where it stands, whatever it was commanded before; where that is
+        not a number the last command stays.
+
+        Args:
+            position: where that is [rad|m]: as measured; for a joint that turns without end, in the turn in which it is
+                commanded.
+        """
+        if math.isfinite(position):
+            self.command = position
+            self.held = True
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, command={self.command:.6g})"
+
+
+def unmeasured(handles: Iterable[JointHandle]) -> str:
+    """Which joints have a measured position that is not a finite number; "" when none has."""
+    faults = [f"joint '{handle.name}' is measured at {handle.position}" for handle in handles
+              if not math.isfinite(handle.position)]
+    return f"{', '.join(faults)}; expected a position: see why the hardware reads none" if faults else ""
+
+
+class PosVelJointHandle(JointHandle):
+    """A joint that takes a position with the velocity there.
+
+    Attributes:
+        command_velocity: [rad/s|m/s], beside the position in `command`.
+    """
+
+    __slots__ = ("command_velocity",)
+
+    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
+        super().__init__(state, command, supports_max_effort)
+        self.command_velocity = 0.0
+
+
+class PosVelAccJointHandle(PosVelJointHandle):
+    """A joint that takes a position with the velocity and the acceleration there.
+
+    Attributes:
+        command_acceleration: [rad/s^2|m/s^2].
+    """
+
+    __slots__ = ("command_acceleration",)
+
+    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
+        super().__init__(state, command, supports_max_effort)
+        self.command_acceleration = 0.0
+
+
+class ActuatorHandle:
+    """One actuator, beyond the transmission that moves a joint; see `RobotTransmissions`.
+
+    Attributes:
+        name: as in the <transmission> of the robot description.
+        position: measured [rad] or [m]; the `RobotHW` writes it in `read()`, as velocity and effort.
+        velocity: measured [rad/s] or [m/s].
+        effort: measured [Nm] or [N].
+        command_position: what the joints' position commands make of it [rad] or [m]; NaN while there is none.
+        command_velocity: likewise of velocity commands [rad/s] or [m/s].
+        command_effort: likewise of effort commands [Nm] or [N].
+    """
+
+    __slots__ = ("name", "position", "velocity", "effort", "command_position", "command_velocity", "command_effort")
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.position = self.velocity = self.effort = 0.0
+        self.command_position = self.command_velocity = self.command_effort = math.nan
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, position={self.position:.6g})"
+
+
+class SpeedScalingHandle:
+    """How fast a robot lets itself be moved just now: its speed slider, 0 while it is paused or stopped.
+
+    Attributes:
+        name: of the handle, "speed_scaling_factor" for one robot.
+        joints: the joints it is about.
+        factor: share of the planned speed, 0 to 1; the `RobotHW` writes it in `read()`.
+    """
+
+    __slots__ = ("name", "joints", "factor")
+
+    def __init__(self, name: str, joints: Sequence[str], factor: float = 1.0) -> None:
+        self.name = name
+        self.joints = tuple(joints)
+        self.factor = factor
+
+
+class ForceTorqueSensorHandle:
+    """What a force-torque sensor measures.
+
+    Attributes:
+        name: of the sensor; it is also the name of its topic.
+        frame_id: frame in which force and torque are given.
+        force: x, y, z [N]; the `RobotHW` replaces it as a whole in `read()`.
+        torque: x, y, z [Nm]; likewise.
+    """
+
+    __slots__ = ("name", "frame_id", "force", "torque")
+
+    def __init__(self, name: str, frame_id: str) -> None:
+        self.name = name
+        self.frame_id = frame_id
+        self.force: Vector = (0.0, 0.0, 0.0)
+        self.torque: Vector = (0.0, 0.0, 0.0)
+
+
+class ImuSensorHandle:
+    """What an inertial measurement unit measures.
+
+    Attributes:
+        name: of the sensor; it is also the name of its topic.
+        frame_id: frame in which everything is given.
+        orientation: quaternion xyzw.
+        angular_velocity: x, y, z [rad/s].
+        linear_acceleration: x, y, z [m/s^2].
+        orientation_covariance, angular_velocity_covariance, linear_acceleration_covariance: 9 numbers, row by row; all
+            0 when they are not known, the first -1 when the quantity is not measured.
+    """
+
+    __slots__ = ("name", "frame_id", "orientation", "angular_velocity", "linear_acceleration",
+                 "orientation_covariance", "angular_velocity_covariance", "linear_acceleration_covariance")
+
+    def __init__(self, name: str, frame_id: str) -> None:
+        self.name = name
+        self.frame_id = frame_id
+        self.orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+        self.angular_velocity: Vector = (0.0, 0.0, 0.0)
+        self.linear_acceleration: Vector = (0.0, 0.0, 0.0)
+        self.orientation_covariance = self.angular_velocity_covariance = self.linear_acceleration_covariance = \
+            (0.0,) * 9

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The interfaces that hand out handles: what a controller may see and command of a robot.
+
+The words are those of ros_control. A `RobotHW` makes one handle per joint and keeps it; controllers ask an interface
+for the handle by name, once, and afterwards read and write plain attributes. Interfaces that command a joint note who
+asked (a *claim*), so that two controllers never command the same joint through interfaces that exclude each other.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Generic, Protocol, TypeVar
+
+from modular_framework_control.hardware_interface.handles import (
+    ForceTorqueSensorHandle,
+    ImuSensorHandle,
+    JointHandle,
+    JointStateHandle,
+    PosVelAccJointHandle,
+    PosVelJointHandle,
+    SpeedScalingHandle,
+)
+
+
+class HardwareInterfaceError(Exception):
+    """A resource of the hardware was asked for that it does not have, or was registered twice."""
+
+
+class _Named(Protocol):
+    """What every handle has."""
+
+    @property
+    def name(self) -> str:
+        """Name under which it is found."""
+
+
+HandleT = TypeVar("HandleT", bound=_Named)
+
+
+class HardwareInterface(Generic[HandleT]):
+    """A set of handles of one kind, found by joint name.
+
+    Attributes:
+        type_name: the name written in URDF transmissions and in `ControllerState.claimed_resources`.
+        claims_resources: whether getting a handle claims its joint.
+        noun: what a handle is of, in messages.
+    """
+
+    type_name: ClassVar[str] = "hardware_interface/HardwareInterface"
+    claims_resources: ClassVar[bool] = False
+    noun: ClassVar[str] = "joint"
+
+    def __init__(self) -> None:
+        self._handles: dict[str, HandleT] = {}
+        self._claims: dict[str, None] = {}
+
+    def register_handle(self, handle: HandleT) -> HandleT:
+        """Add a handle; returns it for chaining.
+
+        Raises:
+            HardwareInterfaceError: a handle of that name is already registered.
+        """
+        if handle.name in self._handles:
+            raise HardwareInterfaceError(f"{self.type_name}: {self.noun} '{handle.name}' is registered twice; "
+                                         f"register each {self.noun} once per interface")
+        self._handles[handle.name] = handle
+        return handle
+
+    def get_handle(self, name: str) -> HandleT:
+        """The handle of joint `name`; claims the joint if this interface claims.
+
+        Raises:
+            HardwareInterfaceError: no such joint; the message lists those there are.
+        """
+        try:
+            handle = self._handles[name]
+        except KeyError:
+            known = ", ".join(sorted(self._handles)) or "none"
+            raise HardwareInterfaceError(f"{self.type_name}: no {self.noun} '{name}'; it has: {known}") from None
+        if self.claims_resources:
+            self._claims[name] = None
+        return handle
+
+    @property
+    def names(self) -> list[str]:
+        """Joint names in the order of registration."""
+        return list(self._handles)
+
+    @property
+    def handles(self) -> list[HandleT]:
+        """All handles in the order of registration; reading them claims nothing (for the RobotHW itself)."""
+        return list(self._handles.values())
+
+    def take_claims(self) -> tuple[str, ...]:
+        """Joints claimed since the last call, in the order they were asked for; forgets them."""
+        claims = tuple(self._claims)
+        self._claims.clear()
+        return claims
+
+
+class JointStateInterface(HardwareInterface[JointStateHandle]):
+    """Read access to joint states; any number of controllers may share it."""
+
+    type_name = "hardware_interface/JointStateInterface"
+
+
+class _JointCommandInterface(HardwareInterface[JointHandle]):
+    """Handles with a command; a joint belongs to one running controller at a time.
+
+    Attributes:
+        handle_class: class of its handles.
+    """
+
+    claims_resources = True
+    handle_class: ClassVar[type[JointHandle]] = JointHandle
+
+
+class PositionJointInterface(_JointCommandInterface):
+    """Joints commanded by position [rad|m]."""
+
+    type_name = "hardware_interface/PositionJointInterface"
+
+
+class VelocityJointInterface(_JointCommandInterface):
+    """Joints commanded by velocity [rad/s|m/s]."""
+
+    type_name = "hardware_interface/VelocityJointInterface"
+
+
+class EffortJointInterface(_JointCommandInterface):
+    """Joints commanded by effort [Nm|N]."""
+
+    type_name = "hardware_interface/EffortJointInterface"
+
+
+class PosVelJointInterface(_JointCommandInterface):
+    """Joints commanded by position [rad|m] and velocity [rad/s|m/s]."""
+
+    type_name = "hardware_interface/PosVelJointInterface"
+    handle_class = PosVelJointHandle
+
+
+class PosVelAccJointInterface(_JointCommandInterface):
+    """Joints commanded by position [rad|m], velocity [rad/s|m/s] and acceleration [rad/s^2|m/s^2]."""
+
+    type_name = "hardware_interface/PosVelAccJointInterface"
+    handle_class = PosVelAccJointHandle
+
+
+class SpeedScalingInterface(HardwareInterface[SpeedScalingHandle]):
+    """How fast robots let themselves be moved; read by controllers that slow their clocks accordingly."""
+
+    type_name = "scaled_controllers/SpeedScalingInterface"
+    noun = "speed scaling"
+
+
+class ForceTorqueSensorInterface(HardwareInterface[ForceTorqueSensorHandle]):
+    """Force-torque sensors."""
+
+    type_name = "hardware_interface/ForceTorqueSensorInterface"
+    noun = "sensor"
+
+
+class ImuSensorInterface(HardwareInterface[ImuSensorHandle]):
+    """Inertial measurement units."""
+
+    type_name = "hardware_interface/ImuSensorInterface"
+    noun = "sensor"
+
+
+CommandInterface = (PositionJointInterface | VelocityJointInterface | EffortJointInterface | PosVelJointInterface
+                    | PosVelAccJointInterface)
+AnyInterface = JointStateInterface | CommandInterface
+
+COMMAND_INTERFACES: tuple[type[CommandInterface], ...] = (
+    PositionJointInterface, VelocityJointInterface, EffortJointInterface, PosVelJointInterface, PosVelAccJointInterface)
+INTERFACES_BY_NAME: dict[str, type[AnyInterface]] = {
+    interface.type_name: interface for interface in (JointStateInterface, *COMMAND_INTERFACES)}
+
+
+def interface_from_name(type_name: str) -> type[AnyInterface]:
+    """The interface class for a name as written in a URDF transmission, with or without the package part.
+
+    Raises:
+        HardwareInterfaceError: unknown name; the message lists the known ones.
+    """
+    full_name = type_name if "/" in type_name else f"hardware_interface/{type_name}"
+    if full_name not in INTERFACES_BY_NAME:
+        known = ", ".join(sorted(INTERFACES_BY_NAME))
+        raise HardwareInterfaceError(f"unknown hardware interface '{type_name}'; known: {known}")
+    return INTERFACES_BY_NAME[full_name]
+
+
+@dataclass(frozen=True, slots=True)
+class InterfaceResources:
+    """The joints a controller claims of one interface, in the order in which it asked for them."""
+
+    hardware_interface: str
+    resources: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerInfo:
+    """What the hardware is told of a controller when it is asked about a switch."""
+
+    name: str
+    type: str
+    claimed_resources: tuple[InterfaceResources, ...]
+
+
+__all__ = [
+    "COMMAND_INTERFACES", "INTERFACES_BY_NAME", "AnyInterface", "CommandInterface", "ControllerInfo",
+    "EffortJointInterface", "ForceTorqueSensorHandle", "ForceTorqueSensorInterface", "HandleT", "HardwareInterface",
+    "HardwareInterfaceError", "ImuSensorHandle", "ImuSensorInterface", "InterfaceResources", "JointHandle",
+    "JointStateHandle", "JointStateInterface", "PosVelAccJointHandle", "PosVelAccJointInterface", "PosVelJointHandle",
+    "PosVelJointInterface", "PositionJointInterface", "SpeedScalingHandle", "SpeedScalingInterface",
+    "VelocityJointInterface", "interface_from_name",
+]

@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps joint commands within the limits of the robot, whatever a controller asks for.
+
+A hardware does so first thing in `write`: with one object per command handle (`limit_handle`), or for all its handles
+at once (`JointLimitGuard`). The rules for positions, velocities and efforts, with and without soft limits, are those of
+ros_control's joint_limits_interface.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
+
+from modular_framework_control.hardware_interface.interfaces import (
+    EffortJointInterface,
+    HardwareInterface,
+    JointHandle,
+    PosVelAccJointInterface,
+    PosVelJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.hardware_interface.joint_limit_parameters import (
+    JointLimits,
+    SoftJointLimits,
+    limits_from_urdf,
+    limits_with_parameters,
+    soft_limits_from_urdf,
+    soft_limits_with_parameters,
+)
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle
+
+
+class JointLimiter(Protocol):
+    """What keeps the command of one handle within limits."""
+
+    handle: Any
+
+    def reset(self) -> None:
+        """Forget the last command, after the joint was moved by other means."""
+
+    def enforce_limits(self, period_s: float) -> None:
+        """Replace the command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+
+
+class PositionJointSaturation:
+    """Saturates position commands: inside the range, and no faster than the velocity limit from one cycle to the next.
+
+    With soft limits the speed towards an end of the soft range is besides at most `k_position` times the way left.
+    It looks at commands, not at measured positions, which lag behind them; only a joint that is held
+    (`JointHandle.hold`) gets that command at once, as it is where the joint stands. One that stands outside its range
+    comes back no faster than the velocity limit.
+
+    Args:
+        handle: the joint.
+        limits: its limits.
+        soft: its soft limits, if any.
+    """
+
+    __slots__ = ("handle", "limits", "soft", "_last_command")
+
+    def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
+        self.handle = handle
+        self.limits = limits
+        self.soft = soft
+        self._last_command = math.nan
+
+    def reset(self) -> None:
+        """Forget the last command, after the joint was moved by other means."""
+        self._last_command = math.nan
+
+    def enforce_limits(self, period_s: float) -> None:
+        """Replace `handle.command` by the nearest allowed one; a command that is not a number keeps the last one.
+
+        Args:
+            period_s: time since the last call [s].
+        """
+        limits, handle, last = self.limits, self.handle, self._last_command
+        command = handle.command
+        if handle.held:
+            handle.held = False
+            if command == command:
+                last = command
+        if last != last:
+            last = handle.position
+        if command != command:
+            command = last
+        if period_s <= 0.0:
+            lowest = highest = last
+        elif self.soft is None:
+            reach = limits.max_velocity * period_s
+            lowest, highest = last - reach, last + reach
+        else:
+            slowest, fastest = soft_velocities(last, limits, self.soft)
+            lowest, highest = last + slowest * period_s, last + fastest * period_s
+        if command > limits.max_position:
+            command = limits.max_position
+        elif command < limits.min_position:
+            command = limits.min_position
+        if command > highest:
+            command = highest
+        elif command < lowest:
+            command = lowest
+        self._last_command = command
+        handle.command = command
+
+
+class PosVelJointSaturation(PositionJointSaturation):
+    """Saturates positions as above, and the velocities (and accelerations) commanded with them to their largest."""
+
+    __slots__ = ()
+
+    def enforce_limits(self, period_s: float) -> None:
+        super().enforce_limits(period_s)
+        handle: Any = self.handle
+        handle.command_velocity = _clamped(handle.command_velocity, self.limits.max_velocity)
+        if hasattr(handle, "command_acceleration"):
+            handle.command_acceleration = _clamped(handle.command_acceleration, self.limits.max_acceleration)
+
+
+class _Saturation:
+    """What bounds the velocities or efforts of one joint, and remembers what it was asked for and what it gave.
+
+    A controller that stops commands 0 once. What was given in its place was not asked for by any controller, so the 0
+    stays in force until a controller commands something else. A position that was given is different: it is where the
+    joint is to stay.
+    """
+
+    __slots__ = ("handle", "limits", "soft", "_wanted", "_given")
+
+    def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
+        self.handle = handle
+        self.limits = limits
+        self.soft = soft
+        self._wanted = 0.0
+        self._given: float | None = None
+
+    def reset(self) -> None:
+        """Forget what was given, after the joint was moved by other means; what is asked for stays."""
+        self.handle.command = self._asked()
+        self._given = None
+
+    def _asked(self) -> float:
+        """What was commanded last by anybody else; 0 when that is not a number."""
+        command = self.handle.command
+        if command is not self._given:
+            self._wanted = command if command == command else 0.0
+        return self._wanted
+
+    def _give(self, command: float) -> None:
+        self._given = self.handle.command = command + 0.0   # a sum is an object of its own, as no command of others is
+
+
+class VelocityJointSaturation(_Saturation):
+    """Saturates velocity commands: largest velocity, largest change from one command to the next, the first one from
+    the measured velocity; only the way back at an end of the range, whatever change that takes. With soft limits at
+    most `k_position` times the way left. Not a number becomes 0.
+
+    Args:
+        handle: the joint.
+        limits: its limits.
+        soft: its soft limits, if any.
+    """
+
+    __slots__ = ()
+
+    def enforce_limits(self, period_s: float) -> None:
+        """Replace `handle.command` by the nearest allowed one."""
+        limits, state = self.limits, self.handle.state
+        command, position = self._asked(), state.position
+        if self.soft is None:
+            lowest, highest = -limits.max_velocity, limits.max_velocity
+        else:
+            lowest, highest = soft_velocities(position, limits, self.soft)
+        if limits.max_acceleration < math.inf:
+            change = limits.max_acceleration * max(0.0, period_s)
+            last = state.velocity if self._given is None else self._given
+            lowest, highest = max(lowest, last - change), min(highest, last + change)
+        command = max(lowest, min(highest, command))
+        if position >= limits.max_position:
+            command = min(command, 0.0)
+        if position <= limits.min_position:
+            command = max(command, 0.0)
+        self._give(command)
+
+
+class EffortJointSaturation(_Saturation):
+    """Saturates effort commands: largest effort; none that drives a joint further out of its range or beyond its
+    largest velocity. With soft limits at most `k_velocity` times what is left to the velocity that is allowed there.
+    Not a number becomes 0.
+
+    Args:
+        handle: the joint.
+        limits: its limits.
+        soft: its soft limits, if any.
+    """
+
+    __slots__ = ()
+
+    def enforce_limits(self, period_s: float) -> None:
+        """Replace `handle.command` by the nearest allowed one."""
+        del period_s
+        limits, state = self.limits, self.handle.state
+        position, velocity = state.position, state.velocity
+        lowest, highest = -limits.max_effort, limits.max_effort
+        if self.soft is not None:
+            slowest, fastest = soft_velocities(position, limits, self.soft)
+            if slowest > -math.inf:
+                lowest = _clamped(self.soft.k_velocity * (slowest - velocity), limits.max_effort)
+            if fastest < math.inf:
+                highest = _clamped(self.soft.k_velocity * (fastest - velocity), limits.max_effort)
+        if position < limits.min_position or velocity < -limits.max_velocity:
+            lowest = max(lowest, 0.0)
+        if position > limits.max_position or velocity > limits.max_velocity:
+            highest = min(highest, 0.0)
+        self._give(max(lowest, min(highest, self._asked())))
+
+
+def _clamped(value: float, bound: float) -> float:
+    """`value` within `bound` on both sides of 0; 0 when it is not a number."""
+    return max(-bound, min(bound, value)) if value == value else 0.0
+
+
+def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
+    """Smallest and largest velocity allowed at `position`: none while that is not a number."""
+    if position != position:
+        return 0.0, 0.0
+    largest = limits.max_velocity
+    lowest = -largest if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
+    highest = largest if soft.max_position == math.inf else soft.k_position * (soft.max_position - position)
+    return max(-largest, min(largest, lowest)), max(-largest, min(largest, highest))
+
+
+def limit_handle(interface_class: type[HardwareInterface[Any]], handle: JointHandle, limits: JointLimits,
+                 soft_limits: SoftJointLimits | None = None) -> JointLimiter:
+    """What keeps the commands of a handle within limits, by what the handle commands; the handle then says its limits.
+
+    Args:
+        interface_class: interface the handle belongs to.
+        handle: the joint.
+        limits: its limits.
+        soft_limits: its soft limits, if any.
+    """
+    handle.limits = limits
+    if issubclass(interface_class, VelocityJointInterface):
+        return VelocityJointSaturation(handle, limits, soft_limits)
+    if issubclass(interface_class, EffortJointInterface):
+        return EffortJointSaturation(handle, limits, soft_limits)
+    if issubclass(interface_class, (PosVelJointInterface, PosVelAccJointInterface)):
+        return PosVelJointSaturation(handle, limits, soft_limits)
+    return PositionJointSaturation(handle, limits, soft_limits)
+
+
+def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[JointLimits]:
+    """What is known of the limits of joints: those their hardware enforces; where it enforces none, those of
+    `robot_description` and `joint_limits/<joint>/...`.
+
+    Args:
+        handles: the joints.
+        root_nh: where `robot_description` and `joint_limits` are found, if they are there.
+
+    Raises:
+        ParameterError: a limit makes no sense; says which parameter.
+    """
+    unknown = [handle.name for handle in handles if handle.limits is None]
+    description = root_nh.get_param("robot_description") if unknown else None
+    described = limits_from_urdf(description) if isinstance(description, str) else {}
+    return [handle.limits if handle.limits is not None
+            else limits_with_parameters(handle.name, described.get(handle.name, JointLimits()), root_nh)
+            for handle in handles]
+
+
+class JointLimitGuard:
+    """Keeps all commands of a hardware within the limits of `robot_description` and of `joint_limits/<joint>/...`.
+
+    Args:
+        robot_hw: hardware whose command interfaces are registered.
+        root_nh: where `robot_description` and `joint_limits` are found, if they are there.
+
+    Attributes:
+        limits: limits by joint name, of every joint that can be commanded.
+
+    Raises:
+        ParameterError: a limit makes no sense; says which parameter.
+    """
+
+    def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle) -> None:
+        description = root_nh.get_param("robot_description")
+        known = limits_from_urdf(description) if isinstance(description, str) else {}
+        soft = soft_limits_from_urdf(description) if isinstance(description, str) else {}
+        self.limits: dict[str, JointLimits] = {}
+        self._limiters: list[JointLimiter] = []
+        for interface in robot_hw.interfaces:
+            for handle in interface.handles if interface.claims_resources else ():
+                name = handle.name
+                self.limits[name] = limits_with_parameters(name, known.get(name, JointLimits()), root_nh)
+                self._limiters.append(limit_handle(type(interface), handle, self.limits[name],
+                                                   soft_limits_with_parameters(name, soft.get(name), root_nh)))
+
+    def enforce(self, period_s: float) -> None:
+        """Replace every command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+        for limiter in self._limiters:
+            limiter.enforce_limits(period_s)
+
+    def reset(self, joints: Iterable[str] | None = None) -> None:
+        """Forget the last commands (of these joints), after they were moved by other means."""
+        names = self.limits.keys() if joints is None else set(joints)
+        for limiter in self._limiters:
+            if limiter.handle.name in names:
+                limiter.reset()
+
+
+__all__ = ["EffortJointSaturation", "JointLimitGuard", "JointLimiter", "JointLimits", "PosVelJointSaturation",
+           "PositionJointSaturation", "SoftJointLimits", "VelocityJointSaturation", "limit_handle", "limits_from_urdf",
+           "limits_of", "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters",
+           "soft_velocities"]

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fake hardware: joints that do what they are told, for demonstrations and tests without a robot or physics."""
+from __future__ import annotations
+
+import logging
+
+from modular_framework_control.hardware_interface.interfaces import (
+    COMMAND_INTERFACES,
+    CommandInterface,
+    EffortJointInterface,
+    JointHandle,
+    JointStateHandle,
+    JointStateInterface,
+    PositionJointInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard, JointLimits
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+
+LOGGER = logging.getLogger("rosout.mock_robot_hw")
+
+
+class MockRobotHW(RobotHW):
+    """Joints that do, one cycle later, exactly what they were commanded to do.
+
+    Commanded by position they are there; by velocity they have moved on with it; by effort they have been accelerated
+    by it, as bodies of inertia 1 without friction or weight. They stop dead at the ends of their range.
+
+    Parameters: `joints`, a list of names; `initial_positions/<joint>` [rad|m] 0; `command_interface`
+    PositionJointInterface, or VelocityJointInterface, EffortJointInterface, PosVelJointInterface,
+    PosVelAccJointInterface (which are followed by position). Limits come from `robot_description` in the
+    root namespace and from `joint_limits`, when they are there.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._handles: list[JointHandle] = []
+        self._limits: list[JointLimits] = []
+        self._sent: list[float] = []
+        self._sent_period_s = 0.0
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        try:
+            names = read_names(robot_hw_nh, "joints")
+            positions = [read_number(robot_hw_nh, f"initial_positions/{name}", 0.0, None) for name in names]
+            interface_class = _read_interface(robot_hw_nh)
+            self._by_velocity = interface_class is VelocityJointInterface
+            self._by_effort = interface_class is EffortJointInterface
+            self._register(interface_class, names, positions)
+            self._guard = JointLimitGuard(self, root_nh)
+        except ParameterError as error:
+            LOGGER.error("%s in %s: %s", type(self).__name__, join_names(robot_hw_nh.namespace, ""), error)
+            return False
+        self._limits = [self._guard.limits[name] for name in names]
+        self._sent = [handle.command for handle in self._handles]
+        return True
+
+    def _register(self, interface_class: type[CommandInterface], names: list[str], positions: list[float]) -> None:
+        states, commands = JointStateInterface(), interface_class()
+        rates = self._by_velocity or self._by_effort
+        for name, position in zip(names, positions, strict=True):
+            state = states.register_handle(JointStateHandle(name, position))
+            handle = interface_class.handle_class(state, 0.0 if rates else position)
+            self._handles.append(commands.register_handle(handle))
+        self.register_interface(states)
+        self.register_interface(commands)
+
+    def read(self, time_s: float, period_s: float) -> None:
+        if self._by_velocity or self._by_effort:
+            self._move_on(period_s)
+            return
+        for handle, position in zip(self._handles, self._sent, strict=True):
+            state = handle.state
+            if self._sent_period_s > 0.0:     # while time stands still a joint keeps the velocity it has
+                state.velocity = (position - state.position) / self._sent_period_s
+            state.position = position
+
+    def _move_on(self, period_s: float) -> None:
+        """Where velocities or efforts have brought the joints in `period_s` [s]."""
+        for handle, sent, limit in zip(self._handles, self._sent, self._limits, strict=True):
+            state, velocity = handle.state, sent
+            if self._by_effort:
+                state.effort = sent
+                velocity = state.velocity + sent * period_s
+            position = min(max(state.position + velocity * period_s, limit.min_position), limit.max_position)
+            if period_s > 0.0:
+                state.velocity = (position - state.position) / period_s
+            state.position = position
+
+    def write(self, time_s: float, period_s: float) -> None:
+        self._guard.enforce(period_s)
+        self._sent_period_s = period_s  # what the controllers went on by; the next differs when cycles come late
+        self._sent = [handle.command for handle in self._handles]
+
+
+def _read_interface(robot_hw_nh: NodeHandle) -> type[CommandInterface]:
+    value = robot_hw_nh.get_param("command_interface", PositionJointInterface.__name__)
+    for interface in COMMAND_INTERFACES:
+        if value in (interface.__name__, interface.type_name):
+            return interface
+    raise ParameterError(f"parameter {join_names(robot_hw_nh.namespace, 'command_interface')}: got {value!r}; expected "
+                         f"one of: {', '.join(interface.__name__ for interface in COMMAND_INTERFACES)}")

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds classes that other packages offer under a name `package/Class`: hardware and controllers of users.
+
+A package offers its classes as ROS packages offer plugins: an `<export>` tag in its package.xml names a description,
+
+    <export><modular_framework_control plugin="${prefix}/plugins.xml"/></export>
+
+and the description names, per Python module, the classes in it:
+
+    <library path="my_package.my_module">
+      <class name="my_package/MyHW" type="MyHW" base_class_type="hardware_interface::RobotHW"/>
+    </library>
+"""
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from modular_framework_urdf import xml_text
+
+EXPORT_TAG = "modular_framework_control"
+ROBOT_HW_BASE = "hardware_interface::RobotHW"
+CONTROLLER_BASE = "controller_interface::ControllerBase"
+
+
+class PluginError(Exception):
+    """A class is not offered by any package, cannot be loaded, or is not what it should be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """One class that a package offers.
+
+    Attributes:
+        name: what users write, package/Class.
+        base: what it is, as in `base_class_type`.
+        module: Python module it is in.
+        class_name: its name in that module.
+        origin: the description that offers it.
+    """
+
+    name: str
+    base: str
+    module: str
+    class_name: str
+    origin: Path
+
+
+def _packages_of_workspace() -> Mapping[str, Path]:
+    # Imported here, as only who looks for plugins needs to know the workspace.
+    from modular_framework_control.hardware_interface.workspace_packages import packages_of_workspace
+
+    return packages_of_workspace()
+
+
+class PluginIndex:
+    """The classes of one base that packages offer; looked for at the first question, then kept.
+
+    Args:
+        base: ROBOT_HW_BASE or CONTROLLER_BASE.
+        packages: gives the folder of each package by name; those of the sourced workspace when not given.
+    """
+
+    def __init__(self, base: str, packages: Callable[[], Mapping[str, Path]] | None = None) -> None:
+        self._base = base
+        self._packages = packages if packages is not None else _packages_of_workspace
+        self._found: dict[str, Plugin] | None = None
+        self._faults: list[str] = []
+        self._stale: set[str] = set()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the classes on offer, sorted."""
+        return sorted(self._plugins())
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with descriptions that could not be read in full."""
+        self._plugins()
+        return list(self._faults)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._plugins()
+
+    def load(self, name: str, expected: type[Any]) -> type[Any]:
+        """Import the class offered under `name`.
+
+        Args:
+            name: package/Class.
+            expected: class that it must be derived from.
+
+        Raises:
+            PluginError: nobody offers it (the message lists what is offered and which descriptions are faulty), its
+                module cannot be imported, or it is something else.
+        """
+        plugin = self._plugins().get(name)
+        if plugin is None:
+            faults = f"; faulty descriptions: {'; '.join(self._faults)}" if self._faults else ""
+            raise PluginError(f"no package of this workspace offers a {self._base} named {name!r}; known: "
+                              f"{', '.join(self.names) or 'none'}{faults}. A package offers one by <export>"
+                              f"<{EXPORT_TAG} plugin=\"${{prefix}}/plugins.xml\"/></export> in its package.xml")
+        where = f"{plugin.class_name} of {plugin.module} (offered as {name} by {plugin.origin})"
+        try:
+            loaded = getattr(self._module(plugin.module), plugin.class_name)
+        except Exception as error:  # a user's module may raise anything when it is imported
+            raise PluginError(f"cannot load {where}: {type(error).__name__}: {error}") from error
+        if not isinstance(loaded, type) or not issubclass(loaded, expected):
+            raise PluginError(f"{where} is no {expected.__name__}; derive it from "
+                              f"{expected.__module__}.{expected.__name__}")
+        return loaded
+
+    def reload(self) -> None:
+        """Look again at the next question, also for modules installed or changed since they were imported."""
+        self._stale |= {plugin.module for plugin in (self._found or {}).values()}
+        self._found = None
+        importlib.invalidate_caches()
+
+    def _module(self, name: str) -> ModuleType:
+        stale = name in self._stale and name in sys.modules
+        self._stale.discard(name)
+        return importlib.reload(sys.modules[name]) if stale else importlib.import_module(name)
+
+    def _plugins(self) -> dict[str, Plugin]:
+        if self._found is None:
+            found: dict[str, Plugin] = {}
+            faults: list[str] = []
+            for package, folder in sorted(self._packages().items()):
+                for plugin in self._of_package(package, folder, faults):
+                    first = found.setdefault(plugin.name, plugin)
+                    if first is not plugin:
+                        faults.append(f"{plugin.origin}: {plugin.name} is already offered by {first.origin}")
+            self._faults, self._found = faults, found
+            return found
+        return self._found
+
+    def _of_package(self, package: str, folder: Path, faults: list[str]) -> list[Plugin]:
+        manifest = folder / "package.xml"
+        if not manifest.is_file() or EXPORT_TAG not in manifest.read_text(encoding="utf-8", errors="replace"):
+            return []
+        plugins: list[Plugin] = []
+        for path in _descriptions(package, manifest, faults):
+            try:
+                plugins += [plugin for plugin in read_description(path) if plugin.base == self._base]
+            except PluginError as error:
+                faults.append(str(error))
+        return plugins
+
+
+def _descriptions(package: str, manifest: Path, faults: list[str]) -> list[Path]:
+    try:
+        exports = xml_text.read(manifest).findall(f"export/{EXPORT_TAG}")
+    except xml_text.XmlError as error:
+        faults.append(f"{manifest} of package {package}: {error}")
+        return []
+    return [Path(export.get("plugin", "").replace("${prefix}", str(manifest.parent))) for export in exports]
+
+
+def read_description(path: Path) -> list[Plugin]:
+    """The classes a description names.
+
+    Raises:
+        PluginError: no such file, not XML, or entries that lack something; all of them are named.
+    """
+    try:
+        root = xml_text.read(path)
+    except (OSError, xml_text.XmlError) as error:
+        raise PluginError(f"plugin description {path}: {error}") from error
+    plugins: list[Plugin] = []
+    faults: list[str] = []
+    for library in ([root] if root.tag == "library" else root.findall("library")):
+        for entry in library.findall("class"):
+            values = {key: entry.get(key, "") for key in ("name", "type", "base_class_type")}
+            values["path (of library)"] = library.get("path", "")
+            missing = [key for key, value in values.items() if not value]
+            if missing or values["name"].count("/") != 1:
+                faults.append(f"class {values['name']!r}: " + (f"no {', '.join(missing)}" if missing else
+                                                               "its name must have the form package/Class"))
+                continue
+            plugins.append(Plugin(values["name"], values["base_class_type"], values["path (of library)"],
+                                  values["type"], path))
+    if faults:
+        raise PluginError(f"plugin description {path}: {'; '.join(faults)}")
+    return plugins

@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What controllers of mobile bases have in common: commands that grow old, limits, odometry and what is published."""
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.mobile_base.planar_odometry import PlanarOdometry
+from modular_framework_control.mobile_base.speed_limiter import SpeedLimiter, read_speed_limiter
+from modular_framework_control.realtime.rates import first_due, next_due, period_of
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+
+Diagonal = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class BaseVelocity:
+    """Velocity of a base.
+
+    Attributes:
+        linear: along its x axis [m/s].
+        angular: about its z axis [rad/s].
+    """
+
+    linear: float = 0.0
+    angular: float = 0.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether all of it are numbers."""
+        return math.isfinite(self.linear) and math.isfinite(self.angular)
+
+
+AT_REST = BaseVelocity()
+
+
+@dataclass(frozen=True, slots=True)
+class OdometrySnapshot:
+    """Where the base is and how fast it moves.
+
+    Attributes:
+        time_s: time of the cycle [s].
+        x: in the odometry frame [m].
+        y: in the odometry frame [m].
+        heading: [rad].
+        linear: along the x axis of the base [m/s].
+        lateral: along its y axis [m/s].
+        angular: about its z axis [rad/s].
+        with_tf: whether the frame of the base is to be published.
+    """
+
+    time_s: float
+    x: float
+    y: float
+    heading: float
+    linear: float
+    lateral: float
+    angular: float
+    with_tf: bool
+
+
+@dataclass(frozen=True)
+class BaseSettings:
+    """What may change while the controller runs; replaced as a whole.
+
+    Attributes:
+        publish_rate: of the odometry [1/s]; 0 for never.
+        enable_odom_tf: whether the frame of the base is published too.
+    """
+
+    publish_rate: float = 50.0
+    enable_odom_tf: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class BaseFrames:
+    """Constant parts of the odometry message.
+
+    Attributes:
+        odom: frame in which the pose is given.
+        base: frame of the base.
+        pose_covariance: its diagonal; x, y, z [m^2], roll, pitch, yaw [rad^2].
+        twist_covariance: its diagonal.
+    """
+
+    odom: str
+    base: str
+    pose_covariance: Diagonal
+    twist_covariance: Diagonal
+
+
+class MobileBaseController(Controller, ABC):
+    """Base of controllers of wheels.
+
+    Parameters, below the controller's name: `publish_rate` [1/s] 50, `open_loop` false: odometry from what is commanded
+    instead of what is measured; `cmd_vel_timeout` [s] 0.5: a command that is older is no longer in force;
+    `allow_multiple_cmd_vel_publishers` true; `velocity_rolling_window_size` 10; `base_frame_id` base_link,
+    `odom_frame_id` odom, `enable_odom_tf` true; `pose_covariance_diagonal` and `twist_covariance_diagonal`: six numbers
+    each, which must be there; `linear/x` and `angular/z`: limits, see `read_speed_limiter`.
+
+    Attributes:
+        settings: what may be replaced, from any thread, while the controller runs.
+        frames: constant parts of the odometry message.
+        allows_several_publishers: whether commands may come from several publishers.
+        odometry: where the base is.
+        on_odometry: called in the control loop at `publish_rate`; must not block.
+    """
+
+    def __init__(self) -> None:
+        self.settings = BaseSettings()
+        self.on_odometry: Callable[[OdometrySnapshot], None] | None = None
+        self._latest: Any = None
+        self._latest_seen: Any = None
+        self._seen_s = -math.inf
+        self._rate = self._next_s = math.inf
+        self._refusal = "the controller is not running; start it first"
+
+    def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
+        self.settings = self._read_settings(controller_nh)
+        self.frames = BaseFrames(read_name(controller_nh, "odom_frame_id", "odom", "frame"),
+                                 read_name(controller_nh, "base_frame_id", "base_link", "frame"),
+                                 _diagonal(controller_nh, "pose_covariance_diagonal"),
+                                 _diagonal(controller_nh, "twist_covariance_diagonal"))
+        self._open_loop = read_bool(controller_nh, "open_loop", False)
+        self._timeout_s = read_number(controller_nh, "cmd_vel_timeout", 0.5)
+        self.allows_several_publishers = read_bool(controller_nh, "allow_multiple_cmd_vel_publishers", True)
+        self._linear_limits = read_speed_limiter(controller_nh.child("linear/x"))
+        self._angular_limits = read_speed_limiter(controller_nh.child("angular/z"))
+        window = read_number(controller_nh, "velocity_rolling_window_size", 10, 1)
+        self.odometry = PlanarOdometry(int(window))
+        return True
+
+    def _read_settings(self, controller_nh: NodeHandle) -> BaseSettings:
+        return BaseSettings(read_number(controller_nh, "publish_rate", 50.0),
+                            read_bool(controller_nh, "enable_odom_tf", True))
+
+    # ---- any thread ----
+
+    def submit(self, command: Any) -> None:
+        """Take a command, which is in force from the next cycle on until it is too old.
+
+        Args:
+            command: with a property `finite`; its class depends on the controller.
+
+        Raises:
+            ControllerError: not finite, the controller does not run, or the hardware has a fault.
+        """
+        if self._refusal:
+            raise ControllerError(self._refusal)
+        if not command.finite:
+            raise ControllerError(f"got {command}; expected finite numbers")
+        self._latest = command
+
+    def drop_command(self) -> None:
+        """Let the command in force be in force no longer: the base comes to rest within its limits."""
+        self._latest = None
+
+    # ---- control loop ----
+
+    def starting(self, time_s: float) -> None:
+        self._brake()
+        self._forget()
+        self._rate = math.inf      # of no settings: they are taken over in the first cycle
+        self.odometry.start(time_s)
+        self._refusal = ""
+
+    def stopping(self, time_s: float) -> None:
+        self._refusal = "the controller is not running; start it first"
+        self._brake()
+        self._forget()
+
+    def on_hardware_fault(self, time_s: float, reason: str) -> None:
+        self._refusal = f"hardware fault: {reason}"
+        self._brake()
+        self._forget()
+
+    def on_hardware_recovered(self, time_s: float) -> None:
+        self._forget()      # a command may have come just as the fault did
+        self._refusal = ""
+
+    def update(self, time_s: float, period_s: float) -> None:
+        measured = self._follow_wheels(time_s)
+        self._report(time_s)
+        if self._refusal:
+            self._brake()
+        else:
+            command = self._in_force(time_s)
+            self._drive(command if measured else None, time_s, period_s)
+
+    def _report(self, time_s: float) -> bool:
+        """Hand the odometry out if that is due; answers whether it is."""
+        settings, pose = self.settings, self.odometry
+        period_s = period_of(settings.publish_rate)
+        if settings.publish_rate != self._rate:
+            self._rate, self._next_s = settings.publish_rate, first_due(period_s, time_s)
+        if self.on_odometry is None or time_s < self._next_s:
+            return False
+        self._next_s = next_due(self._next_s, period_s, time_s)
+        self.on_odometry(OdometrySnapshot(time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular,
+                                          settings.enable_odom_tf))
+        return True
+
+    def _in_force(self, time_s: float) -> Any:
+        """The last command; None when it is too old."""
+        command = self._latest
+        if command is not self._latest_seen:
+            self._latest_seen, self._seen_s = command, time_s
+        return None if time_s - self._seen_s > self._timeout_s else command
+
+    def _forget(self) -> None:
+        """Forget commands, also those that limits go by."""
+        self._latest = self._latest_seen = None
+
+    @abstractmethod
+    def _follow_wheels(self, time_s: float) -> bool:
+        """Bring the odometry up to date; answers whether it is known how the wheels stand."""
+
+    @abstractmethod
+    def _drive(self, command: Any, time_s: float, period_s: float) -> None:
+        """Command the joints so that the base does what is asked for; with None it comes to rest within its limits."""
+
+    @abstractmethod
+    def _brake(self) -> None:
+        """Command the joints to stand still at once."""
+
+
+class TwistLimits:
+    """Limits of both velocities of a base, and what was commanded before, by which accelerations are limited.
+
+    Args:
+        linear: limits along x.
+        angular: limits about z.
+
+    Attributes:
+        last: velocity commanded in the last cycle.
+    """
+
+    def __init__(self, linear: SpeedLimiter, angular: SpeedLimiter) -> None:
+        self._linear, self._angular = linear, angular
+        self.forget()
+
+    def forget(self) -> None:
+        """The base stands."""
+        self.last = self._before_last = AT_REST
+
+    def limit(self, wanted: BaseVelocity, period_s: float) -> BaseVelocity:
+        """The velocity to command in this cycle, `period_s` [s] after the last."""
+        last, before = self.last, self._before_last
+        self._before_last = last
+        self.last = BaseVelocity(self._linear.limit(wanted.linear, last.linear, before.linear, period_s),
+                                 self._angular.limit(wanted.angular, last.angular, before.angular, period_s))
+        return self.last
+
+    def limit_linear(self, wanted: float, period_s: float) -> float:
+        """The linear velocity to command in this cycle, of a base whose turn is not limited by itself."""
+        last = self.last
+        value = self._linear.limit(wanted, last.linear, self._before_last.linear, period_s)
+        self.last, self._before_last = BaseVelocity(value, last.angular), last
+        return value
+
+
+def read_positive(handle: NodeHandle, key: str, default: float) -> float:
+    """A number parameter above 0.
+
+    Raises:
+        ParameterError: not a number above 0.
+    """
+    value = read_number(handle, key, default)
+    if value <= 0.0:
+        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a number above 0")
+    return value
+
+
+def read_name(handle: NodeHandle, key: str, default: str, what: str) -> str:
+    """A parameter that names something: `what` says what, for the message.
+
+    Raises:
+        ParameterError: not a text, or an empty one.
+    """
+    value = handle.get_param(key, default)
+    if not isinstance(value, str) or not value:
+        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a {what}'s name")
+    return value
+
+
+def _diagonal(handle: NodeHandle, key: str) -> Diagonal:
+    values = handle.get_param(key)
+    if (not isinstance(values, (list, tuple)) or len(values) != 6
+            or any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values)):
+        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {values!r}; expected six "
+                             "numbers: the variances along x, y, z and about x, y, z")
+    x, y, z, roll, pitch, yaw = map(float, values)
+    return x, y, z, roll, pitch, yaw

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The action server of a controller: passes goals to the control loop, and their status and results to the clients."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from actionlib.server_goal_handle import ServerGoalHandle
+
+from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
+from modular_framework_control.ros.outbox import Outbox
+from modular_framework_ros.action_server import SteadyActionServer
+
+Submit = Callable[[Any, RealtimeGoalHandle[Any]], None]
+MakeResult = Callable[[RealtimeGoalHandle[Any]], Any]
+
+
+class GoalRefusedError(Exception):
+    """A goal is refused at once; carries the result to send."""
+
+    def __init__(self, result: Any, text: str) -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class ControllerActionServer:
+    """Serves one action of a controller with any number of goals, of which the newest is followed.
+
+    Args:
+        name: absolute action name.
+        action: the action's message class.
+        submit: hands a goal message and its goal handle to the controller, or raises GoalRefusedError.
+        cancel: asks the controller to end a goal handle.
+        make_result: result message of a finished goal handle.
+        outbox: thread that talks to ROS for the control loop.
+    """
+
+    def __init__(self, name: str, action: type[Any], submit: Submit, cancel: Callable[[Any], None],
+                 make_result: MakeResult, outbox: Outbox) -> None:
+        self._submit = submit
+        self._cancel = cancel
+        self._make_result = make_result
+        self._outbox = outbox
+        self._goals: dict[RealtimeGoalHandle[Any], ServerGoalHandle] = {}
+        self._server = SteadyActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
+        self._server.start()
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._server.stop()
+
+    def publish_feedback(self, goal_handle: RealtimeGoalHandle[Any], feedback: Any) -> None:
+        """Send feedback to the client of `goal_handle`; nothing happens when the goal has ended meanwhile."""
+        goal = self._goals.get(goal_handle)
+        if goal is not None:
+            goal.publish_feedback(feedback)
+
+    def _on_goal(self, goal: ServerGoalHandle) -> None:
+        goal_handle: RealtimeGoalHandle[Any] = RealtimeGoalHandle(
+            lambda changed: self._outbox.put(self._publish_status, changed, changed.status))
+        self._goals[goal_handle] = goal
+        try:
+            self._submit(goal.get_goal(), goal_handle)
+        except GoalRefusedError as error:
+            del self._goals[goal_handle]
+            rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)
+            goal.set_rejected(error.result, str(error))
+        except Exception as error:  # whatever is in the message, its sender gets an answer
+            del self._goals[goal_handle]
+            rospy.logerr("%s: goal rejected: %s: %s", self._server.ns, type(error).__name__, error)
+            goal.set_rejected(None, f"{type(error).__name__}: {error}")
+
+    def _on_cancel(self, goal: ServerGoalHandle) -> None:
+        for goal_handle, known in list(self._goals.items()):
+            if known == goal:
+                self._cancel(goal_handle)
+
+    def _publish_status(self, goal_handle: RealtimeGoalHandle[Any], status: GoalStatus) -> None:
+        goal = self._goals[goal_handle]
+        if status is GoalStatus.ACTIVE:
+            goal.set_accepted()
+            return
+        del self._goals[goal_handle]
+        finish = {GoalStatus.SUCCEEDED: goal.set_succeeded, GoalStatus.ABORTED: goal.set_aborted,
+                  GoalStatus.CANCELED: goal.set_canceled, GoalStatus.REJECTED: goal.set_rejected}[status]
+        if status in (GoalStatus.ABORTED, GoalStatus.REJECTED):
+            rospy.logwarn("%s: goal %s: %s", self._server.ns, status.value, goal_handle.text)
+        finish(self._make_result(goal_handle), goal_handle.text)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command-line tool controller_group: controllers that belong together are started, and exchanged, together."""
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import rospy
+
+from modular_framework_control.ros import controller_manager_interface as interface
+from modular_framework_control.ros.controller_manager_client import (
+    ControllerManagerClient,
+    ControllerManagerClientError,
+)
+
+Groups = Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupPlan:
+    """What brings the controllers of one group into force.
+
+    Attributes:
+        load: controllers of the group that are not loaded, in its order.
+        start: those that do not run, in its order.
+        stop: controllers that run and are in other groups only.
+    """
+
+    load: tuple[str, ...]
+    start: tuple[str, ...]
+    stop: tuple[str, ...]
+
+
+def read_groups(value: object) -> Groups:
+    """The parameter `controller_groups`, checked.
+
+    Raises:
+        ControllerManagerClientError: not a mapping of names to lists of names.
+    """
+    where = f"parameter {rospy.resolve_name('controller_groups')}"
+    if not isinstance(value, dict) or not value:
+        raise ControllerManagerClientError(f"{where}: got {value!r}; expected names of groups, each with the list of "
+                                           "its controllers")
+    for group, controllers in value.items():
+        if not isinstance(controllers, list) or not all(isinstance(name, str) and name for name in controllers):
+            raise ControllerManagerClientError(f"{where}/{group}: got {controllers!r}; expected a list of controllers")
+    return value
+
+
+def plan_group(groups: Groups, group: str, states: Mapping[str, str]) -> GroupPlan:
+    """What is to be done for `group`.
+
+    Args:
+        groups: controllers of each group.
+        group: the wanted one.
+        states: state of each loaded controller by name.
+
+    Raises:
+        ControllerManagerClientError: no such group, or it has no controllers.
+    """
+    if not groups.get(group):
+        raise ControllerManagerClientError(f"no controllers are defined for group '{group}'; known groups: "
+                                           f"{', '.join(sorted(groups))}")
+    wanted = tuple(dict.fromkeys(groups[group]))
+    others = dict.fromkeys(name for names in groups.values() for name in names if name not in wanted)
+    return GroupPlan(tuple(name for name in wanted if name not in states),
+                     tuple(name for name in wanted if states.get(name) != "running"),
+                     tuple(name for name in others if states.get(name) == "running"))
+
+
+def _list(groups: Groups) -> None:
+    print(f"Number of groups: {len(groups)}")
+    for group in sorted(groups):
+        print(f"  {group}")
+        for name in groups[group]:
+            print(f"      {name}")
+
+
+def _bring_up(groups: Groups, group: str, client: ControllerManagerClient, switch: bool) -> None:
+    plan_group(groups, group, {})
+    states = {entry.name: entry.state for entry in client.list_controllers()}
+    plan = plan_group(groups, group, states)
+    for name in plan.load:
+        if not interface.load_controller(name, client):
+            raise ControllerManagerClientError(f"{'Cancel group switching' if switch else 'Group not spawned'}: "
+                                               f"controller '{name}' of group '{group}' was not loaded")
+    if switch:
+        interface.start_stop_controllers(plan.start, plan.stop, client)
+        return
+    for name in plan.start:
+        interface.start_controller(name, client)
+
+
+def controller_group_main() -> int:
+    """List groups of controllers, load and start one, or switch to one from the others."""
+    parser = argparse.ArgumentParser(prog="controller_group", description=controller_group_main.__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="list the groups and their controllers")
+    for name, text in (("spawn", "load and start the controllers of a group"),
+                       ("switch", "start the controllers of a group and stop those of the others, in one cycle")):
+        commands.add_parser(name, help=text).add_argument("group", help="name of a group in controller_groups")
+    arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
+    rospy.init_node("controller_group", anonymous=True)
+    try:
+        groups = read_groups(rospy.get_param("controller_groups", None))
+        if arguments.command == "list":
+            _list(groups)
+        else:
+            _bring_up(groups, arguments.group, ControllerManagerClient(), arguments.command == "switch")
+    except ControllerManagerClientError as error:
+        rospy.logerr("%s", error)
+        return 1
+    finally:
+        rospy.signal_shutdown("done")
+    return 0

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics, actions and services of each controller, under the names of ros_controllers."""
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    GripperCommandAction,
+    GripperCommandGoal,
+    JointTrajectoryControllerState,
+)
+from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateRequest, QueryTrajectoryStateResponse
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+
+from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controllers.gripper_action_controller import (
+    GripperActionController,
+    GripperGoalError,
+    GripperGoalHandle,
+    GripperState,
+)
+from modular_framework_control.controllers.joint_command_controllers import JointCommandController
+from modular_framework_control.controllers.joint_state_controller import JointStateController
+from modular_framework_control.controllers.joint_trajectory_controller import JointTrajectoryController
+from modular_framework_control.controllers.sensor_controllers import SensorController
+from modular_framework_control.mobile_base.diff_drive_controller import DiffDriveController
+from modular_framework_control.mobile_base.four_wheel_steering_controller import FourWheelSteeringController
+from modular_framework_control.mobile_base.mobile_base_controller import MobileBaseController
+from modular_framework_control.realtime.goal_handle import RealtimeGoalHandle
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.ros import conversions
+from modular_framework_control.ros.controller_action_server import ControllerActionServer, GoalRefusedError
+from modular_framework_control.ros.joint_command_interface import JointCommandRosInterface
+from modular_framework_control.ros.mobile_base_interfaces import (
+    DiffDriveRosInterface,
+    FourWheelSteeringRosInterface,
+    MobileBaseRosInterface,
+)
+from modular_framework_control.ros.outbox import Outbox
+from modular_framework_control.ros.sensor_interfaces import SensorRosInterface
+from modular_framework_control.trajectory.trajectory_goal import (
+    GoalRejectedError,
+    TrajectoryErrorCode,
+    TrajectoryGoal,
+    TrajectoryGoalHandle,
+    TrajectorySnapshot,
+)
+from modular_framework_ros.node_handle import join_names
+from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
+
+PID_GAINS = (
+    Adjustable("p", -1e5, 1e5, "command per error"),
+    Adjustable("i", -1e5, 1e5, "command per error and second"),
+    Adjustable("d", -1e3, 1e3, "command per rate of the error"),
+    Adjustable("i_clamp_min", -1e5, 0.0, "smallest part of the integral in the command"),
+    Adjustable("i_clamp_max", 0.0, 1e5, "largest part of the integral in the command"),
+    Adjustable("antiwindup", False, True, "stop to add up errors at the bounds of the integral"))
+
+
+class JointStateRosInterface:
+    """Publishes `joint_states` (sensor_msgs/JointState) in the namespace of the robot."""
+
+    def __init__(self, controller: JointStateController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        del name
+        self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=10)
+        controller.on_state = lambda snapshot: outbox.publish(
+            self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s))
+
+    def close(self) -> None:
+        """Close the topic."""
+        self._publisher.unregister()
+
+
+class JointTrajectoryRosInterface:
+    """Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
+    `<name>/query_state` (service)."""
+
+    def __init__(self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        self._controller = controller
+        self._name = join_names(namespace, name)
+        self._loop_time = loop_time
+        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+            self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
+            opened.callback(self._state.unregister)
+            self._action = ControllerActionServer(f"{self._name}/follow_joint_trajectory", FollowJointTrajectoryAction,
+                                                  self._submit, controller.cancel, _trajectory_result, outbox)
+            opened.callback(self._action.close)
+            query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
+            opened.callback(query.shutdown, "controller unloaded")
+            command = rospy.Subscriber(f"{self._name}/command", JointTrajectoryMsg, self._on_command, queue_size=1)
+            opened.callback(command.unregister)
+            self._opened = opened.pop_all()
+        controller.on_state = lambda snapshot: outbox.publish(
+            self._state, lambda: conversions.snapshot_to_msg(snapshot, controller.joint_names, loop_time.ahead_s))
+        controller.on_feedback = lambda goal_handle, snapshot: outbox.put_droppable(self._feedback, goal_handle,
+                                                                                    snapshot)
+
+    def close(self) -> None:
+        """Close topics, action and service."""
+        self._opened.close()
+
+    def _submit(self, message: FollowJointTrajectoryGoal, goal_handle: TrajectoryGoalHandle) -> None:
+        try:
+            self._controller.submit(conversions.goal_from_msg(message, self._loop_time.ahead_s), goal_handle)
+        except GoalRejectedError as error:
+            result = conversions.trajectory_result_to_msg(error.code, str(error))
+            raise GoalRefusedError(result, str(error)) from error
+
+    def _on_command(self, message: JointTrajectoryMsg) -> None:
+        try:
+            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
+        except GoalRejectedError as error:
+            rospy.logwarn("%s/command ignored: %s", self._name, error)
+
+    def _on_query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
+        try:
+            state = self._controller.desired_at(request.time.to_sec() - self._loop_time.ahead_s)
+        except ControllerError as error:
+            raise rospy.ServiceException(f"{self._name}/query_state: {error}") from error
+        return QueryTrajectoryStateResponse(self._controller.joint_names, *(row.tolist() for row in state))
+
+    def _feedback(self, goal_handle: TrajectoryGoalHandle, snapshot: TrajectorySnapshot) -> None:
+        message = conversions.fill_snapshot(FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names,
+                                            self._loop_time.ahead_s)
+        self._action.publish_feedback(goal_handle, message)
+
+
+def _trajectory_result(goal_handle: RealtimeGoalHandle[TrajectoryErrorCode]) -> Any:
+    code = TrajectoryErrorCode.INVALID_GOAL if goal_handle.result is None else goal_handle.result
+    return conversions.trajectory_result_to_msg(code, goal_handle.text)
+
+
+class GripperRosInterface:
+    """Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action)."""
+
+    def __init__(self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        del loop_time
+        self._controller = controller
+        self._action = ControllerActionServer(join_names(namespace, f"{name}/gripper_cmd"), GripperCommandAction,
+                                              self._submit, controller.cancel, _gripper_result, outbox)
+        controller.on_feedback = lambda goal_handle, state: outbox.put_droppable(self._feedback, goal_handle, state)
+
+    def close(self) -> None:
+        """Close the action."""
+        self._action.close()
+
+    def _submit(self, message: GripperCommandGoal, goal_handle: GripperGoalHandle) -> None:
+        try:
+            self._controller.submit(message.command.position, message.command.max_effort, goal_handle)
+        except GripperGoalError as error:
+            raise GoalRefusedError(None, str(error)) from error
+
+    def _feedback(self, goal_handle: GripperGoalHandle, state: GripperState) -> None:
+        self._action.publish_feedback(goal_handle, conversions.gripper_feedback_to_msg(state))
+
+
+def _gripper_result(goal_handle: RealtimeGoalHandle[GripperState]) -> Any:
+    return None if goal_handle.result is None else conversions.gripper_result_to_msg(goal_handle.result)
+
+
+_ROS_INTERFACES: tuple[tuple[type[Controller], Any], ...] = (
+    (JointStateController, JointStateRosInterface),
+    (JointTrajectoryController, JointTrajectoryRosInterface),
+    (GripperActionController, GripperRosInterface),
+    (JointCommandController, JointCommandRosInterface),
+    (SensorController, SensorRosInterface),
+    (DiffDriveController, DiffDriveRosInterface),
+    (FourWheelSteeringController, FourWheelSteeringRosInterface),
+    (MobileBaseController, MobileBaseRosInterface),
+)
+
+
+def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox,
+               loop_time: LoopTime) -> Callable[[], None]:
+    """Open the topics, actions and services of a controller, and dynamic_reconfigure of its gains.
+
+    Args:
+        controller: an initialised controller; one of a class unknown here gets the latter only.
+        namespace: absolute namespace of the robot.
+        name: name of the controller.
+        outbox: thread that talks to ROS for the control loop.
+        loop_time: says how stamps of messages and the time of the control loop differ.
+
+    Returns:
+        What closes them.
+    """
+    with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+        for controller_class, ros_interface in _ROS_INTERFACES:
+            if isinstance(controller, controller_class):
+                opened.callback(ros_interface(controller, namespace, name, outbox, loop_time).close)
+                break
+        for below, pid in controller.pids.items():
+            gains = Reconfiguration(join_names(namespace, f"{name}/{below}"), PID_GAINS, pid, "gains")
+            opened.callback(gains.close)
+            gains.connect()
+        return opened.pop_all().close

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where message classes meet the types of the controllers.
+
+Messages are stamped by the ROS clock, controllers count in the time of the control loop: by `ahead_s` [s] the former is
+ahead of the latter (see `LoopTime`).
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import genpy
+from control_msgs.msg import (
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    GripperCommandFeedback,
+    GripperCommandResult,
+    JointTrajectoryControllerState,
+)
+from controller_manager_msgs.msg import ControllerState, ControllerStatistics, HardwareInterfaceResources
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_control.controller_manager.controller_manager import ControllerReport
+from modular_framework_control.controller_manager.controller_switch import ControllerState as LoadedState
+from modular_framework_control.controllers.gripper_action_controller import GripperState
+from modular_framework_control.controllers.joint_state_controller import JointStateSnapshot
+from modular_framework_control.trajectory.joint_trajectory import Array, JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.tolerances import JointTolerance
+from modular_framework_control.trajectory.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectorySnapshot
+
+
+def trajectory_from_msg(message: JointTrajectoryMsg, ahead_s: float = 0.0) -> JointTrajectory:
+    """A trajectory_msgs/JointTrajectory as sent; it is not checked here."""
+    points = tuple(TrajectoryPoint(point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities),
+                                   tuple(point.accelerations)) for point in message.points)
+    stamp = message.header.stamp
+    return JointTrajectory(tuple(message.joint_names), points, stamp.to_sec() - ahead_s if stamp else 0.0)
+
+
+def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
+    return {message.name: JointTolerance(message.position, message.velocity) for message in messages}
+
+
+def goal_from_msg(message: FollowJointTrajectoryGoal, ahead_s: float = 0.0) -> TrajectoryGoal:
+    """A control_msgs/FollowJointTrajectoryGoal as sent; it is not checked here."""
+    return TrajectoryGoal(
+        trajectory_from_msg(message.trajectory, ahead_s), _tolerances_from_msg(message.path_tolerance),
+        _tolerances_from_msg(message.goal_tolerance), message.goal_time_tolerance.to_sec())
+
+
+def trajectory_result_to_msg(code: TrajectoryErrorCode, text: str) -> FollowJointTrajectoryResult:
+    """Result of a trajectory goal."""
+    return FollowJointTrajectoryResult(error_code=int(code), error_string=text)
+
+
+def _point(state: Array) -> JointTrajectoryPoint:
+    rows = [row.tolist() for row in state]
+    return JointTrajectoryPoint(positions=rows[0], velocities=rows[1], accelerations=rows[2] if len(rows) > 2 else [])
+
+
+def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0) -> Any:
+    """Write a snapshot into a JointTrajectoryControllerState or a FollowJointTrajectoryFeedback; returns it."""
+    message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
+    message.joint_names = list(joint_names)
+    message.desired = _point(snapshot.desired)
+    message.actual = _point(snapshot.actual)
+    message.error = _point(snapshot.error)
+    message.desired.time_from_start = message.actual.time_from_start = genpy.Duration.from_sec(snapshot.elapsed_s)
+    return message
+
+
+def snapshot_to_msg(snapshot: TrajectorySnapshot, joint_names: Sequence[str],
+                    ahead_s: float = 0.0) -> JointTrajectoryControllerState:
+    """State of a trajectory controller."""
+    return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names, ahead_s)
+
+
+def gripper_result_to_msg(state: GripperState) -> GripperCommandResult:
+    """Result of a gripper goal."""
+    return GripperCommandResult(state.position, state.effort, state.stalled, state.reached_goal)
+
+
+def gripper_feedback_to_msg(state: GripperState) -> GripperCommandFeedback:
+    """Feedback of a gripper goal."""
+    return GripperCommandFeedback(state.position, state.effort, state.stalled, state.reached_goal)
+
+
+def joint_state_to_msg(snapshot: JointStateSnapshot, ahead_s: float = 0.0) -> JointState:
+    """A sensor_msgs/JointState."""
+    message = JointState(name=snapshot.names, position=snapshot.positions, velocity=snapshot.velocities,
+                         effort=snapshot.efforts)
+    message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
+    return message
+
+
+def controller_report_to_msg(report: ControllerReport) -> ControllerState:
+    """One line of list_controllers; interfaces have the names of C++ there."""
+    claims = [HardwareInterfaceResources(claim.hardware_interface.replace("/", "::"), list(claim.resources))
+              for claim in report.info.claimed_resources]
+    return ControllerState(report.info.name, report.state.value, report.info.type, claims)
+
+
+def controller_statistics_to_msg(report: ControllerReport, ahead_s: float = 0.0) -> ControllerStatistics:
+    """Update times of one controller; `variance_time`, a duration, is the square root of their variance."""
+    figures = report.statistics
+    updated, overrun = (genpy.Time.from_sec(time_s + ahead_s if time_s else 0.0)
+                        for time_s in (figures.updated_at_s, figures.last_overrun_s))
+    return ControllerStatistics(
+        report.info.name, report.info.type, updated, report.state is LoadedState.RUNNING,
+        genpy.Duration.from_sec(figures.max_s), genpy.Duration.from_sec(figures.mean_s),
+        genpy.Duration.from_sec(math.sqrt(figures.variance_s2)), figures.overruns, overrun)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Says, and waits until others say, that hardware is ready for controllers: the topics `topic_to_wait_for`."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import rospy
+from std_msgs.msg import Bool
+
+from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+
+
+class HardwareNotReadyError(Exception):
+    """Hardware did not say within the time it had that it is ready; says which and on what topic."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadyTopics:
+    """Who says on which topic that it is ready.
+
+    Attributes:
+        awaited: topic by hardware, of hardware that says it itself.
+        announced: topics on which it is said on behalf of hardware that does not.
+    """
+
+    awaited: Mapping[str, str]
+    announced: frozenset[str]
+
+
+def ready_topics_of(robot_hw: RobotHW, robot_hw_nh: NodeHandle) -> ReadyTopics:
+    """The topics of initialised hardware: of each part when it is a combination, and its own.
+
+    Raises:
+        ParameterError: `topic_to_wait_for` is not the name of a topic.
+    """
+    listed = {robot_hw_nh.namespace: (robot_hw, robot_hw_nh)}
+    if isinstance(robot_hw, CombinedRobotHW):
+        listed |= {part.name: (part.hardware, robot_hw_nh.child(part.name)) for part in robot_hw.parts}
+    awaited: dict[str, str] = {}
+    announced: set[str] = set()
+    for name, (hardware, handle) in listed.items():
+        topic = handle.get_param("topic_to_wait_for", "")
+        if not isinstance(topic, str):
+            where = join_names(handle.namespace, "topic_to_wait_for")
+            raise ParameterError(f"parameter {where}: got {topic!r}; expected the name of a topic, or nothing")
+        if topic and hardware.announces_ready:
+            awaited[name] = rospy.resolve_name(topic)
+        elif topic:
+            announced.add(rospy.resolve_name(topic))
+    return ReadyTopics(awaited, frozenset(announced - set(awaited.values())))
+
+
+class HardwareReadiness:
+    """Waits for hardware that announces itself; announces the other.
+
+    Args:
+        topics: who says what where; all are std_msgs/Bool, latched.
+    """
+
+    def __init__(self, topics: ReadyTopics) -> None:
+        self._topics = topics
+        self._ready = {name: threading.Event() for name in topics.awaited}
+        self._subscribers: list[rospy.Subscriber] = []
+        self._publishers: list[rospy.Publisher] = []
+
+    def connect(self) -> None:
+        """Subscribe what is waited for."""
+        for name, topic in self._topics.awaited.items():
+            self._subscribers.append(rospy.Subscriber(topic, Bool, self._on_ready, self._ready[name], queue_size=1))
+
+    @staticmethod
+    def _on_ready(message: Bool, event: threading.Event) -> None:
+        if message.data:
+            event.set()
+
+    def wait(self, timeout_s: float, ended: threading.Event) -> None:
+        """Return when every awaited hardware has said True, or the node is shut down.
+
+        Args:
+            timeout_s: how long to wait for all of them together [s of real time].
+            ended: set when nobody waits any more.
+
+        Raises:
+            HardwareNotReadyError: not all have; names each that has not.
+        """
+        deadline = time.monotonic() + timeout_s
+        while not all(event.wait(0.05) for event in self._ready.values()):
+            if rospy.is_shutdown() or ended.is_set():
+                return
+            if time.monotonic() > deadline:
+                missing = ", ".join(f"topic {self._topics.awaited[name]} of hardware '{name}'"
+                                    for name, event in self._ready.items() if not event.is_set())
+                raise HardwareNotReadyError(f"waited {timeout_s:g} s in vain for True on {missing}; is the hardware "
+                                            "switched on and connected? (~ready_timeout gives it longer)")
+
+    def announce(self) -> None:
+        """Say True, latched, on behalf of the hardware that does not say it itself."""
+        for topic in sorted(self._topics.announced):
+            self._publishers.append(rospy.Publisher(topic, Bool, queue_size=1, latch=True))
+            self._publishers[-1].publish(True)
+
+    def close(self) -> None:
+        """Close all topics; may be called twice."""
+        while self._subscribers:
+            self._subscribers.pop().unregister()
+        while self._publishers:
+            self._publishers.pop().unregister()

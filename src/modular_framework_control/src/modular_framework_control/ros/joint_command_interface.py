@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The topics of controllers that do at once what their topic `command` says."""
+from __future__ import annotations
+
+import contextlib
+
+import rospy
+from control_msgs.msg import JointControllerState
+from std_msgs.msg import Float64, Float64MultiArray
+
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.controllers.joint_command_controllers import (
+    GainsController,
+    JointCommandController,
+    JointControlSnapshot,
+)
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.ros.outbox import Outbox
+from modular_framework_ros.node_handle import join_names
+
+
+class JointCommandRosInterface:
+    """Subscribes `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several. Publishes
+    `<name>/state` (control_msgs/JointControllerState) of controllers that have gains for one joint."""
+
+    def __init__(self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        self._controller = controller
+        self._topic = join_names(namespace, f"{name}/command")
+        kind = Float64 if controller.single else Float64MultiArray
+        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+            opened.callback(rospy.Subscriber(self._topic, kind, self._on_command, queue_size=1).unregister)
+            if isinstance(controller, GainsController) and controller.single:
+                state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=1)
+                opened.callback(state.unregister)
+                controller.on_state = lambda snapshot: outbox.publish(
+                    state, lambda: joint_control_to_msg(snapshot, loop_time.ahead_s))
+            self._opened = opened.pop_all()
+
+    def _on_command(self, message: Float64 | Float64MultiArray) -> None:
+        values = [message.data] if self._controller.single else list(message.data)
+        try:
+            self._controller.submit(values)
+        except ControllerError as error:
+            rospy.logwarn_throttle(1.0, f"{self._topic} ignored: {error}")
+
+    def close(self) -> None:
+        """Close the topics."""
+        self._opened.close()
+
+
+def joint_control_to_msg(snapshot: JointControlSnapshot, ahead_s: float) -> JointControllerState:
+    """What a controller of one joint did; its stamp is `ahead_s` [s] ahead of the loop's time."""
+    gains = snapshot.gains
+    message = JointControllerState(
+        set_point=snapshot.set_point, process_value=snapshot.process_value,
+        process_value_dot=snapshot.process_value_dot, error=snapshot.error, time_step=snapshot.period_s,
+        command=snapshot.command, p=gains.p, i=gains.i, d=gains.d, i_clamp=gains.i_clamp_max,
+        antiwindup=gains.antiwindup)
+    message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
+    return message

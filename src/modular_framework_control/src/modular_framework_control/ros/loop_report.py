@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tells over ROS how the control loop keeps its time and whether the hardware follows."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_srvs.srv import Empty, EmptyResponse
+
+from modular_framework_control.realtime.cycle_pacer import LoopFigures, LoopStatistics
+from modular_framework_ros.publishing import publish
+
+REPORT_PERIOD_S = 1.0
+OVERRUN_WARNING_PERIOD_S = 10.0
+
+
+class LoopReport:
+    """Publishes `/diagnostics` (diagnostic_msgs/DiagnosticArray) once a second of real time; serves `~reset_statistics`
+    (std_srvs/Empty), which begins the figures anew.
+
+    The status is a warning when cycles were late since the last one, an error when the hardware has a fault. Values:
+    `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
+    `work_max_us`, `no_processor_us` (for how long in all the loop was to run and had no processor),
+    `no_processor_max_us` (the longest such time), `fault`.
+
+    Args:
+        statistics: figures that the loop writes.
+        period_s: period of the loop [s].
+        hardware: what the loop drives, for `hardware_id`.
+        fault: asked for the fault of the hardware, "" for none.
+    """
+
+    def __init__(self, statistics: LoopStatistics, period_s: float, hardware: str, fault: Callable[[], str]) -> None:
+        self._statistics = statistics
+        self._period_s = period_s
+        self._hardware = hardware
+        self._fault = fault
+        self._late = 0
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="loop_report", daemon=True)
+
+    def connect(self) -> None:
+        """Open topic and service, and begin to report."""
+        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
+        self._service = rospy.Service("~reset_statistics", Empty, self._on_reset)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Report no more; may be called twice."""
+        self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join(2.0)
+            self._service.shutdown("the control loop ended")
+            self._publisher.unregister()
+
+    def _on_reset(self, request: Any) -> EmptyResponse:
+        del request
+        self._statistics.reset()
+        self._late = 0
+        return EmptyResponse()
+
+    def _work(self) -> None:
+        while not self._ended.wait(REPORT_PERIOD_S) and not rospy.is_shutdown():
+            self._publish(self._statistics.figures())
+
+    def _publish(self, figures: LoopFigures) -> None:
+        late = figures.missed + figures.overruns
+        news, self._late = late > self._late, late
+        fault = self._fault()
+        text = (f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
+                f"{figures.missed} were left out")
+        if news:
+            rospy.logwarn_throttle(OVERRUN_WARNING_PERIOD_S,
+                                   f"control loop at {text}; the longest took {figures.work_max_s * 1e3:.1f} ms, its "
+                                   f"period is {self._period_s * 1e3:.1f} ms; it was without a processor for "
+                                   f"{figures.no_processor_max_s * 1e3:.1f} ms at most")
+        status = DiagnosticStatus(name=f"{rospy.get_name().lstrip('/')}: control loop", hardware_id=self._hardware,
+                                  message=f"hardware fault: {fault}; {text}" if fault else text)
+        status.level = DiagnosticStatus.ERROR if fault else DiagnosticStatus.WARN if news else DiagnosticStatus.OK
+        values = {"rate": 1.0 / self._period_s, "cycles": figures.cycles, "missed": figures.missed,
+                  "overruns": figures.overruns, "late_p50_us": figures.late_p50_s * 1e6,
+                  "late_p99_us": figures.late_p99_s * 1e6, "late_max_us": figures.late_max_s * 1e6,
+                  "work_mean_us": figures.work_mean_s * 1e6, "work_max_us": figures.work_max_s * 1e6,
+                  "no_processor_us": figures.no_processor_s * 1e6,
+                  "no_processor_max_us": figures.no_processor_max_s * 1e6}
+        status.values = [KeyValue(key, f"{value:.10g}") for key, value in values.items()] + [KeyValue("fault", fault)]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = rospy.Time.now()
+        publish(self._publisher, message)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics and adjustable settings of controllers of mobile bases, under the names of ros_controllers."""
+from __future__ import annotations
+
+import contextlib
+import math
+from typing import Any
+
+import rospy
+from control_msgs.msg import JointTrajectoryControllerState
+from geometry_msgs.msg import Quaternion, TransformStamped, Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from tf2_msgs.msg import TFMessage
+
+from modular_framework_control.controller_interface.controller import ControllerError
+from modular_framework_control.mobile_base.diff_drive_controller import DiffDriveController, WheelState
+from modular_framework_control.mobile_base.four_wheel_steering_controller import (
+    FourWheelSteeringController,
+    SteeringCommand,
+    SteeringSnapshot,
+)
+from modular_framework_control.mobile_base.mobile_base_controller import (
+    BaseFrames,
+    BaseVelocity,
+    MobileBaseController,
+    OdometrySnapshot,
+)
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.ros.outbox import Outbox
+from modular_framework_ros.node_handle import join_names
+from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
+
+QUEUE_SIZE = 100
+DIFF_DRIVE_SETTINGS = (
+    Adjustable("left_wheel_radius_multiplier", 0.5, 1.5, "factor of the radius of the left wheels"),
+    Adjustable("right_wheel_radius_multiplier", 0.5, 1.5, "factor of the radius of the right wheels"),
+    Adjustable("wheel_separation_multiplier", 0.5, 1.5, "factor of the wheel separation"),
+    Adjustable("publish_rate", 0.0, 2000.0, "of the odometry [Hz]; 0: none"),
+    Adjustable("enable_odom_tf", False, True, "publish the frame of the base on tf"))
+
+
+class MobileBaseRosInterface:
+    """Subscribes `<name>/cmd_vel` (geometry_msgs/Twist); publishes `<name>/odom` (nav_msgs/Odometry) and, where that is
+    switched on, the frame of the base on `/tf`."""
+
+    def __init__(self, controller: MobileBaseController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        self._controller, self._name = controller, join_names(namespace, name)
+        self._outbox, self._loop_time = outbox, loop_time
+        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+            self._open(opened)
+            self._opened = opened.pop_all()
+
+    def close(self) -> None:
+        """Close the topics."""
+        self._opened.close()
+
+    def _open(self, opened: contextlib.ExitStack) -> None:
+        odom = self._advertise(opened, "odom", Odometry)
+        tf = self._advertise(opened, "/tf", TFMessage)
+        self._subscribe(opened, "cmd_vel", Twist, lambda twist: BaseVelocity(twist.linear.x, twist.angular.z))
+        frames = self._controller.frames
+
+        def report(snapshot: OdometrySnapshot) -> None:
+            ahead_s = self._loop_time.ahead_s
+            self._outbox.publish(odom, lambda: odometry_to_msg(snapshot, frames, ahead_s))
+            if snapshot.with_tf:
+                self._outbox.publish(tf, lambda: transform_to_msg(snapshot, frames, ahead_s))
+
+        self._controller.on_odometry = report
+
+    def _advertise(self, opened: contextlib.ExitStack, topic: str, kind: Any) -> rospy.Publisher:
+        publisher = rospy.Publisher(self._topic(topic), kind, queue_size=QUEUE_SIZE)
+        opened.callback(publisher.unregister)
+        return publisher
+
+    def _topic(self, topic: str) -> str:
+        return topic if topic.startswith("/") else f"{self._name}/{topic}"
+
+    def _subscribe(self, opened: contextlib.ExitStack, topic: str, kind: Any, command_of: Any) -> None:
+        """Hands each message of a topic to the controller, as what `command_of` makes of it."""
+        name = self._topic(topic)
+        subscribers: list[rospy.Subscriber] = []    # a message may come before there is anything to ask
+
+        def on_message(message: Any) -> None:
+            publishers = sum(subscriber.get_num_connections() for subscriber in subscribers)
+            if publishers > 1 and not self._controller.allows_several_publishers:
+                self._controller.drop_command()
+                rospy.logerr_throttle(1.0, f"{name}: {publishers} publishers; only one is allowed, as "
+                                      f"{self._name}/allow_multiple_cmd_vel_publishers is false: the base is brought "
+                                      "to rest; end the others")
+                return
+            try:
+                self._controller.submit(command_of(message))
+            except ControllerError as error:
+                rospy.logwarn_throttle(1.0, f"{name} ignored: {error}")
+
+        subscribers.append(rospy.Subscriber(name, kind, on_message, queue_size=1))
+        opened.callback(subscribers[0].unregister)
+
+
+class DiffDriveRosInterface(MobileBaseRosInterface):
+    """Publishes besides, where that is switched on, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and
+    `<name>/wheel_joint_controller_state` (control_msgs/JointTrajectoryControllerState); serves dynamic_reconfigure in
+    `<name>`."""
+
+    _controller: DiffDriveController
+
+    def _open(self, opened: contextlib.ExitStack) -> None:
+        super()._open(opened)
+        controller, names = self._controller, self._controller.wheel_names
+        if controller.publishes_command:
+            command = self._advertise(opened, "cmd_vel_out", TwistStamped)
+            controller.on_command = lambda time_s, velocity: self._outbox.publish(
+                command, lambda: velocity_to_msg(time_s + self._loop_time.ahead_s, velocity))
+        if controller.publishes_wheels:
+            wheels = self._advertise(opened, "wheel_joint_controller_state", JointTrajectoryControllerState)
+            controller.on_wheels = lambda time_s, states: self._outbox.publish(
+                wheels, lambda: wheels_to_msg(time_s + self._loop_time.ahead_s, names, states))
+        settings = Reconfiguration(self._name, DIFF_DRIVE_SETTINGS, controller, "settings")
+        opened.callback(settings.close)
+        settings.connect()
+
+
+class FourWheelSteeringRosInterface(MobileBaseRosInterface):
+    """Subscribes besides `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
+    `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped)."""
+
+    _controller: FourWheelSteeringController
+
+    def _open(self, opened: contextlib.ExitStack) -> None:
+        # Imported here, as no other controller needs this package of messages.
+        from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
+
+        super()._open(opened)
+        self._subscribe(opened, "cmd_four_wheel_steering", FourWheelSteering, lambda command: SteeringCommand(
+            command.speed, command.front_steering_angle, command.rear_steering_angle))
+        steer = self._advertise(opened, "odom_steer", FourWheelSteeringStamped)
+        frame = self._controller.frames.odom
+        self._controller.on_steering = lambda snapshot: self._outbox.publish(
+            steer, lambda: fill_steering(FourWheelSteeringStamped(), snapshot, frame, self._loop_time.ahead_s))
+
+
+def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> Odometry:
+    """Where the base is; the stamp is `ahead_s` [s] ahead of the loop's time."""
+    message = Odometry()
+    message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
+    message.header.frame_id, message.child_frame_id = frames.odom, frames.base
+    message.pose.pose.position.x, message.pose.pose.position.y = snapshot.x, snapshot.y
+    message.pose.pose.orientation = _about_z(snapshot.heading)
+    message.twist.twist.linear.x, message.twist.twist.linear.y = snapshot.linear, snapshot.lateral
+    message.twist.twist.angular.z = snapshot.angular
+    for covariance, diagonal in ((message.pose.covariance, frames.pose_covariance),
+                                 (message.twist.covariance, frames.twist_covariance)):
+        covariance[::7] = diagonal
+    return message
+
+
+def transform_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> TFMessage:
+    """The frame of the base in that of the odometry."""
+    transform = TransformStamped(child_frame_id=frames.base)
+    transform.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
+    transform.header.frame_id = frames.odom
+    transform.transform.translation.x, transform.transform.translation.y = snapshot.x, snapshot.y
+    transform.transform.rotation = _about_z(snapshot.heading)
+    return TFMessage([transform])
+
+
+def velocity_to_msg(stamp_s: float, velocity: BaseVelocity) -> TwistStamped:
+    """The velocity that is commanded at `stamp_s` of the ROS clock [s]."""
+    message = TwistStamped()
+    message.header.stamp = rospy.Time.from_sec(stamp_s)
+    message.twist.linear.x, message.twist.angular.z = velocity.linear, velocity.angular
+    return message
+
+
+def fill_steering(message: Any, snapshot: SteeringSnapshot, frame_id: str, ahead_s: float) -> Any:
+    """Write speed of the base and angles of its axles into a FourWheelSteeringStamped; returns it."""
+    message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
+    message.header.frame_id = frame_id
+    data = message.data
+    data.speed, data.acceleration, data.jerk = snapshot.values
+    data.front_steering_angle, data.rear_steering_angle = snapshot.angles
+    data.front_steering_angle_velocity, data.rear_steering_angle_velocity = snapshot.angle_velocities
+    return message
+
+
+def wheels_to_msg(stamp_s: float, names: list[str], states: list[WheelState]) -> JointTrajectoryControllerState:
+    """What the wheels do and what they are commanded; efforts are not commanded, hence not numbers."""
+    message = JointTrajectoryControllerState(joint_names=names)
+    message.header.stamp = rospy.Time.from_sec(stamp_s)
+    unknown = [math.nan] * len(states)
+    message.actual.positions = [state.position for state in states]
+    message.actual.velocities = [state.velocity for state in states]
+    message.actual.accelerations = [state.acceleration for state in states]
+    message.actual.effort = [state.effort for state in states]
+    message.desired.positions = [state.desired_position for state in states]
+    message.desired.velocities = [state.desired_velocity for state in states]
+    message.desired.accelerations = [state.desired_acceleration for state in states]
+    message.error.positions = [state.desired_position - state.position for state in states]
+    message.error.velocities = [state.desired_velocity - state.velocity for state in states]
+    message.error.accelerations = [state.desired_acceleration - state.acceleration for state in states]
+    message.desired.effort = message.error.effort = unknown
+    return message
+
+
+def _about_z(angle: float) -> Quaternion:
+    return Quaternion(0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0))

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The control loop of a robot that is not simulated: hardware, controller manager and time in one node."""
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable
+
+import rospy
+
+from modular_framework_control.hardware_interface.combined_robot_hw import robot_hw_of_type
+from modular_framework_control.hardware_interface.interfaces import EffortJointInterface, VelocityJointInterface
+from modular_framework_control.hardware_interface.plugins import PluginError
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
+from modular_framework_control.realtime.cycle_pacer import CyclePacer, LoopStatistics
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.realtime.scheduling import (
+    keep_processors_awake,
+    prepare_interpreter,
+    run_in_real_time,
+)
+from modular_framework_control.ros.hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
+from modular_framework_control.ros.loop_report import LoopReport
+from modular_framework_control.ros.ros_controller_manager import RosControllerManager
+from modular_framework_ros.node_handle import ParameterError, read_bool, read_number
+from modular_framework_ros.ros_node_handle import RosNodeHandle
+from modular_framework_ros.shutdown import hold_shutdown
+
+COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
+MOCK_TYPE = "modular_framework_control/MockRobotHW"
+CLOCK_TOLERANCE_S = 1e-6
+REST_VELOCITY = 0.01
+"""What is no faster [rad/s|m/s] is at rest, for hardware whose measured velocities are never quite 0."""
+HELD_UP_S = 0.05
+"""A cycle that comes so late, or two periods late, finds the motions where they were."""
+RESTLESS_S = 0.2
+"""How long such hardware is written to before it is believed to be at rest [s]."""
+LONGEST_END_S = 2.0
+"""How long the end of the loop waits for rest [s]."""
+
+
+class RobotHwNode:
+    """Node `robot_hw`; its namespace is that of the robot: there are its controllers, services and parameters.
+
+    Parameters: `robot_hardware`: a list of hardware, each with its parameters in the namespace of that name, which is
+    combined to one robot; without it, `~type` (MockRobotHW of this package) is one hardware, with private parameters.
+    `robot_description` and `joint_limits/...`: limits of the joints, as far as there are any.
+    `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
+    says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
+    itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that
+    is not permitted the log says so once, and the loop runs as it can.
+
+    Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
+    `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning. What
+    `LoopReport` publishes and serves is there as long as the loop runs.
+
+    Args:
+        ended: set by whoever wants the loop to end; controllers are then stopped, goals end, and the hardware is closed
+            while the node can still say so.
+        loop_time: time of the loop, unless the clock is simulated; stamps follow the clock of the system.
+    """
+
+    def __init__(self, ended: threading.Event, loop_time: LoopTime | None = None) -> None:
+        self._ended = ended
+        self._loop_time = loop_time if loop_time is not None else LoopTime()
+        self._nh = RosNodeHandle("~")
+        self._period_s = 1.0 / read_number(self._nh, "rate", 125.0, 1.0)
+        self._loop_time.longest_step_s = max(HELD_UP_S, 2.0 * self._period_s)
+        self._real_time = read_bool(self._nh, "real_time", True)
+        self._ready_timeout_s = read_number(self._nh, "ready_timeout", 60.0)
+        self._root_nh = RosNodeHandle(rospy.get_namespace())
+        listed = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
+        self._hw_nh = self._root_nh if listed else self._nh
+        type_name = COMBINED_TYPE if listed else self._nh.get_param("type", MOCK_TYPE)
+        try:
+            self._robot_hw = robot_hw_of_type(type_name)
+        except PluginError as error:
+            raise ParameterError(f"parameter {self._nh.namespace}/type: unknown hardware type {type_name!r}: "
+                                 f"{error}") from error
+        self._manager: RosControllerManager | None = None
+        self._connected = threading.Event()
+        self._failure = ""
+        self._statistics = LoopStatistics(self._period_s)
+        self._last_s = 0.0
+
+    def connect(self) -> None:
+        """Initialise the hardware.
+
+        Raises:
+            ParameterError: the hardware refused its parameters.
+        """
+        self._warn_of_a_description_elsewhere()
+        if not self._robot_hw.init(self._root_nh, self._hw_nh):
+            raise ParameterError(f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
+                                 "its own message above says why")
+        self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
+        self._readiness.connect()
+        self._manager = RosControllerManager(self._robot_hw, rospy.get_namespace(), loop_time=self._loop_time)
+        self._report = LoopReport(self._statistics, self._period_s, type(self._robot_hw).__name__, self._fault)
+        self._report.connect()
+
+    def _warn_of_a_description_elsewhere(self) -> None:
+        if (rospy.get_namespace() != "/" and not self._root_nh.has_param("robot_description")
+                and RosNodeHandle("/").has_param("robot_description")):
+            rospy.logwarn("/robot_description is not taken, the robot's own is looked for: %s/robot_description. "
+                          "Without one, no limits of joints are known from it", self._root_nh.namespace)
+
+    def _fault(self) -> str:
+        return self._manager.manager.fault if self._manager is not None else ""
+
+    def close(self) -> None:
+        """Close the hardware; may be called twice."""
+        self._robot_hw.close()
+
+    def run(self) -> bool:
+        """Run the control loop until it is told to end; then stop all controllers and bring the robot to rest.
+
+        Returns:
+            Whether it ended because it was told to; otherwise the log says why.
+        """
+        if self._manager is None:
+            raise RuntimeError("connect() comes before run()")
+        starter = threading.Thread(target=self._get_ready, args=(self._manager,), name="get_ready", daemon=True)
+        starter.start()
+        self._prepare()
+        try:
+            self._loop(self._manager)
+        except Exception as error:  # a user's hardware may raise anything
+            self._failure = f"hardware {type(self._robot_hw).__name__} raised {type(error).__name__}: {error}"
+            rospy.logfatal("control loop ends: %s\n%s", self._failure, traceback.format_exc())
+        finally:
+            self._end(self._manager, starter)
+        return not self._failure
+
+    def _prepare(self) -> None:
+        """Asks the system for what the loop needs."""
+        prepare_interpreter()
+        if not self._real_time:
+            return
+        refused = run_in_real_time() + keep_processors_awake()
+        if refused:
+            rospy.logwarn("control loop without: %s", "; ".join(refused))
+
+    def _loop(self, manager: RosControllerManager) -> None:
+        if not self._goes_on():
+            return
+        if rospy.rostime.is_wallclock():
+            self._last_s = self._loop_time.now()
+            pacer = CyclePacer(self._period_s)
+            pacer.run(lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed,
+                                                         pacer.woken_late_s))
+            return
+        self._last_s = rospy.get_time()
+        while self._cycle(manager, rospy.get_time(), 0.0, 0):   # how late it is, is not known
+            self._wait_for_simulated_clock()
+
+    def _cycle(self, manager: RosControllerManager, time_s: float, late_s: float, missed: int,
+               woken_late_s: float = 0.0) -> bool:
+        """Reads, updates, writes; returns whether the loop goes on."""
+        begun_s = time.perf_counter()
+        period_s = max(0.0, time_s - self._last_s)
+        self._last_s = time_s
+        self._robot_hw.read(time_s, period_s)
+        if self._connected.is_set():
+            manager.update(time_s, period_s)
+        self._robot_hw.write(time_s, period_s)
+        self._statistics.add(late_s, missed, time.perf_counter() - begun_s, woken_late_s)
+        return self._goes_on()
+
+    def _goes_on(self) -> bool:
+        return not (self._ended.is_set() or self._failure or rospy.is_shutdown())
+
+    def _wait_for_simulated_clock(self) -> None:
+        """Wait until the simulated clock has gone on by a period, or has jumped back."""
+        begun_s = rospy.get_time()
+        tick = rospy.rostime.get_rostime_cond()
+        while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
+            if not self._goes_on():
+                break
+            with tick:
+                tick.wait(0.1)
+
+    def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
+        """Stop the controllers, bring the robot to rest, close everything.
+
+        The robot comes first: to close is work on the network, which may take long, or fail.
+        """
+        self._ended.set()
+        manager.manager.stop_all()
+        _attempt("bringing the robot to rest", self._bring_to_rest)
+        starter.join(timeout=2.0)
+        _attempt("closing the topics of ready hardware", self._readiness.close)
+        _attempt("closing the controllers", manager.close)
+        _attempt("closing the report of the loop", self._report.close)
+
+    def _bring_to_rest(self) -> None:
+        """Write what the controllers left as commands (velocities and efforts of 0) until nothing moves any more: what
+        brakes, be it the hardware or the limits of its commands, does so cycle by cycle. It goes by real time, as a
+        simulated clock may stand."""
+        begun_s = due_s = time.monotonic()
+        going = self._attempt_last("write")
+        while going and time.monotonic() - begun_s < LONGEST_END_S:
+            if not moves(self._robot_hw, 0.0 if time.monotonic() - begun_s < RESTLESS_S else REST_VELOCITY):
+                break
+            due_s += self._period_s
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            self._last_s += self._period_s
+            going = self._attempt_last("read") and self._attempt_last("write")
+
+    def _attempt_last(self, step: str) -> bool:
+        """Read or write a period after the last cycle; answers whether that succeeded."""
+        return _attempt(f"last {step} of hardware {type(self._robot_hw).__name__}",
+                        lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s))
+
+    def _get_ready(self, manager: RosControllerManager) -> None:
+        """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
+        try:
+            self._readiness.wait(self._ready_timeout_s, self._ended)
+            if rospy.is_shutdown() or self._ended.is_set():
+                return
+            manager.connect()
+            self._connected.set()
+            self._readiness.announce()
+        except Exception as error:  # on this thread nobody else would see it, and the node would run without services
+            if not rospy.is_shutdown():
+                self._failure = str(error) or type(error).__name__
+                rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())
+
+
+def moves(robot_hw: RobotHW, slow: float) -> bool:
+    """Whether a joint that can be commanded is faster than `slow` [rad/s|m/s], or commanded a velocity or effort."""
+    for interface in robot_hw.interfaces:
+        if interface.claims_resources:
+            rates = isinstance(interface, (VelocityJointInterface, EffortJointInterface))
+            for handle in interface.handles:
+                if abs(getattr(handle, "velocity", 0.0)) > slow or (rates and handle.command != 0.0):
+                    return True
+    return False
+
+
+def _attempt(what: str, action: Callable[[], None]) -> bool:
+    try:
+        action()
+    except Exception as error:  # hardware and network may raise anything; what follows must be done all the same
+        rospy.logerr("%s raised %s: %s", what, type(error).__name__, error)
+        return False
+    return True
+
+
+def main() -> int:
+    """Run the node; returns its exit code."""
+    ended, running = threading.Event(), threading.Event()
+
+    def on_signal(number: int, frame: object) -> None:
+        del frame
+        if not running.is_set():  # hardware that takes its time to connect must not hold the end up
+            raise SystemExit(128 + number)
+        ended.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    rospy.init_node("robot_hw", disable_signals=True)
+    finished = hold_shutdown(ended)
+    node: RobotHwNode | None = None
+    try:
+        node = RobotHwNode(ended)
+        node.connect()
+        running.set()
+        return 0 if node.run() else 1
+    except ParameterError as error:
+        rospy.logfatal("%s", error)
+        return 1
+    finally:
+        if node is not None:
+            node.close()
+        finished.set()
+        rospy.signal_shutdown("the control loop has ended")

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The topics of controllers that report sensors: one a sensor, under its name in the namespace of the robot."""
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Quaternion, Vector3, WrenchStamped
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Float64
+
+from modular_framework_control.controllers.sensor_controllers import (
+    ForceTorqueSensorController,
+    ImuSensorController,
+    SensorController,
+    SpeedScalingStateController,
+)
+from modular_framework_control.hardware_interface.handles import (
+    ForceTorqueSensorHandle,
+    ImuSensorHandle,
+    SpeedScalingHandle,
+)
+from modular_framework_control.realtime.loop_time import LoopTime
+from modular_framework_control.ros.outbox import Outbox
+from modular_framework_ros.node_handle import join_names
+
+
+class SensorRosInterface:
+    """Publishes geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units,
+    std_msgs/Float64 for the pace of a robot."""
+
+    def __init__(self, controller: SensorController, namespace: str, name: str, outbox: Outbox,
+                 loop_time: LoopTime) -> None:
+        del name
+        kind, to_msg = next(entry for of, entry in _MESSAGES.items() if isinstance(controller, of))
+        self._publishers = {sensor: rospy.Publisher(join_names(namespace, sensor), kind, queue_size=4)
+                            for sensor in controller.sensor_names}
+
+        def report(time_s: float, handle: Any) -> None:
+            reading = copy.copy(handle)     # the loop goes on to change it
+            outbox.publish(self._publishers[handle.name], lambda: to_msg(time_s + loop_time.ahead_s, reading))
+
+        controller.on_reading = report
+
+    def close(self) -> None:
+        """Close the topics."""
+        for publisher in self._publishers.values():
+            publisher.unregister()
+
+
+def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamped:
+    """What a force-torque sensor measured at `time_s` of the ROS clock [s]."""
+    message = _stamped(WrenchStamped(), time_s, handle.frame_id)
+    message.wrench.force = Vector3(*handle.force)
+    message.wrench.torque = Vector3(*handle.torque)
+    return message
+
+
+def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
+    """What an inertial unit measured at `time_s` of the ROS clock [s]."""
+    message = _stamped(Imu(), time_s, handle.frame_id)
+    message.orientation = Quaternion(*handle.orientation)
+    message.angular_velocity = Vector3(*handle.angular_velocity)
+    message.linear_acceleration = Vector3(*handle.linear_acceleration)
+    message.orientation_covariance = handle.orientation_covariance
+    message.angular_velocity_covariance = handle.angular_velocity_covariance
+    message.linear_acceleration_covariance = handle.linear_acceleration_covariance
+    return message
+
+
+def pace_to_msg(time_s: float, handle: SpeedScalingHandle) -> Float64:
+    """How fast a robot lets itself be moved, 0 to 1; the message has no time."""
+    del time_s
+    return Float64(handle.factor)
+
+
+def _stamped(message: Any, time_s: float, frame_id: str) -> Any:
+    message.header.stamp = rospy.Time.from_sec(time_s)
+    message.header.frame_id = frame_id
+    return message
+
+
+_MESSAGES: dict[type[SensorController], tuple[type[Any], Callable[[float, Any], Any]]] = {
+    ForceTorqueSensorController: (WrenchStamped, wrench_to_msg),
+    ImuSensorController: (Imu, imu_to_msg),
+    SpeedScalingStateController: (Float64, pace_to_msg),
+}

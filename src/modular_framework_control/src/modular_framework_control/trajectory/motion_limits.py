@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a trajectory may ask of joints whose limits are known: positions and velocities, at its points and between them.
+
+Between points the curve is sampled. A motion that is a little too fast is followed: the hardware keeps to its limits,
+and the joint comes a little late.
+"""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits
+from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track
+
+VELOCITY_SHARE = 1.05
+"""Share of a velocity limit up to which a trajectory is followed: time parameterisations interpolate that much over."""
+POINT_MARGIN = 1e-3
+"""How far a point may lie beyond a position limit [rad|m]: rounding of angles."""
+CURVE_MARGIN = 1e-2
+"""How far the curve between points may go beyond a position limit, and how far a joint may fall behind on its way to
+the first point that is followed [rad|m]."""
+_MOST_FAULTS = 8
+_SEGMENTS_AT_ONCE = 1024
+_NO_SPEED = "with it the joint may not move at all: correct it in robot_description or joint_limits"
+
+# Chebyshev nodes, whose largest sample is at most 2 % (velocity) below the largest value of a quintic segment.
+_NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 33))
+_POSITION_BASIS = _NODES[:, np.newaxis] ** np.arange(6)
+_VELOCITY_BASIS = np.arange(6) * _NODES[:, np.newaxis] ** np.maximum(np.arange(6) - 1, 0)
+
+
+class _Kind(Enum):
+    POINT_POSITION = "position"
+    POINT_VELOCITY = "velocity"
+    CURVE_POSITION = "position on the way"
+    CURVE_VELOCITY = "velocity on the way"
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """Limits of some joints; infinite where none is known.
+
+    Attributes:
+        lowest: smallest positions [rad|m], shape (joints,).
+        highest: largest positions [rad|m], shape (joints,).
+        fastest: largest velocities [rad/s|m/s], shape (joints,).
+        braking: largest decelerations [rad/s^2|m/s^2], shape (joints,).
+    """
+
+    lowest: Array
+    highest: Array
+    fastest: Array
+    braking: Array
+
+    @classmethod
+    def of(cls, limits: Sequence[JointLimits]) -> MotionLimits:
+        """The limits of joints, in their order."""
+        return cls(np.array([limit.min_position for limit in limits]),
+                   np.array([limit.max_position for limit in limits]),
+                   np.array([limit.max_velocity for limit in limits]),
+                   np.array([limit.max_acceleration for limit in limits]))
+
+    def of_joints(self, joints: Sequence[int]) -> MotionLimits:
+        """Those of some of the joints, by index."""
+        chosen = list(joints)
+        return MotionLimits(self.lowest[chosen], self.highest[chosen], self.fastest[chosen], self.braking[chosen])
+
+    def with_positions(self, positions: Array) -> MotionLimits:
+        """The same, widened to where the joints are, shape (joints,): one that stands outside may come back."""
+        return MotionLimits(np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest,
+                            self.braking)
+
+
+class LimitViolations:
+    """Everything that a trajectory asks beyond limits; a point that is left out, and the way to it, do not count.
+
+    Args:
+        names: the joints of the trajectory.
+        limits: their limits.
+        here: where they are, shape (joints,).
+    """
+
+    def __init__(self, names: Sequence[str], limits: MotionLimits, here: Array) -> None:
+        self._names = tuple(names)
+        self._limits = limits
+        self._here = here
+        self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []
+
+    def add(self, kind: _Kind, values: Array, beyond: NDArray[np.bool_], first_point: int) -> None:
+        """Note values, shape (points, joints), where `beyond`, the first row being of `first_point`."""
+        if beyond.any():
+            indices: NDArray[np.int64] = np.argwhere(beyond) + (first_point, 0)
+            self._found.append((kind, indices, values[beyond]))
+
+    def text(self, first: int = 0, first_segment: int = 1) -> str:
+        """The excesses in one text, of very many only the first few; "" when there are none.
+
+        Args:
+            first: the first point that counts.
+            first_segment: the first point whose way to it counts.
+        """
+        described: list[str] = []
+        count = 0
+        for kind, indices, values in self._found:       # may be very many, and the control loop asks
+            begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_segment
+            counted = np.flatnonzero(indices[:, 0] >= begin)
+            count += len(counted)
+            described += [self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
+                          for i in counted[:_MOST_FAULTS - len(described)]]
+        more = count - len(described)
+        return "; ".join(described) + (f"; and {more} more" if more else "")
+
+    def _described(self, kind: _Kind, point: int, joint: int, value: float) -> str:
+        name, allowed, fastest = self._names[joint], self._range(joint), self._limits.fastest[joint]
+        match kind:
+            case _Kind.POINT_POSITION:
+                return (f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within "
+                        "them")
+            case _Kind.POINT_VELOCITY:
+                return (f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; "
+                        + ("give a lower velocity" if fastest > 0.0 else _NO_SPEED))
+            case _Kind.CURVE_POSITION:
+                return (f"on the way to point {point} joint '{name}' comes to {value:.6g}; {allowed}; give the points "
+                        " other velocities, or points in between")
+            case _Kind.CURVE_VELOCITY:
+                return (f"on the way to point {point} joint '{name}' reaches the velocity {value:.6g}; its limit is "
+                        f"{fastest:.6g}; " + ("give the point a later time_from_start" if fastest > 0.0 else _NO_SPEED))
+
+    def _range(self, joint: int) -> str:
+        lowest, highest, here = self._limits.lowest[joint], self._limits.highest[joint], self._here[joint]
+        outside = f" (it stands outside, at {here:.6g})" if not lowest <= here <= highest else ""
+        return f"its limits are {lowest:.6g} to {highest:.6g}{outside}"
+
+
+def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits, here: Array) -> LimitViolations:
+    """What a trajectory asks beyond limits, at its points and between them.
+
+    Args:
+        spline: the trajectory.
+        names: its joints.
+        limits: their limits.
+        here: where they are, shape (joints,); one that stands outside its range may come back.
+    """
+    found = LimitViolations(names, limits, here)
+    limits = limits.with_positions(here)
+    positions, velocities = spline.states[:, POSITION], spline.states[:, VELOCITY]
+    found.add(_Kind.POINT_POSITION, positions,
+              (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN), 0)
+    found.add(_Kind.POINT_VELOCITY, velocities, np.abs(velocities) > VELOCITY_SHARE * limits.fastest, 0)
+    if np.isfinite(limits.fastest).any() or np.isfinite(limits.lowest).any() or np.isfinite(limits.highest).any():
+        durations_s = np.diff(spline.times_s)
+        for begin in range(0, len(durations_s), _SEGMENTS_AT_ONCE):
+            chosen = slice(begin, begin + _SEGMENTS_AT_ONCE)
+            ways = _SegmentExtremes(spline.coefficients[chosen], durations_s[chosen])
+            found.add(_Kind.CURVE_VELOCITY, ways.velocities, np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest,
+                      begin + 1)
+            _add_positions(found, ways, limits, begin + 1)
+    return found
+
+
+def first_segment_violations(track: Track, names: Sequence[str], limits: MotionLimits, here: Array, point: int) -> str:
+    """What the way from the present motion to the first point that is followed asks beyond limits; "" for nothing.
+
+    Args:
+        track: the motion, as it was joined to the one so far.
+        names: its joints.
+        limits: their limits.
+        here: where they are, shape (joints,).
+        point: number of that point.
+    """
+    found = LimitViolations(names, limits, here)
+    limits = limits.with_positions(here)
+    coefficients, duration_s = track.first_segment()
+    ways = _SegmentExtremes(coefficients[np.newaxis], np.array([duration_s]))
+    speeds = np.abs(ways.velocities)
+    late = (speeds - limits.fastest) * duration_s > CURVE_MARGIN
+    found.add(_Kind.CURVE_VELOCITY, ways.velocities, late & (speeds > VELOCITY_SHARE * limits.fastest), point)
+    _add_positions(found, ways, limits, point)
+    return found.text(point, point)
+
+
+def _add_positions(found: LimitViolations, ways: _SegmentExtremes, limits: MotionLimits, first_point: int) -> None:
+    found.add(_Kind.CURVE_POSITION, ways.lowest, ways.overshoots & (ways.lowest < limits.lowest - CURVE_MARGIN),
+              first_point)
+    found.add(_Kind.CURVE_POSITION, ways.highest, ways.overshoots & (ways.highest > limits.highest + CURVE_MARGIN),
+              first_point)
+
+
+class _SegmentExtremes:
+    """Extremes of polynomial segments.
+
+    Args:
+        coefficients: of shape (segments, 6, joints).
+        durations_s: of the segments [s], shape (segments,).
+
+    Attributes:
+        lowest, highest: positions, shape (segments, joints).
+        overshoots: whether one of them lies beyond both ends of the segment, shape (segments, joints).
+        velocities: those largest in size, shape (segments, joints).
+    """
+
+    def __init__(self, coefficients: Array, durations_s: Array) -> None:
+        scaled = coefficients * durations_s[:, np.newaxis, np.newaxis] ** np.arange(6)[:, np.newaxis]
+        positions = _POSITION_BASIS @ scaled
+        self.lowest: Array = positions.min(axis=1)
+        self.highest: Array = positions.max(axis=1)
+        begin, end = positions[:, 0], positions[:, -1]
+        self.overshoots = (self.lowest < np.minimum(begin, end)) | (self.highest > np.maximum(begin, end))
+        velocities = _VELOCITY_BASIS @ scaled / durations_s[:, np.newaxis, np.newaxis]
+        upper, lower = velocities.max(axis=1), velocities.min(axis=1)
+        self.velocities: Array = np.where(upper > -lower, upper, lower)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How joints come to rest when a motion is broken off: where they are, as fast as they may.
+
+A stop begins at the measured state, whatever was desired: a trajectory that the joints could not follow has nothing to
+say about where they end.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from modular_framework_control.trajectory.joint_trajectory import (
+    POSITION,
+    SHORTEST_SEGMENT_S,
+    VELOCITY,
+    Array,
+    Track,
+    segment_coefficients,
+)
+from modular_framework_control.trajectory.motion_limits import MotionLimits
+
+FOLLOWING_LAG_S = 0.05
+"""How late a moving joint may follow [s]: at its measured velocity it is that far behind commands on their way, and a
+ramp goes on from them. Set by an arm that follows over a network 0.03 s late; a slower one is brought back a little as
+it brakes."""
+COMMAND_S = 0.01
+"""How old the last command is at most [s]; so much of the desired motion a joint has not begun to follow."""
+FOLLOWING_SHARE = 0.1
+"""How different the measured velocity of a joint that follows may be, as a share of the desired one, which a ramp then
+goes on from: measured velocities are late and noisy."""
+PEAK_OF_RAMP = 1.5
+"""Largest deceleration of a ramp, as a multiple of its mean one."""
+
+
+class StopMotion:
+    """Makes the motion in which joints stop.
+
+    Args:
+        duration_s: of a ramp [s], longer where a joint may not brake that hard; 0 to hold the measured positions.
+        limits: of the joints.
+    """
+
+    def __init__(self, duration_s: float, limits: MotionLimits) -> None:
+        self._duration_s = duration_s
+        self._limits = limits
+
+    def holds(self, rate: float) -> bool:
+        """Whether the joints are held where they are, at this rate of the trajectories' clock, and not slowed down."""
+        return self._duration_s * rate <= SHORTEST_SEGMENT_S
+
+    def tracks(self, desired: Array, actual: Array, time_s: float, rate: float) -> list[Track]:
+        """The motion of all joints from `time_s` on.
+
+        Args:
+            desired: positions and velocities desired now, shape (3, joints) or (2, joints).
+            actual: positions and velocities measured, shape (2, joints).
+            time_s: now [s of the trajectories' clock].
+            rate: how fast that clock runs, 0 to 1; a slowed robot has as much less speed to lose.
+        """
+        limits = self._limits
+        joints = range(actual.shape[1])
+        if self.holds(rate):
+            return [Track.hold(list(joints), actual[POSITION], time_s)]
+        follows = np.abs(desired[VELOCITY] - actual[VELOCITY]) <= FOLLOWING_SHARE * np.abs(desired[VELOCITY])
+        velocity = np.clip(np.where(follows, desired[VELOCITY], actual[VELOCITY]), -limits.fastest, limits.fastest)
+        under_way = (FOLLOWING_LAG_S * np.minimum(np.abs(actual[VELOCITY]), limits.fastest)
+                     + COMMAND_S * np.minimum(np.abs(desired[VELOCITY]), limits.fastest))
+        ahead = np.clip(desired[POSITION] - actual[POSITION], -under_way, under_way)
+        limits = limits.with_positions(actual[POSITION])
+        position = np.clip(actual[POSITION] + ahead, limits.lowest, limits.highest)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            braking_s = np.where(limits.braking > 0.0, PEAK_OF_RAMP * np.abs(velocity) / limits.braking, 0.0)
+        durations_s = rate * np.maximum(self._duration_s, braking_s)
+        return [_ramp(joint, (position[joint], velocity[joint] / rate), time_s, durations_s[joint],
+                      limits.highest[joint] if velocity[joint] > 0.0 else limits.lowest[joint]) for joint in joints]
+
+
+def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: float, bound: float) -> Track:
+    """A velocity that falls as 1 - 3s^2 + 2s^3, so that half of the way without it is gone; `bound` ends it earlier."""
+    position, velocity = start
+    left = abs(bound - position)
+    if 0.5 * abs(velocity) * duration_s > left:
+        duration_s = 2.0 * left / abs(velocity)
+    begin, end = np.zeros((3, 1)), np.zeros((3, 1))
+    begin[POSITION], begin[VELOCITY] = position, velocity
+    if duration_s <= SHORTEST_SEGMENT_S:
+        return Track.hold([joint], begin[POSITION], time_s)
+    end[POSITION] = position + 0.5 * duration_s * velocity
+    coefficients = segment_coefficients(begin, end, duration_s, 5)[np.newaxis]
+    return Track([joint], [time_s], coefficients, time_s + duration_s, end[POSITION], time_s)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is asked of a trajectory controller and what it answers: goal, result code, snapshot of its state."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from modular_framework_control.realtime.goal_handle import RealtimeGoalHandle
+from modular_framework_control.trajectory.joint_trajectory import Array, JointTrajectory
+from modular_framework_control.trajectory.tolerances import JointTolerance
+
+
+class TrajectoryErrorCode(IntEnum):
+    """Result codes of control_msgs/FollowJointTrajectory."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+class GoalRejectedError(Exception):
+    """A goal that the controller will not take up; carries the result code."""
+
+    def __init__(self, code: TrajectoryErrorCode, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+
+
+TrajectoryGoalHandle = RealtimeGoalHandle[TrajectoryErrorCode]
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryGoal:
+    """What an action client asks for.
+
+    Attributes:
+        trajectory: the motion.
+        path_tolerance: by joint name.
+        goal_tolerance: by joint name.
+        goal_time_tolerance_s: positive replaces the default [s], 0 keeps it, negative means no time at all.
+    """
+
+    trajectory: JointTrajectory
+    path_tolerance: Mapping[str, JointTolerance] = field(default_factory=dict)
+    goal_tolerance: Mapping[str, JointTolerance] = field(default_factory=dict)
+    goal_time_tolerance_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectorySnapshot:
+    """State of the controller in one cycle.
+
+    Attributes:
+        time_s: time of the cycle [s].
+        desired: position, velocity, acceleration, shape (3, joints).
+        actual: position, velocity, shape (2, joints).
+        error: desired minus actual, shape (2, joints).
+        elapsed_s: how far the trajectory has come since its time_from_start 0 [s].
+    """
+
+    time_s: float
+    desired: Array
+    actual: Array
+    error: Array
+    elapsed_s: float = 0.0
