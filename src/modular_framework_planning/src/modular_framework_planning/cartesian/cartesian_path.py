@@ -21,8 +21,8 @@ from modular_framework_planning.kinematics.pose_follower import PoseFollower
 
 LONGEST_STEP_M = 0.01  # a longer max_step is followed in steps of this length
 RADIANS_PER_METRE = 3.5  # a step of 0.01 m may turn by 0.035 rad, as in MoveIt
-MOST_STEPS = 50_000  # of one request
-FEWEST_STEPS_FOR_MEAN = 10  # of a line, where a jump is judged by the mean step
+MAX_STEPS = 50_000  # of one request
+MIN_STEPS_FOR_MEAN = 10  # of a line, where a jump is judged by the mean step
 
 Objection = Callable[[Array, Array], str]
 
@@ -130,8 +130,8 @@ def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints:
 def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: JumpThresholds) -> None:
     if not waypoints:
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "waypoints: there is none; give at least one pose")
-    if len(waypoints) > MOST_STEPS:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"waypoints: {len(waypoints)}; at most {MOST_STEPS} are "
+    if len(waypoints) > MAX_STEPS:
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"waypoints: {len(waypoints)}; at most {MAX_STEPS} are "
                             "followed: thin them out")
     if not (np.isfinite(max_step_m) and max_step_m > 0.0):
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_step is {max_step_m}; a length above 0 m is needed")
@@ -144,9 +144,9 @@ def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: Ju
 
 def _require_countable(lines: Sequence[_Line], max_step_m: float) -> None:
     steps = sum(line.count for line in lines)
-    if steps > MOST_STEPS:
+    if steps > MAX_STEPS:
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{len(lines)} waypoints with max_step {max_step_m} m take "
-                            f"{steps} steps; at most {MOST_STEPS} are followed: choose a longer step or fewer lines")
+                            f"{steps} steps; at most {MAX_STEPS} are followed: choose a longer step or fewer lines")
 
 
 class _Line:
@@ -154,7 +154,15 @@ class _Line:
 
     def __init__(self, follower: PoseFollower, ends: tuple[Transform, Transform, Transform], step_m: float,
                  jumps: JumpThresholds, objection: Objection) -> None:
-        """Args: ends: first and last pose of what follows the line, and pose of the follower's link in its frame."""
+        """Divides the line into steps.
+
+        Args:
+            follower: solves for the joints.
+            ends: first and last pose of what follows the line, and pose of the follower's link in its frame.
+            step_m: longest step [m].
+            jumps: what counts as a jump.
+            objection: says why a step is not allowed, or nothing.
+        """
         start, end, self._to_link = ends
         self._follower, self._start, self._end = follower, start, end
         self._jumps, self._objection = jumps, objection
@@ -162,7 +170,7 @@ class _Line:
         length = float(np.linalg.norm(end.translation - start.translation))
         angle = float(np.linalg.norm(self._turn))
         self.count = max(1, int(np.ceil(max(length / step_m, angle / (RADIANS_PER_METRE * step_m)) - 1e-9)),
-                         FEWEST_STEPS_FOR_MEAN if jumps.factor > 0.0 else 1)
+                         MIN_STEPS_FOR_MEAN if jumps.factor > 0.0 else 1)
 
     def _pose(self, number: int) -> Transform:
         share = number / self.count

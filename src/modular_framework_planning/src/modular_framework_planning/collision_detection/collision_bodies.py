@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lists the bodies that may bump into each other in a scene, and which pairs of them are watched."""
+"""Lists the bodies of a scene that can collide, and the pairs of them that are checked."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ class PlacedGeometry:
     """A collision geometry of a body.
 
     Attributes:
-        joint_id: Pinocchio's number of the joint it hangs on, 0 for the world.
+        joint_id: Pinocchio's number of the joint that moves it, 0 for the world.
         placement: pose in that joint's frame.
         source: the shape, which never changes.
         margin: distance it keeps from bodies of the world [m].
@@ -43,7 +43,7 @@ class PlacedGeometry:
 
 @dataclass(frozen=True, slots=True)
 class WatchedPair:
-    """Two geometries (by number) that may not come closer than `margin` [m]; `is_fixed` where no joint moves them."""
+    """Two geometries, by index, that may not come closer than `margin` [m]; `is_fixed` where no joint moves them."""
 
     first: int
     second: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Answers "does this state or this motion collide?": compiled bounds first, Coal's exact check of what they leave open.
+"""Checks states and motions for collisions: compiled bounds first, Coal's exact check of what they leave open.
 
 A state is called free only where every pair of bodies was proved apart, or where Coal says so.
 """
@@ -75,7 +75,7 @@ class CollisionChecker:
         return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
-        """Builds now what the first question would build: seconds for 100,000 triangles.
+        """Builds now what the first check would build: it takes seconds for 100,000 triangles.
 
         Args:
             check_interrupt: called between shapes; raises an exception to stop. What was built is kept.

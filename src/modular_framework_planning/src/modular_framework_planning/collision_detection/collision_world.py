@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the bodies of a scene and the pairs to watch into the arrays that compiled collision checks work on."""
+"""Puts the bodies of a scene and the pairs to check into the arrays that compiled collision checks work on."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence

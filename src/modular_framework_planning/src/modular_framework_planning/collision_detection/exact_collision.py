@@ -15,7 +15,7 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 ROUNDING = 1.0e-9  # [m]
-MOST_CONTACTS = 20  # of a pair, of which the deepest is reported
+MAX_CONTACTS = 20  # of a pair, of which the deepest is reported
 
 
 class ExactCollision:
@@ -83,7 +83,7 @@ class ExactCollision:
             if self._is_far(number):
                 continue
             if self._collide(number, coal.CollisionRequest()).isCollision():  # without contacts: much faster
-                result = self._collide(number, coal.CollisionRequest(coal.CONTACT, MOST_CONTACTS))
+                result = self._collide(number, coal.CollisionRequest(coal.CONTACT, MAX_CONTACTS))
                 found.append((number, self._contact(number, result)))
         return found
 

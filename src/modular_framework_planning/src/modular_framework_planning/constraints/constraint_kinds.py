@@ -18,7 +18,7 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 
 SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
 INSIDE = 1.0e-5  # [m]; projections aim this far inside a region, not at its border
-INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight ways between two states bulge
+INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight motions between two states bulge
 TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
 Row = tuple[Array, float]  # one linearised condition: (joint velocities -> change, change that is wanted)
 
@@ -88,7 +88,7 @@ class JointConstraint:
         return float(np.arctan2(np.sin(value), np.cos(value))) if self.is_continuous else value
 
     def evaluate(self, _: Any, positions: Array) -> ConstraintResult:
-        """Returns the verdict on a state."""
+        """Evaluates a state."""
         value = self.deviation(positions)
         kept = -self.below - SLACK <= value <= self.above + SLACK
         text = (f"joint '{self.name}' is {value:+.4f} from {self.target:.4f}; allowed is -{self.below:.4f} to "
@@ -132,7 +132,7 @@ class PositionConstraint:
         return best
 
     def evaluate(self, data: Any, _: Array) -> ConstraintResult:
-        """Returns the verdict on the state whose joint placements `data` holds."""
+        """Evaluates the state whose joint placements `data` holds."""
         distance, _nearest, inside, _region, _solid = self._gap(data)
         text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
         return ConstraintResult("position", self.link.name, distance <= SLACK,
@@ -183,7 +183,7 @@ class OrientationConstraint:
         return angles, turned
 
     def evaluate(self, data: Any, _: Array) -> ConstraintResult:
-        """Returns the verdict on the state whose joint placements `data` holds."""
+        """Evaluates the state whose joint placements `data` holds."""
         angles = np.abs(self.deviation(data)[0])
         excess = float((angles - self.tolerances).max())
         text = (f"link '{self.link.name}' is turned {np.array2string(angles, precision=4)} rad about x, y, z; allowed "

@@ -20,7 +20,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 MAX_STEP = 0.3  # [rad or m]; of any joint in one step of a projection
 DAMPING = 1.0e-6
-LOOSE = 0.02  # [m] or [rad]; tolerances above this are worth looking around in
+LOOSE = 0.02  # [m] or [rad]; tolerances above this are worth sampling in
 Index = Sequence[int] | NDArray[np.int64]
 
 

@@ -157,7 +157,10 @@ class HullSolid:
     """The convex hull of a mesh (as in MoveIt, whose mesh regions are hulls)."""
 
     def __init__(self, vertices: Array) -> None:
-        """Args: vertices of the mesh, shape (n, 3) [m].
+        """Computes the hull.
+
+        Args:
+            vertices: of the mesh, shape (n, 3) [m].
 
         Raises:
             GeometryError: they are fewer than four, not finite, or in one plane.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns positions and xyzw quaternions into rigid transforms, and refuses numbers that are not a pose."""
+"""Makes rigid transforms of positions and xyzw quaternions, and refuses numbers that are not a pose."""
 from __future__ import annotations
 
 import logging

@@ -59,7 +59,13 @@ class ChainModel:
     """The kinematic chain from the planning frame to the last link of a group."""
 
     def __init__(self, model: RobotModel, group: JointGroup, last_link: str) -> None:
-        """Args: the robot, the group whose joints move the chain, the link at its end."""
+        """Reads the chain from the model.
+
+        Args:
+            model: the robot.
+            group: whose joints move the chain.
+            last_link: at the end of the chain.
+        """
         frame = model.pin_model.frames[model.frame_ids[last_link]]
         path = [int(number) for number in model.pin_model.supports[frame.parentJoint] if number > 0]
         self.positions = np.array([number - 1 for number in path], dtype=np.int64)  # indices in a position vector

@@ -34,7 +34,7 @@ FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it
 MAX_TURNS = 4096
 POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 25, 20
 STARTS_A_BATCH = 4
-LEAST_BATCHES = 8  # tried even where the time is over, so that a busy machine does not turn poses unreachable
+MIN_BATCHES = 8  # tried even where the time is over, so that a busy machine does not turn poses unreachable
 FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
 ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
 APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
@@ -210,7 +210,7 @@ class InverseKinematics:
             rows = rows[unique_rows(rows, problem.turning, SAME_SOLUTION)]
             fruitless = fruitless + 1 if len(rows) == len(found) else 0
             found, batches = rows, batches + 1
-            if time.monotonic() > problem.deadline and (len(found) or batches >= LEAST_BATCHES):
+            if time.monotonic() > problem.deadline and (len(found) or batches >= MIN_BATCHES):
                 break
             starts = rng.uniform(lower, upper, (STARTS_A_BATCH, len(lower)))
         return whole_turns(found, problem.turning, problem.lower, problem.upper, MAX_TURNS)
@@ -286,7 +286,12 @@ class KinematicsPool:
     """Builds the solver of each group once."""
 
     def __init__(self, model: RobotModel, settings: Mapping[str, KinematicsSettings] | None = None) -> None:
-        """Args: the robot; settings of groups, by name."""
+        """Stores what solvers are built from.
+
+        Args:
+            model: the robot.
+            settings: by name of the group.
+        """
         self._model = model
         self._settings = dict(settings or {})
         self._solvers: dict[str, InverseKinematics] = {}

@@ -15,7 +15,7 @@ SIMILAR = 0.1  # [rad]; distances from the seed that differ by less are decided 
 def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: int = 1) -> list[Array]:
     """Returns the first candidates that are free, in their order.
 
-    Whole turns of a joint look the same to every obstacle, so each posture is checked once.
+    A whole turn of a joint leads to the same posture, so each posture is checked once.
     """
     verdicts: dict[bytes, bool] = {}
     free: list[Array] = []

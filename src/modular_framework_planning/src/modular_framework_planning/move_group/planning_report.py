@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells why: every planning, kinematics and execution result goes to the log once and to ~planning_report as JSON."""
+"""Reports every planning, kinematics and execution result: in the log once, and on ~planning_report as JSON."""
 from __future__ import annotations
 
 import itertools
@@ -19,7 +19,11 @@ class Reporter:
     """Publishes ~planning_report (std_msgs/String, JSON) and, if asked to, ~motion_plan_request (latched)."""
 
     def __init__(self, publish_requests: bool = False) -> None:
-        """Args: whether requests for plans are published, as MoveIt does with the argument --debug."""
+        """Advertises the topics.
+
+        Args:
+            publish_requests: whether requests for plans are published, as MoveIt does with the argument --debug.
+        """
         self._ids = itertools.count(1)
         self._publisher = rospy.Publisher(names.REPORT_TOPIC, String, queue_size=100)
         self._requests = rospy.Publisher(names.REQUEST_TOPIC, MotionPlanRequest, queue_size=10,

@@ -91,7 +91,7 @@ class VoxelMap:
         steps = np.repeat(np.array([MISS, HIT, LOWEST - HIGHEST], np.float32), [len(free), len(occupied), len(masked)])
         order = np.argsort(keys, kind="stable")
         keys, steps = keys[order], steps[order]
-        last = np.append(keys[1:] != keys[:-1], True)[:len(keys)]  # of several verdicts on a voxel the strongest
+        last = np.append(keys[1:] != keys[:-1], True)[:len(keys)]  # of several updates of a voxel the strongest
         return VoxelMap(self.resolution, *merged(self.keys, self.values, keys[last], steps[last], LOWEST, HIGHEST))
 
     def with_point_cloud(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:

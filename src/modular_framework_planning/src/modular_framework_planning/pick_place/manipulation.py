@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans a grasp or a release: go there, approach on a straight line, move the fingers, leave on a straight line.
+"""Plans a grasp or a release: to the approach, along it in a straight line, fingers, retreat in a straight line.
 
 Picking and placing differ in what the fingers and the scene do in the middle, and in what may touch on the two lines.
 """
@@ -149,7 +149,7 @@ class ManoeuvrePlanner:
         return self._deadline_s - time.monotonic()
 
     def plan(self, manoeuvre: Manoeuvre, allowed_time_s: float) -> tuple[Stage, ...]:
-        """Returns the stages of one manoeuvre; the plan of the way to it may take `allowed_time_s`.
+        """Returns the stages of one manoeuvre; the plan of the motion to its approach may take `allowed_time_s`.
 
         Raises:
             PlanningError: which stage cannot be done, and why.
@@ -245,7 +245,7 @@ class ManoeuvrePlanner:
                              self._settings.cartesian_motion_step_size, objection=self._objection(scene))
 
     def _plan_to_approach(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
-        """Plans from where the robot is to the begin of the approach, with nothing allowed to touch."""
+        """Plans from where the robot is to the start of the approach, with nothing allowed to touch."""
         group, template = self._arm.group, self._template
         allowed_s = min(self.remaining_s, allowed_time_s)
         if allowed_s <= 0.0:

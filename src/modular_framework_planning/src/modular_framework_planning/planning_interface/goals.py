@@ -28,8 +28,8 @@ from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
 from modular_framework_planning.robot_model.robot_model import JointGroup
 
 MAX_GOAL_STATES = 8
-MOST_SAMPLES = 64  # states tried within the tolerances of one goal
-MOST_POSES = 16  # poses tried within the tolerances of one goal
+MAX_SAMPLES = 64  # states tried within the tolerances of one goal
+MAX_POSES = 16  # poses tried within the tolerances of one goal
 
 
 class GoalResolver:
@@ -116,8 +116,8 @@ class GoalResolver:
         if self._is_valid(target):
             return target
         if (high > low).any():
-            for number in range(MOST_SAMPLES):
-                share = (number + 1) / MOST_SAMPLES
+            for number in range(MAX_SAMPLES):
+                share = (number + 1) / MAX_SAMPLES
                 values = target + share * (self._rng.uniform(low, high) - target)
                 if self._is_valid(values):
                     return values
@@ -179,7 +179,7 @@ class GoalResolver:
         seed, indices = self._request.scene.positions, self._group.indices
         to_link = allowed.pose_target(seed).inverse() * goal.target
         found: list[Array] = []
-        for _ in range(MOST_POSES):
+        for _ in range(MAX_POSES):
             target = allowed.pose_target(seed, self._rng) * to_link
             solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng)
             found += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
@@ -190,7 +190,7 @@ class GoalResolver:
         seed, indices = self._request.scene.positions, self._group.indices
         free: list[Array] = []
         rejected: list[Array] = []
-        for number in range(MOST_SAMPLES):
+        for number in range(MAX_SAMPLES):
             found = constraints.project(seed, indices) if number == 0 else (
                 constraints.sample(self._rng, seed, indices, 1))
             if found is not None:

@@ -11,7 +11,11 @@ class PlannerConfigurations:
     """Settings by name, for all groups or for one; safe to share between threads."""
 
     def __init__(self, named: Mapping[str, Mapping[str, Any]]) -> None:
-        """Args: planner_configs of the pipeline's parameters."""
+        """Copies the settings.
+
+        Args:
+            named: planner_configs of the pipeline's parameters.
+        """
         self._lock = threading.Lock()
         self._entries: dict[tuple[str, str], dict[str, Any]] = {
             ("", name): dict(entry or {}) for name, entry in named.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a planner is given and what it gives back: the one interface between the pipelines and every planner."""
+"""Problem, path and protocols: the one interface between the pipelines and every planner."""
 from __future__ import annotations
 
 import time

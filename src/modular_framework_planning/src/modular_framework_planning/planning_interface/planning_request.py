@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a planner is asked and what it answers, free of messages."""
+"""Requests to the planner and its answers, free of messages."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -122,7 +122,7 @@ class PipelineSettings:
 
     @property
     def finest_step(self) -> float:
-        """Distance of states looked at before a motion is returned [rad or m]: bodies that graze touch but briefly."""
+        """Distance of states checked before a motion is returned [rad or m]: bodies that graze touch only briefly."""
         return self.motion_step / PARTS_OF_MOTION_STEP
 
     def default_planner(self, group: str) -> str:
@@ -149,7 +149,7 @@ class AuxiliaryPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanningRequest:
-    """One question to the planner.
+    """One request to the planner.
 
     Attributes:
         scene: snapshot with the start positions and attached objects already in it.

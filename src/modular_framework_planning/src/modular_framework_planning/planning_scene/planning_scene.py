@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Holds what the robot may bump into as immutable snapshots, so that plans under way never see a half-made change."""
+"""The planning scene as immutable snapshots, so that plans under way never see a half-made change."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence, Set
@@ -57,7 +57,7 @@ class PlanningScene:
     """One version of the world: objects, attached objects, allowed collisions and the robot's positions.
 
     Every `with_...` method returns a new snapshot with a new version number; the old one stays as it is.
-    `geometry_version` is new whenever the verdict on a state may be another one.
+    `geometry_version` is new whenever a collision check of a state may have another result.
     """
 
     model: RobotModel

@@ -38,7 +38,12 @@ class SeededPlanning:
     """Hands requests to the worker process, which starts with the first of them; threads may share it."""
 
     def __init__(self, model: RobotModel, specs: Sequence[PipelineSpec]) -> None:
-        """Args: the robot; how the pipelines are built."""
+        """Stores what the worker will build.
+
+        Args:
+            model: the robot.
+            specs: of the pipelines.
+        """
         self._model, self._specs = model, tuple(specs)
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None

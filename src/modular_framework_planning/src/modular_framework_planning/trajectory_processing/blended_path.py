@@ -22,7 +22,12 @@ class BlendedPath:
     """
 
     def __init__(self, vertices: Array, blends: Array) -> None:
-        """Args: vertices of shape (n, joints), n >= 2; distance d of each inner corner, shape (n - 2,), above 0."""
+        """Computes the pieces.
+
+        Args:
+            vertices: of the polyline, shape (n, joints), n >= 2 [rad or m].
+            blends: distance d of each inner corner, shape (n - 2,), above 0 [rad or m].
+        """
         self.start, self.end = vertices[0], vertices[-1]
         spans = np.diff(vertices, axis=0)
         lengths = np.linalg.norm(spans, axis=1)

@@ -10,7 +10,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.time_parameterization import MARGIN, joined, overrun, point_times
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-MOST_DEVIATION = 2.0e-3  # [rad or m] that averaging may take a curve off its path
+MAX_DEVIATION = 2.0e-3  # [rad or m] that averaging may take a curve off its path
 SHORTEST_LENGTH = 1.0e-9  # [rad or m]
 
 
@@ -93,14 +93,14 @@ def averaged_curve(trajectory: Trajectory, velocity: Array, acceleration: Array,
     """Returns a motion averaged over so long a window that its jerk keeps the limits.
 
     The window is 2 a / j for the hardest joint. Averaging takes curves off their path by a w^2 / 24, which running
-    slower by k first lessens by k^6; k is chosen for MOST_DEVIATION.
+    slower by k first lessens by k^6; k is chosen for MAX_DEVIATION.
     """
     if len(trajectory.times) < 2:
         return trajectory
     strongest = np.abs(trajectory.at(trajectory.sample_times())[2]).max(axis=0)
     window = float((2.0 * strongest / jerk).max())
     deviation = float(strongest.max()) * window * window / 24.0
-    factor = max(1.0, (deviation / MOST_DEVIATION) ** (1.0 / 6.0))
+    factor = max(1.0, (deviation / MAX_DEVIATION) ** (1.0 / 6.0))
     slower = trajectory.slowed(factor)
     window = max(window / factor**2, 1e-3)
     times = point_times(np.array([window]), slower.duration_s + window)

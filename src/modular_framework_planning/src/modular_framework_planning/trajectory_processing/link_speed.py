@@ -13,7 +13,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.time_parameterization import LONGEST_PERIOD_S, MARGIN, overrun
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-PERIOD_S = 0.005  # at which the link's speed is looked at to choose the slow-down
+PERIOD_S = 0.005  # of the samples of the link's speed that choose the slow-down
 EASE_S = 0.1  # over which the pace changes, on both sides of a fast stretch
 LONGEST_SLOWED_PERIOD_S = 2.5 * LONGEST_PERIOD_S
 

@@ -21,9 +21,9 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 WINDOW_S = 0.04  # over which the fastest motion is averaged
 LONGEST_PERIOD_S, SHORTEST_PERIOD_S = 0.02, 0.004  # between two points, unless longer ones are asked for
 GRID_STEP = 0.02  # [rad or m] between changes of the path acceleration, at most
-FEWEST_INTERVALS = 12  # a straight or curved piece is cut into
+MIN_INTERVALS = 12  # a straight or curved piece is cut into
 JUMP = 0.05  # jump of an acceleration, as a share of its limit, that is worth a point
-MARGIN = 1.0e-3  # share of the limits kept free for what happens between the samples looked at
+MARGIN = 1.0e-3  # share of the limits kept free for what happens between the checked samples
 SAMPLES_PER_SEGMENT = 24
 
 
@@ -51,7 +51,7 @@ def _section(joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, a
              longest_period_s: float) -> Trajectory:
     """Times one section from rest to rest."""
     pieces = path.pieces()
-    motion = fastest_motion(pieces, velocity, acceleration, GRID_STEP, FEWEST_INTERVALS)
+    motion = fastest_motion(pieces, velocity, acceleration, GRID_STEP, MIN_INTERVALS)
     jumps = motion.times[motion.jumps > JUMP]
     end = float(motion.times[-1]) + WINDOW_S
     times = point_times(np.concatenate([jumps, jumps + WINDOW_S, [WINDOW_S, end - WINDOW_S]]), end, longest_period_s)

@@ -32,7 +32,7 @@ RANDOM_ATTEMPTS = 200
 TEXT_ABOVE_TIP_M = 0.45  # clear of the hand
 TEXT_WIDTH, TEXT_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
-JOB_END_S = 0.2  # a job says that it is done before it makes way for the next one
+JOB_END_S = 0.2  # after a job has reported its end, until the next one can start
 DEFAULT_PLANNER = "move_group's default"
 
 

@@ -30,7 +30,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import JointGroup
 
 LONGEST_TIMEOUT_S = 10.0
-MOST_COMPARED = 4  # free solutions whose clearance decides between them
+MAX_COMPARED = 4  # free solutions whose clearance decides between them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +111,7 @@ class KinematicsService:
         if not request.avoid_collisions:
             return kept[0]
         checker = CollisionChecker(scene, group.indices)
-        free = first_free(kept, checker.is_free, MOST_COMPARED)
+        free = first_free(kept, checker.is_free, MAX_COMPARED)
         if free:
             return clearest(free, scene.positions, checker.distance)
         contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))

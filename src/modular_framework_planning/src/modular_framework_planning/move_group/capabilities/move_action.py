@@ -95,7 +95,7 @@ class MoveAction:
         except PlanningError as error:
             result.error_code.val = int(error.code)
             return result, error.reason
-        if cancelled.is_set():  # a planner that goes on improving has a path by then, but nobody wants it any more
+        if cancelled.is_set():  # a planner that goes on improving has a path by then, but the client has cancelled
             result.error_code.val = ErrorCode.PREEMPTED
             return result, "cancelled while planning"
         result = MoveGroupResult(error_code=response.error_code, trajectory_start=response.trajectory_start,

@@ -26,7 +26,7 @@ ACTION_TYPES = dict(zip(ACTION_KINDS, (FollowJointTrajectoryAction, GripperComma
 
 
 class RunningMotion(Protocol):
-    """A motion one controller is at."""
+    """A motion that one controller executes."""
 
     def is_done(self) -> bool:
         """Whether the controller says that it has done it; raises PlanningError when it failed."""
@@ -41,7 +41,7 @@ class ControllerManager(Protocol):
     may_switch: bool
 
     def connect(self) -> None:
-        """Starts to look for the controllers."""
+        """Starts to connect to the controllers."""
 
     def describe(self) -> str:
         """Says how many controllers there are, or where they are asked for."""
@@ -79,7 +79,7 @@ class ActionControllers:
         self._clients: dict[str, Any] = {}
 
     def connect(self) -> None:
-        """Starts to look for the actions."""
+        """Starts to connect to the actions."""
         for spec in self._specs:
             self._client(spec)
 
@@ -123,7 +123,7 @@ class ActionMotion:
         self._client = client
 
     def is_done(self) -> bool:
-        """Whether the goal has ended well; raises PlanningError in the controller's words when it has not."""
+        """Whether the goal has succeeded; raises PlanningError with the controller's message when it has failed."""
         # the status of the goal is final some time before its result is here; DONE means that both are
         if self._client.simple_state != actionlib.SimpleGoalState.DONE:
             return False

@@ -57,7 +57,7 @@ class TrajectoryExecution:
         self._busy = threading.Lock()
 
     def connect(self) -> None:
-        """Starts to listen for stop events and to look for the controllers."""
+        """Subscribes to stop events and starts to connect to the controllers."""
         rospy.Subscriber(names.EXECUTION_EVENT_TOPIC, String, self._on_event, queue_size=5)
         if self.manager is not None:
             self.manager.connect()
@@ -84,7 +84,7 @@ class TrajectoryExecution:
         """Executes a RobotTrajectory and returns when the robot is there.
 
         Raises:
-            PlanningError: what went wrong, in the controller's words where it spoke.
+            PlanningError: what went wrong, with the controller's own message where it sent one.
         """
         if self.manager is None:
             raise PlanningError(ErrorCode.CONTROL_FAILED, f"{rospy.resolve_name('~allow_trajectory_execution')} is "

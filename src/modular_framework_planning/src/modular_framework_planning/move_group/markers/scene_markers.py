@@ -38,7 +38,11 @@ class MarkerPublisher:
     """
 
     def __init__(self, planning_frame: str) -> None:
-        """Args: the frame of contacts."""
+        """Advertises the topics.
+
+        Args:
+            planning_frame: of contacts and paths.
+        """
         self._frame = planning_frame
         self._contacts = rospy.Publisher(names.DISPLAY_CONTACTS_TOPIC, MarkerArray, queue_size=5, latch=True)
         self._scene = rospy.Publisher(names.SCENE_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
@@ -76,7 +80,7 @@ class MarkerPublisher:
         publish(self._path, MarkerArray(markers))
 
     def show_contacts(self, contacts: Sequence[Contact]) -> None:
-        """Publishes a ball where bodies touch, named by them: why the last plan failed; none takes old ones away."""
+        """Publishes a ball where bodies touch, named by them; without contacts the old ones are deleted."""
         markers = [Marker(action=Marker.DELETEALL)]
         for number, contact in enumerate(contacts):
             marker = _marker(Marker.SPHERE, self._frame, f"{contact.first.name}={contact.second.name}", number)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hands depth images and point clouds to the octomap: MoveIt's two octomap updaters."""
+"""Inserts depth images and point clouds into the octomap: MoveIt's two octomap updaters."""
 from __future__ import annotations
 
 import threading
@@ -37,7 +37,7 @@ class InsertPointCloud(Protocol):
 
 
 class _Updater(ABC):
-    """Takes messages as they come and works on them in a thread of its own; when it is late, the oldest are dropped."""
+    """Processes messages in a thread of its own; when it is late, the oldest are dropped."""
 
     def __init__(self, settings: SensorSettings, insert: InsertPointCloud, waiting: int) -> None:
         self._settings: Any = settings
@@ -81,7 +81,7 @@ class _Updater(ABC):
 
     @abstractmethod
     def _process(self, message: Any) -> None:
-        """Brings one message into the map."""
+        """Inserts one message into the map."""
 
 
 class PointCloudUpdater(_Updater):

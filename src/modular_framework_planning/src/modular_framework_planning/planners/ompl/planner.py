@@ -28,7 +28,7 @@ from modular_framework_planning.planning_interface.path_repair import repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
-CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # of the search for a way round one edge
+CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # of the search for a detour round one edge
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
@@ -140,7 +140,15 @@ class _Search:
 
     def __init__(self, problem: PlanningProblem, goals: Array, step: float, default_range: float = DEFAULT_RANGE,
                  limit: int | None = None) -> None:
-        """Args: what to plan; where to; distance of checks on edges; range and most iterations where not set."""
+        """Stores what to search.
+
+        Args:
+            problem: what to plan.
+            goals: joint vectors to reach, shape (n, joints).
+            step: distance of checks along an edge [rad or m].
+            default_range: longest step of the planner where no parameter sets it [rad or m].
+            limit: of iterations; None: the clock ends the search.
+        """
         self._problem, self._goals, self._step = problem, goals, step
         self._range, self._limit = default_range, limit
         self._count = len(problem.group.joints)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joins two motions without a stop: inside a sphere around their common point the link goes over from one to the other.
+"""Joins two motions without a stop: inside a sphere around their common point the link passes from one to the other.
 
 Both motions go on in their own time; the link's pose is a mean of the two poses whose weight moves smoothly (a
 polynomial of fifth order) from the first to the second. The link enters and leaves the sphere with the velocity and

@@ -49,7 +49,7 @@ class CommandPlanner:
     planner_ids = ("PTP", "LIN", "CIRC")
     replaces_bad_values = False
     auxiliary_constraints = (CENTRE, INTERIM)
-    collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators look at no collisions themselves
+    collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators check no collisions themselves
 
     def __init__(self, cartesian_limits: Mapping[str, Any] | None, sampling_time_s: float = DEFAULT_SAMPLING_TIME_S
                  ) -> None:

@@ -16,8 +16,8 @@ from modular_framework_planning.planners.pilz.velocity_profile import sample_tim
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-CHECK_PERIOD_S = 0.01  # between two looks at the joints' limits
-MOST_CHECKS = 4000
+CHECK_PERIOD_S = 0.01  # between two checks of the joints' limits
+MAX_CHECKS = 4000
 DIFFERENCE_S = 1.0e-5  # step of the numeric derivatives of a pose
 LIMIT_TOLERANCE = 1.0e-3  # share of a limit
 
@@ -124,7 +124,7 @@ def follow(motion: PoseMotion, follower: PoseFollower, period_s: float, start: J
     """
     rates = JointRates.of(follower.model, follower.group)
     points = sample_times(motion.duration_s, motion.knots, period_s)
-    longest = max(CHECK_PERIOD_S, motion.duration_s / MOST_CHECKS)
+    longest = max(CHECK_PERIOD_S, motion.duration_s / MAX_CHECKS)
     state, rows = start, [start]
     for low, high in zip(points[:-1], points[1:], strict=True):
         count = int(np.ceil((high - low) / longest))

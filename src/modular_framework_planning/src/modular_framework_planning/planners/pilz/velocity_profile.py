@@ -16,7 +16,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 
 ROUNDING_S = 0.004  # width of the averaging window: how long the acceleration takes to change
-MOST_POINTS = 20_000  # of one motion
+MAX_POINTS = 20_000  # of one motion
 SHORTEST_GAP_S = 1.0e-4  # between two points of a trajectory
 
 
@@ -93,9 +93,9 @@ def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
     Raises:
         PlanningError: the motion is so slow that it would have more than 20,000 points.
     """
-    if duration_s > MOST_POINTS * period_s:
+    if duration_s > MAX_POINTS * period_s:
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion would take {duration_s:.0f} s, which at one "
-                            f"point every {period_s} s is more than {MOST_POINTS} points; choose larger scaling "
+                            f"point every {period_s} s is more than {MAX_POINTS} points; choose larger scaling "
                             "factors")
     regular = np.arange(0.0, duration_s, period_s)
     kept = np.unique(np.concatenate([[0.0, duration_s], knots[(knots > 0.0) & (knots < duration_s)]]))

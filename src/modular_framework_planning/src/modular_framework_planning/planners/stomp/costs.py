@@ -10,11 +10,11 @@ from modular_framework_planning.planners.stomp.compiled_costs import cover_of, d
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 
 WIDEST_SPHERE = 0.07  # [m]; of those that stand for the bodies
-DEPTH_WEIGHT = 10.0  # with 1, to graze something for a few states costs less than the accelerations of a way round it
+DEPTH_WEIGHT = 10.0  # with 1, grazing an obstacle for a few states costs less than the accelerations of a detour
 
 
 class StateCosts:
-    """Costs of states; the exact check has the last word on whether one is valid."""
+    """Costs of states; whether a state is valid is decided by the exact check."""
 
     def __init__(self, problem: PlanningProblem) -> None:
         self._problem = problem

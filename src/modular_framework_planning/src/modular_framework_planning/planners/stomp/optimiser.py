@@ -23,7 +23,13 @@ class Optimiser:
     """
 
     def __init__(self, settings: StompSettings, lower: Array, upper: Array, rng: np.random.Generator) -> None:
-        """Args: parameters; bounds of the joints, shape (joints,) each; source of the noise."""
+        """Computes the matrices.
+
+        Args:
+            settings: of the planner.
+            lower, upper: bounds of the joints, shape (joints,) [rad or m].
+            rng: source of the noise.
+        """
         self._settings, self._lower, self._upper, self._rng = settings, lower, upper, rng
         inner = settings.num_timesteps - 2
         differences = np.zeros((inner + 2, inner))  # second differences of a motion whose ends do not move

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planner of the pipeline `stomp`: several attempts to bend a straight motion round what is in its way."""
+"""The planner of the pipeline `stomp`: several attempts to bend a straight motion around obstacles."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -27,7 +27,11 @@ class StompPlanner:
     planner_ids = ("stomp", "STOMP")
 
     def __init__(self, settings: Mapping[str, StompSettings] | None = None) -> None:
-        """Args: settings by planning group; MoveIt's for groups that are not named."""
+        """Stores the settings.
+
+        Args:
+            settings: by planning group; MoveIt's for groups that are not named.
+        """
         self._settings = dict(settings or {})
 
     @classmethod
