@@ -55,6 +55,17 @@ def test_files_that_a_page_names_exist(document: Path) -> None:
     assert not missing
 
 
+def test_the_table_of_packages_is_complete() -> None:
+    packages = {manifest.parent.name for manifest in (ROOT / "src").rglob("package.xml")}
+    readme = (ROOT / "README.md").read_text()
+    assert not {name for name in packages if not re.search(rf"\b{name}\b", readme)}
+
+
+def test_every_package_has_a_readme() -> None:
+    folders = [manifest.parent for manifest in (ROOT / "src").rglob("package.xml") if "interfaces" not in manifest.parts]
+    assert not [folder.name for folder in folders if not (folder / "README.md").exists()]
+
+
 def test_every_usual_change_touches_at_most_three_files() -> None:
     sections = re.split(r"^## (.+)$", (ROOT / "docs/contributing.md").read_text(), flags=re.MULTILINE)[1:]
     changes = dict(zip(sections[::2], sections[1::2], strict=True))
