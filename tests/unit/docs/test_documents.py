@@ -62,7 +62,7 @@ def test_the_table_of_packages_is_complete() -> None:
 
 
 def test_every_package_has_a_readme() -> None:
-    folders = [manifest.parent for manifest in (ROOT / "src").rglob("package.xml") if "interfaces" not in manifest.parts]
+    folders = [file.parent for file in (ROOT / "src").rglob("package.xml") if "interfaces" not in file.parts]
     assert not [folder.name for folder in folders if not (folder / "README.md").exists()]
 
 
