@@ -191,8 +191,11 @@ class OrientationConstraint:
         return ConstraintResult("orientation", self.link.name, excess <= SLACK, self.weight * float(angles.sum()), text)
 
     def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
-        """Returns whether the rotation is off, and a condition per axis that brings or keeps it within the tolerances;
-        `data` holds the joint Jacobians.
+        """Returns whether the rotation is off, and a condition per axis that brings or keeps it within the tolerances.
+
+        Args:
+            model: Pinocchio's model of the robot.
+            data: holds the joint Jacobians of the state.
         """
         angles, turned = self.deviation(data)
         tight = self.tolerances <= TIGHT

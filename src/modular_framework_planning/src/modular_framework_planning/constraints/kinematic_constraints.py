@@ -150,8 +150,10 @@ class KinematicConstraints:
         """Returns a random state that satisfies: random joint values, then `project`; None after the attempts.
 
         Args:
+            rng: source of random numbers.
             positions: where the joints that do not move are.
             indices: the joints that may move.
+            attempts: how many random states to try.
         """
         chosen = np.asarray(indices, dtype=np.int64)
         lower, upper = self.bounds(chosen, positions)

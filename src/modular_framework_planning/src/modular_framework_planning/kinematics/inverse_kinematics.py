@@ -129,7 +129,9 @@ class InverseKinematics:
             tip_link: link that carries the point; rigidly fixed to the end of the group's chain.
             point: in the link's frame (3,) [m].
             position: where the point shall be, in the planning frame (3,) [m].
-            seed, timeout_s, rng: as for `solutions`.
+            seed: as for `solutions`.
+            timeout_s: as for `solutions`.
+            rng: as for `solutions`.
         """
         joint = self.tip_offset(tip_link).inverse() * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
         turn = self.model.link_transforms(seed)[tip_link].rotation

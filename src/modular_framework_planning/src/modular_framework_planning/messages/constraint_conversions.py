@@ -43,6 +43,7 @@ def constraints_from_message(scene: PlanningScene, message: Any, where: str,
 
     Args:
         scene: gives frames their poses; those on the robot keep moving with it.
+        message: a moveit_msgs/Constraints.
         where: what the message belongs to, for error texts.
         code: result code for constraints that have no meaning.
         tip: link that constraints without a link_name are for.

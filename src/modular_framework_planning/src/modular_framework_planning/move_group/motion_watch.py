@@ -30,6 +30,7 @@ class WatchedMotion:
         """Takes a motion.
 
         Args:
+            context: of the node.
             trajectory: moveit_msgs/RobotTrajectory as planned.
             planned_in: snapshot of the monitored scene from just before the motion was planned.
             change: what the plan changed in that scene for itself alone.

@@ -68,7 +68,8 @@ def points_of_depth(depth: Array, camera: Pinhole, near: float, far: float, skip
     Args:
         depth: distance along the optical axis (rows, columns) [m]; 0, negative and NaN: no reading, inf: beyond range.
         camera: its camera.
-        near, far: readings outside of these are too near to be used, or beyond range [m].
+        near: readings nearer than this are not used [m].
+        far: readings further than this are beyond range [m].
         skip: rows and columns left out at each border.
     """
     vertical, horizontal = skip

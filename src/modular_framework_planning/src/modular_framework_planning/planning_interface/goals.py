@@ -45,7 +45,8 @@ class GoalResolver:
             request: whose goals are resolved.
             group: the joints to move.
             kinematics: solvers of all groups.
-            checker, motion: collision checks.
+            checker: collision checks of the whole robot.
+            motion: collision checks of the group.
             rng: source of random numbers.
             path_constraints: what goal states must satisfy.
             interrupted: whether no further goal may be tried.

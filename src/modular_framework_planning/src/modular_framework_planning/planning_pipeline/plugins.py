@@ -36,7 +36,8 @@ def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> 
 
     Args:
         plugin: parameter `planning_plugin`: a name of PLANNERS ("::" may stand for "/"), or `module/Class`.
-        model, settings: handed to the class method `configure` of planners that have one.
+        model: argument of the class method `configure` of planners that have one.
+        settings: its other argument.
 
     Raises:
         ModelError: there is no such class, or it has no method `plan`; lists the planners there are.

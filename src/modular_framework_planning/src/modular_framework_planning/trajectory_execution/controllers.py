@@ -143,6 +143,7 @@ def choose_controllers(joints: Collection[str], controllers: Iterable[Controller
 
     Args:
         joints: all that are to be moved.
+        controllers: those there are.
         may_switch: stopped controllers may be chosen because they can be started.
 
     Raises:

@@ -23,7 +23,8 @@ def time_line(joints: tuple[str, ...], rows: Array, velocity: Array, acceleratio
     Args:
         joints: columns of `rows`.
         rows: as straight_line returns them, shape (n, joints).
-        velocity, acceleration: limits of shape (joints,).
+        velocity: limits of shape (joints,) [rad/s or m/s].
+        acceleration: limits of shape (joints,) [rad/s^2 or m/s^2].
         is_free: whether a curve, shape (m, joints), may be run along; asked about the rounded motion.
 
     Raises:

@@ -73,9 +73,13 @@ def with_limited_link_speed(model: RobotModel, trajectory: Trajectory, full_posi
     """Returns the motion along the same curve with the link at or below a speed at every sample.
 
     Args:
-        model, trajectory, full_positions, link: see link_speeds.
+        model: see link_speeds.
+        trajectory: see link_speeds.
+        full_positions: see link_speeds.
+        link: see link_speeds.
         highest: speed [m/s], above 0.
-        velocity, acceleration: limits of the joints, shape (joints,).
+        velocity: limits of the joints, shape (joints,) [rad/s or m/s].
+        acceleration: limits of the joints, shape (joints,) [rad/s^2 or m/s^2].
     """
     if len(trajectory.times) < 2:
         return trajectory

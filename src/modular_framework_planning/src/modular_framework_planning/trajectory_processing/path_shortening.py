@@ -50,7 +50,8 @@ def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.ra
         edge_is_free: whether the straight motion between two points is free.
         deadline: monotonic time [s] at which to stop.
         rng: source of the random choices.
-        attempts: most tries; patience: tries without success in a row after which it stops.
+        attempts: most tries.
+        patience: tries without success in a row after which it stops.
     """
     failures = 0
     for _ in range(attempts):

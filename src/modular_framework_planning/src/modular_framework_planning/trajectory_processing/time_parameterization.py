@@ -77,7 +77,8 @@ def parameterize(joint_names: tuple[str, ...], vertices: Array, blends: Array, v
         joint_names: columns of `vertices`.
         vertices: shape (n, joints), neighbours differ.
         blends: corner distances of shape (n - 2,); 0 stops at the corner.
-        velocity, acceleration: limits of shape (joints,), scaling already applied.
+        velocity: limits of shape (joints,), scaling already applied [rad/s or m/s].
+        acceleration: limits of shape (joints,), scaling already applied [rad/s^2 or m/s^2].
         longest_period_s: between two points [s].
 
     Returns:

@@ -44,16 +44,21 @@ class MotionOptions:
 
 
 def planners_of_group(planner_ids: Sequence[str], group: str) -> list[str]:
-    """Returns a pipeline's planners for a group: those of entries `group[planner]` or, where the group has none, the
-    entries for any group. So MoveIt's panel in RViz reads the list.
+    """Returns a pipeline's planners for a group, read from the list as MoveIt's panel in RViz does.
+
+    They are those of entries `group[planner]` or, where the group has none, the entries for any group.
     """
     own = [name[len(group) + 1:-1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")]
     return own or [name for name in planner_ids if not name.endswith("]")]
 
 
 class MoveGroupClient:
-    """Calls services get_planning_scene, compute_ik, check_state_validity and query_planner_interface, actions
-    move_group and execute_trajectory; publishes trajectory_execution_event."""
+    """What the marker asks of move_group.
+
+    Services: get_planning_scene, compute_ik, check_state_validity, query_planner_interface.
+    Actions: move_group, execute_trajectory.
+    Publishes: trajectory_execution_event.
+    """
 
     def __init__(self) -> None:
         self._scene = rospy.ServiceProxy(names.GET_SCENE_SERVICE, GetPlanningScene)

@@ -48,8 +48,10 @@ class _Wanted:
     target: Transform
 
     def solutions(self, solver: InverseKinematics, seed: Array, timeout_s: float | None) -> list[Array]:
-        """Returns positions of the whole robot, nearest to the seed first; of the position alone where the group's
-        settings say so."""
+        """Returns positions of the whole robot, nearest to the seed first.
+
+        The orientation is left open where the group's settings ask for the position only.
+        """
         if solver.settings.position_only:
             return solver.position_solutions(self.link, self.placed.translation, self.target.translation, seed,
                                              timeout_s)

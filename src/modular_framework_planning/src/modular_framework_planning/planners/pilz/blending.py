@@ -94,7 +94,8 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
     """Joins two trajectories.
 
     Args:
-        first, second: of one group; the second starts where the first ends.
+        first: motion of a group.
+        second: motion of the same group that starts where the first ends.
         radius: of the sphere around the common point [m].
         follower: of the link the radius belongs to.
         period_s: between two points in the sphere.

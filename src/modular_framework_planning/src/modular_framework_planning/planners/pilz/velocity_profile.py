@@ -60,7 +60,9 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
 
     Args:
         distance: length of the path, above 0.
-        velocity, acceleration, deceleration: limits, all above 0 [1/s, 1/s^2].
+        velocity: limit, above 0 [1/s].
+        acceleration: limit, above 0 [1/s^2].
+        deceleration: limit, above 0 [1/s^2].
     """
     peak = min(velocity, float(np.sqrt(2.0 * distance * acceleration * deceleration / (acceleration + deceleration))))
     rise, fall = peak / acceleration, peak / deceleration

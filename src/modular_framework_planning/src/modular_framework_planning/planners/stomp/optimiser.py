@@ -27,7 +27,8 @@ class Optimiser:
 
         Args:
             settings: of the planner.
-            lower, upper: bounds of the joints, shape (joints,) [rad or m].
+            lower: bounds of the joints, shape (joints,) [rad or m].
+            upper: bounds of the joints, shape (joints,) [rad or m].
             rng: source of the noise.
         """
         self._settings, self._lower, self._upper, self._rng = settings, lower, upper, rng
