@@ -117,14 +117,14 @@ def room_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, F
 
 
 def ros_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, Fault]]:
-    """Finds uses of ROS below the ROS edge: of a client or a message of ROS, or of a module of the edge."""
+    """Finds modules below the ROS interface that import a client or message of ROS, or a module of the interface."""
     for each in tree.imports:
         inside = each.imported in tree.files
-        reaches_ros = table.is_ros_edge(each.imported) if inside else table.is_ros(each.imported)
-        if reaches_ros and not table.is_ros_edge(each.importer):
-            edge = ", ".join(("ros_*", *table.ros_edge.get(package_of(each.importer), ())))
-            yield each, Fault(_where(tree, each), f"{each.importer} imports {each.imported} below the ROS edge",
-                              f"in {edge} of the package", "move it to the ROS edge, or pass in what it needs")
+        reaches_ros = table.may_use_ros(each.imported) if inside else table.is_ros(each.imported)
+        if reaches_ros and not table.may_use_ros(each.importer):
+            allowed = ", ".join(("ros_*", *table.ros_interface.get(package_of(each.importer), ())))
+            yield each, Fault(_where(tree, each), f"{each.importer} imports {each.imported} below the ROS interface",
+                              f"in {allowed} of the package", "move it to the ROS interface, or pass in what it needs")
 
 
 def circles(tree: SourceTree, exempt: set[Import]) -> Iterator[Fault]:

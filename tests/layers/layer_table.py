@@ -45,7 +45,7 @@ class LayerTable:
         packages: Folder of a catkin package (a pattern) -> the Python packages it may import besides.
         rooms: Package or room -> its rooms from the bottom up; those of one level do not import each other. The modules
             that lie directly in the folder are the room ".".
-        ros_edge: Python package -> its rooms and modules (patterns) that may import ROS.
+        ros_interface: Python package -> its rooms and modules (patterns) that may import ROS.
         exemptions: The imports that break these rules.
     """
 
@@ -54,7 +54,7 @@ class LayerTable:
     ground_floor: tuple[str, ...]
     packages: dict[str, tuple[str, ...]]
     rooms: dict[str, tuple[tuple[str, ...], ...]]
-    ros_edge: dict[str, tuple[str, ...]]
+    ros_interface: dict[str, tuple[str, ...]]
     exemptions: tuple[Exemption, ...]
 
     def allowed_packages(self, package: str, folder: str) -> tuple[str, ...] | None:
@@ -68,10 +68,10 @@ class LayerTable:
         """Returns whether what is imported is a client or messages of ROS."""
         return any(fnmatchcase(imported, pattern) for pattern in self.ros)
 
-    def is_ros_edge(self, module: str) -> bool:
+    def may_use_ros(self, module: str) -> bool:
         """Returns whether a module may import ROS: its file is called `ros_*`, or the table says so."""
         inside = module.partition(".")[2]
-        patterns = self.ros_edge.get(package_of(module), ())
+        patterns = self.ros_interface.get(package_of(module), ())
         return inside.rpartition(".")[2].startswith("ros_") or any(
             fnmatchcase(inside, pattern) or fnmatchcase(inside, f"{pattern}.*") for pattern in patterns
         )
@@ -96,7 +96,7 @@ def parse_layer_table(text: dict) -> LayerTable:
         KeyError: An entry is missing.
         TypeError: An entry is unknown.
     """
-    known = {"max_modules_in_a_folder", "ros", "ground_floor", "packages", "rooms", "ros_edge", "exemptions"}
+    known = {"max_modules_in_a_folder", "ros", "ground_floor", "packages", "rooms", "ros_interface", "exemptions"}
     if unknown := set(text) - known:
         raise TypeError(f"unknown entries {sorted(unknown)}")
     return LayerTable(
@@ -108,6 +108,6 @@ def parse_layer_table(text: dict) -> LayerTable:
             owner: tuple((item,) if isinstance(item, str) else tuple(item) for item in levels)
             for owner, levels in text["rooms"].items()
         },
-        ros_edge={package: tuple(patterns) for package, patterns in text["ros_edge"].items()},
+        ros_interface={package: tuple(patterns) for package, patterns in text["ros_interface"].items()},
         exemptions=tuple(Exemption(**entry) for entry in text.get("exemptions", ())),
     )

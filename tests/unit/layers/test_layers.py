@@ -23,7 +23,7 @@ def table(**changes: object) -> LayerTable:
         "ground_floor": ["ground"],
         "packages": {"house": [], "ground": []},
         "rooms": {"house": ["cellar", ["kitchen", "bedroom"], "roof"]},
-        "ros_edge": {"house": ["roof"]},
+        "ros_interface": {"house": ["roof"]},
     }
     return parse_layer_table(text | changes)
 
@@ -61,8 +61,9 @@ def test_an_import_that_runs_upwards_fails_in_four_parts(tmp_path: Path) -> None
     assert faults(tmp_path, modules) == [
         "src/house/src/house/kitchen/stove.py:2: house's room 'kitchen' imports house.roof.chimney; "
         "allowed: cellar; move what is shared down, or pass it in",
-        "src/house/src/house/kitchen/stove.py:2: house.kitchen.stove imports house.roof.chimney below the ROS edge; "
-        "allowed: in ros_*, roof of the package; move it to the ROS edge, or pass in what it needs",
+        "src/house/src/house/kitchen/stove.py:2: house.kitchen.stove imports house.roof.chimney below the ROS "
+        "interface; "
+        "allowed: in ros_*, roof of the package; move it to the ROS interface, or pass in what it needs",
     ]
 
 
@@ -107,23 +108,23 @@ def test_an_import_between_packages_has_to_be_in_the_table(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("importer", ["house.cellar.coal", "ground.stone"])
-def test_rospy_below_the_edge_fails(tmp_path: Path, importer: str) -> None:
+def test_rospy_below_the_ros_interface_fails(tmp_path: Path, importer: str) -> None:
     found, = faults(tmp_path, {importer: "def now():\n    import rospy"})
-    assert f"{importer} imports rospy below the ROS edge" in found
+    assert f"{importer} imports rospy below the ROS interface" in found
     assert ".py:2: " in found
 
 
 @pytest.mark.parametrize(
     "text", ["from sensor_msgs.msg import Image", "from ground.msg import Stone", "from ground import srv"]
 )
-def test_messages_below_the_edge_fail(tmp_path: Path, text: str) -> None:
+def test_messages_below_the_ros_interface_fail(tmp_path: Path, text: str) -> None:
     found, = faults(tmp_path, {"ground.stone": text}, table(ros=["*_msgs", "*.msg", "*.srv"]))
-    assert "below the ROS edge" in found
+    assert "below the ROS interface" in found
 
 
-def test_a_module_called_ros_may_import_rospy_but_not_be_imported_from_below_the_edge(tmp_path: Path) -> None:
+def test_a_module_called_ros_may_import_rospy_but_not_be_imported_from_below_the_ros_interface(tmp_path: Path) -> None:
     found, = faults(tmp_path, {"ground.ros_clock": "import rospy", "ground.time": "import ground.ros_clock"})
-    assert "ground.time imports ground.ros_clock below the ROS edge" in found
+    assert "ground.time imports ground.ros_clock below the ROS interface" in found
 
 
 def test_a_circle_of_files_fails_inside_one_room(tmp_path: Path) -> None:
