@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The errors this package raises, so that the ROS edge can turn every one of them into a status message."""
+"""The errors this package raises, so that the ROS interface can turn every one of them into a status message."""
 
 
 class SimulationError(Exception):
@@ -26,7 +26,7 @@ class UnknownEntityError(SimulationError):
     """A model, link or frame was asked for that the world does not have.
 
     Args:
-        kind: What was looked for: "model", "link" or "joint".
+        kind: What was not found: "model", "link" or "joint".
         name: The name that was asked for.
         known: The names that exist.
     """

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ROS edge: the names of Gazebo on the wire, and the world in the planning scene."""
+"""The ROS interface: the names of Gazebo on the wire, and the world in the planning scene."""

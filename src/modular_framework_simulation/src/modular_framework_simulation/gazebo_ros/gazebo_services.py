@@ -74,7 +74,7 @@ class GazeboServices:
         self._endpoints.append(rospy.Subscriber(topic, msg.ModelState, self._on_model_state, queue_size=10))
 
     def close(self) -> None:
-        """Takes everything back; may be called twice."""
+        """Closes all services; may be called twice."""
         while self._endpoints:
             endpoint = self._endpoints.pop()
             if isinstance(endpoint, rospy.Service):
@@ -110,7 +110,7 @@ class GazeboServices:
                 self._in_loop(name, action)
             except SimulationError as error:
                 rospy.logerr("%s: %s", name, error)
-                return None  # std_srvs/Empty has no field for a failure: rospy tells the caller that the call failed
+                return None  # std_srvs/Empty has no field for a failure: rospy reports the failed call
             return EmptyResponse()
 
         return handle
@@ -153,11 +153,11 @@ class GazeboServices:
         self._put(request.model_state)
         return srv.SetModelStateResponse(True, f"put model '{request.model_state.model_name}'")
 
-    def _put(self, wanted: Any) -> None:
-        if self._world.body(wanted.model_name).spec is None:
-            raise ValueError(f"'{wanted.model_name}' is the robot; it stands where its description says")
-        state = conversions.state_from_msgs(wanted.pose, wanted.twist)
-        self._world.set_state(wanted.model_name, state, wanted.reference_frame)
+    def _put(self, model_state: Any) -> None:
+        if self._world.body(model_state.model_name).spec is None:
+            raise ValueError(f"'{model_state.model_name}' is the robot; it stands where its description says")
+        state = conversions.state_from_msgs(model_state.pose, model_state.twist)
+        self._world.set_state(model_state.model_name, state, model_state.reference_frame)
 
     def _on_model_state(self, message: Any) -> None:
         def put() -> None:

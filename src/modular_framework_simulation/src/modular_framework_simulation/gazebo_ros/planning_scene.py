@@ -41,7 +41,7 @@ _SYNC_PERIOD_S = 0.1
 _PRESENCE_PERIOD_S = 0.5
 _RETRY_PERIOD_S = 0.5
 _COMPARE_PERIOD_S = 2.0
-"""At most so long the scene differs from the world unnoticed where no change of the scene is heard of."""
+"""At most so long the scene differs from the world unnoticed while no change of the scene is published."""
 _COMPARE_PAUSE_S, _COMPARE_SHARE = 0.3, 0.1
 """After a comparison, while the scene changes all the time, as it does while the robot moves: so long at least, and so
 long that comparisons take no more than this share of the time (a held mesh comes with all its triangles)."""
@@ -55,7 +55,7 @@ class PlanningScenePublisher:
 
     Client of /apply_planning_scene (moveit_msgs/ApplyPlanningScene) and /get_planning_scene
     (moveit_msgs/GetPlanningScene), whenever they are there.
-    Subscribes: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene), only to hear that something changed.
+    Subscribes: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene), only to notice that something changed.
 
     Args:
         touch_links: Links of the gripper, which may touch an object that is held.

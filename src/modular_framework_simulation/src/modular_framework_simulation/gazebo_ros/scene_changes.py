@@ -101,7 +101,7 @@ class SceneChanges:
 
     @property
     def keys(self) -> Set[ObjectKey]:
-        """Objects that were sent; `compare` wants to know of these."""
+        """Objects that were sent; `compare` needs to know where these are."""
         return self._shown.keys()
 
     def compare(self, in_world: Set[ObjectKey], attached: Mapping[ObjectKey, str]) -> list[ObjectKey]:
@@ -115,7 +115,7 @@ class SceneChanges:
             Objects that another node took out, and that stay out for now: each is named once.
         """
         foreign = {key for key, link in self._attached.items() if link != self._shown[key].carrier_link}
-        for key in foreign & in_world:  # another node attached it, and put it down where it likes
+        for key in foreign & in_world:  # another node attached it, and put it down elsewhere
             del self._shown[key]
         expected = {key for key, shown in self._shown.items() if shown.carrier_link is None and key not in attached}
         witnesses = expected & self._witnesses or expected
@@ -182,8 +182,8 @@ def _wanted(snapshot: WorldSnapshot) -> dict[ObjectKey, _Wanted]:
         for link in model.links:
             key = (model.name, link.spec.name)
             if held is not None and held.model == model.name:
-                pose = held.carrier_pose.inverse() @ link.pose
-                wanted[key] = _Wanted(_Shown(model.instance, pose, held.carrier_link), link.spec)
+                pose_in_carrier = held.carrier_in_world.inverse() @ link.pose_in_world
+                wanted[key] = _Wanted(_Shown(model.instance, pose_in_carrier, held.carrier_link), link.spec)
             else:
-                wanted[key] = _Wanted(_Shown(model.instance, link.pose, None), link.spec)
+                wanted[key] = _Wanted(_Shown(model.instance, link.pose_in_world, None), link.spec)
     return wanted

@@ -158,7 +158,7 @@ class SimulationNode:
         Returns:
             Exit code of the process: 0 after an ordinary shutdown, 1 when the loop failed.
         """
-        # Threads that serve messages hand the interpreter back to the loop within this time.
+        # Threads that serve messages return the interpreter to the loop within this time.
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
         # Topics close at a shutdown: the loop has to have ended before.
         rospy.on_shutdown(self._stop_loop)
@@ -179,7 +179,7 @@ class SimulationNode:
             self._thread.join(timeout=_STOP_TIMEOUT_S)
 
     def close(self) -> None:
-        """Ends the loop and gives everything back; may be called twice."""
+        """Ends the loop and closes the world; may be called twice."""
         self._services.close()
         self._scene.close()
         self._stop_loop()

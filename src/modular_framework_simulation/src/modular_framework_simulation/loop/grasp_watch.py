@@ -32,7 +32,7 @@ class GraspWatch:
         self.held = None
 
     def update(self, time_s: float, touched_by_finger: Sequence[Collection[str]]) -> str | None:
-        """Takes one look at the contacts.
+        """Updates which object is held.
 
         Args:
             time_s: Simulated time [s].
@@ -50,7 +50,7 @@ class GraspWatch:
         if self.held is not None:
             self._update_held(time_s, grasped)
         if self.held is None:
-            self._look_for_new(time_s)
+            self._detect_new(time_s)
         return self.held
 
     def _update_held(self, time_s: float, grasped: Collection[str]) -> None:
@@ -62,8 +62,10 @@ class GraspWatch:
             self.held = None
             self._missed_since = None
 
-    def _look_for_new(self, time_s: float) -> None:
-        ripe = [(since, name) for name, since in self._touched_since.items() if time_s - since >= self._hold_after_s]
-        if ripe:
-            self.held = min(ripe)[1]
+    def _detect_new(self, time_s: float) -> None:
+        candidates = [
+            (since, name) for name, since in self._touched_since.items() if time_s - since >= self._hold_after_s
+        ]
+        if candidates:
+            self.held = min(candidates)[1]
             self._missed_since = None

@@ -43,7 +43,7 @@ class RequestQueue:
         self._arrived = threading.Event()
 
     def call(self, what: str, work: Callable[[], T], timeout_s: float) -> T:
-        """Has the loop do something and waits for the result.
+        """Runs work in the loop's thread and waits for the result.
 
         Args:
             what: Named in the error, for example "spawn_sdf_model".
@@ -62,7 +62,7 @@ class RequestQueue:
                 request.abandoned = not request.started
             if request.abandoned:
                 raise LoopTimeoutError(f"'{what}' waited {timeout_s:g} s for the simulation loop, in vain")
-            # Work that has begun will end: half a spawn cannot be taken back.
+            # Work that has begun will end: half a spawn cannot be undone.
             request.done.wait(timeout_s)
         if request.error is not None:
             raise request.error
@@ -71,7 +71,7 @@ class RequestQueue:
         return request.result  # type: ignore[no-any-return]
 
     def post(self, work: Callable[[], Any]) -> None:
-        """Has the loop do something without waiting; the work must not raise."""
+        """Runs work in the loop's thread without waiting; it must not raise."""
         self._requests.put(_Request(work))
         self._arrived.set()
 

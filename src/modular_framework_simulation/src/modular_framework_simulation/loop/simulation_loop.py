@@ -32,11 +32,11 @@ class Controllers(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Hook:
-    """Something done every so often, in the loop's thread, while time advances.
+    """An action that the loop's thread repeats while time advances.
 
     Attributes:
         every_steps: Physics steps from one call to the next.
-        action: What to do; must be quick.
+        action: Must be quick.
     """
 
     every_steps: int
@@ -88,7 +88,7 @@ class SimulationLoop:
         return self._paused
 
     def add_hook(self, hook: Hook) -> None:
-        """Has something done every so often; to be called before `run`."""
+        """Adds an action that is repeated while time advances; to be called before `run`."""
         self._hooks.append(hook)
 
     def pause(self) -> None:
@@ -106,7 +106,7 @@ class SimulationLoop:
         self.grasp_watch.reset()
         if self._actors is not None:
             self._actors.robot.reset()
-        self._take_over_joints()
+        self._restart_control()
 
     def set_joints(self, name: str, positions: dict[str, float]) -> None:
         """Puts joints of a model or of the robot at positions [rad or m], at rest.
@@ -117,9 +117,9 @@ class SimulationLoop:
         body = self.world.body(name)
         body.set_joints(positions)
         if self._actors is not None and body is self._actors.robot.body:
-            self._take_over_joints()
+            self._restart_control()
 
-    def _take_over_joints(self) -> None:
+    def _restart_control(self) -> None:
         """Has hardware and controllers start from where the joints now are."""
         if self._actors is not None:
             self._actors.hardware.read(self._time_s(), 0.0)
@@ -155,7 +155,7 @@ class SimulationLoop:
 
     def _halt(self, robot: RobotBody) -> None:
         """Has the controllers hold the robot where it is, and goes on until it stands."""
-        self._take_over_joints()
+        self._restart_control()
         begun_s = self._time_s()
         for shortest_s in _HALT_S:
             while self._time_s() - begun_s < shortest_s:
@@ -180,7 +180,7 @@ class SimulationLoop:
                 hook.action()
 
     def watch_grasp(self) -> None:
-        """Looks at the contacts of the fingers; a hook."""
+        """Passes the contacts of the fingers to the grasp watch; a hook."""
         if self._actors is None:
             return
         robot = self._actors.robot
@@ -198,8 +198,8 @@ class SimulationLoop:
         if name is None or self._actors is None or name not in self.world.names():
             return None
         robot = self._actors.robot
-        pose: Pose = robot.body.link_state(robot.palm_link).pose
-        return HeldObject(name, robot.palm_link, pose)
+        palm_in_world: Pose = robot.body.link_state(robot.palm_link).pose
+        return HeldObject(name, robot.palm_link, palm_in_world)
 
     def _time_s(self) -> float:
         return self.world.time_ns * 1e-9

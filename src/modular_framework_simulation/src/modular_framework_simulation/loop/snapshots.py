@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the loop shows to the rest of the process: values that never change once they are made."""
+"""Copies of the state of the world for the other threads of the process."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.simulated_body import BodyState
 
 
 @dataclass(frozen=True, slots=True)
 class LinkSnapshot:
-    """A link with collision shapes, and where it is in the world frame."""
+    """A link with collision shapes, and its pose."""
 
     spec: specs.Link
-    pose: Pose
+    pose_in_world: Pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +42,12 @@ class HeldObject:
     Attributes:
         model: Its instance name.
         carrier_link: Link of the robot it is carried by.
-        carrier_pose: Where that link is in the world frame.
+        carrier_in_world: Pose of that link.
     """
 
     model: str
     carrier_link: str
-    carrier_pose: Pose
+    carrier_in_world: Pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +66,7 @@ class WorldSnapshot:
 
 
 def take_snapshot(world: PhysicsWorld, held: HeldObject | None) -> WorldSnapshot:
-    """Looks at the world; to be called from the loop's thread."""
+    """Copies the state of the world; to be called from the loop's thread."""
     models = []
     for name in world.names():
         body = world.body(name)
@@ -78,8 +77,3 @@ def take_snapshot(world: PhysicsWorld, held: HeldObject | None) -> WorldSnapshot
         )
         models.append(ModelSnapshot(name, body.number, body.static, links))
     return WorldSnapshot(world.time_ns * 1e-9, tuple(models), held)
-
-
-def model_states(world: PhysicsWorld) -> list[tuple[str, BodyState]]:
-    """Returns name and state of every model; to be called from the loop's thread."""
-    return [(name, world.body(name).state()) for name in world.names()]

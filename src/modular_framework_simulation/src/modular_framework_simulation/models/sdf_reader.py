@@ -160,12 +160,7 @@ def _read_link(node: XmlNode, frames: FrameTree, resources: Resources) -> specs.
 
 
 def _read_joint(node: XmlNode, links: list[str], frames: FrameTree) -> specs.Joint:
-    text = node.attributes.get("type", "")
-    try:
-        kind = specs.JointType(text)
-    except ValueError as error:
-        allowed = ", ".join(each.value for each in specs.JointType)
-        raise DescriptionError(node.where, f"got joint type '{text}'", f"allowed: {allowed}") from error
+    kind = node.choice("type", specs.JointType, "joint type")
     parent, child = node.require("parent").text.strip(), node.require("child").text.strip()
     for role, name in (("parent", parent), ("child", child)):
         if name not in links and not (role == "parent" and name == "world"):

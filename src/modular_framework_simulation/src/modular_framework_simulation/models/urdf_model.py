@@ -135,12 +135,7 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
 
 
 def _read_joint(node: XmlNode, links: list[str]) -> specs.Joint:
-    text = node.attributes.get("type", "")
-    try:
-        kind = specs.JointType(text)
-    except ValueError as error:
-        allowed = ", ".join(each.value for each in specs.JointType)
-        raise DescriptionError(node.where, f"got joint type '{text}'", f"allowed: {allowed}") from error
+    kind = node.choice("type", specs.JointType, "joint type")
     for role in ("parent", "child"):
         if _role(node, role) not in links:
             raise DescriptionError(node.where, f"{role} '{_role(node, role)}' is no link", f"allowed: {links}")

@@ -5,11 +5,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
+from typing import TypeVar
 from xml.parsers import expat
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_urdf.xml_text import XmlError, refuse_doctype
+
+Choice = TypeVar("Choice", bound=Enum)
 
 
 @dataclass(slots=True)
@@ -89,8 +93,21 @@ class XmlNode:
         """Returns the text as one finite number."""
         return self.numbers(1)[0]
 
+    def choice(self, attribute: str, choices: type[Choice], what: str) -> Choice:
+        """Returns the value of an attribute as one of the members of an Enum.
+
+        Raises:
+            DescriptionError: It is none of them.
+        """
+        value = self.attributes.get(attribute, "")
+        try:
+            return choices(value)
+        except ValueError as error:
+            allowed = ", ".join(each.value for each in choices)
+            raise DescriptionError(self.where, f"got {what} '{value}'", f"allowed: {allowed}") from error
+
     def flag(self) -> bool:
-        """Returns the text as a truth value.
+        """Returns the text as a bool.
 
         Raises:
             DescriptionError: Neither true, false, 1 nor 0.

@@ -22,7 +22,7 @@ STATIC_LINK = "static"
 
 @dataclass(frozen=True, slots=True)
 class BodyUrdf:
-    """A model in the engine's language.
+    """A model as a URDF for the engine.
 
     Attributes:
         text: The URDF.
@@ -41,7 +41,7 @@ def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: b
     Args:
         model: What to translate; its pose plays no role.
         convex_parts: Cuts meshes for the engine.
-        with_visuals: Whether somebody will look at it.
+        with_visuals: Whether visual shapes are written, for a window.
 
     Raises:
         DescriptionError: A mesh cannot be used.
@@ -51,7 +51,7 @@ def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: b
         shapes = [writer.shapes(link, link.pose, exact=True) for link in model.links]
         body = f'<link name="{STATIC_LINK}">{"".join(shapes)}</link>'
         return BodyUrdf(_robot(model.name, [body]), Pose(), True)
-    # URDF puts a link's frame at the joint above it, SDF anywhere; `frame_in_link` bridges the two.
+    # URDF puts a link's frame at the joint above it, SDF anywhere; `frame_in_link` is the transform between the two.
     joints = [joint for joint in model.joints if joint.parent != "world"]
     frame_in_link = {link.name: Pose() for link in model.links}
     frame_in_link.update({joint.child: joint.pose for joint in joints})

@@ -22,7 +22,7 @@ BASE_INDEX = -1
 """The engine's number of a body's root link."""
 
 LONGEST_NAME_BYTES = 1023
-"""The engine copies names and file names into arrays of 1,024 bytes without a look at their length, and crashes."""
+"""The engine copies names and file names into arrays of 1,024 bytes without checking their length, and crashes."""
 
 _SHOWN_CHARACTERS = 40
 _NAMING_ATTRIBUTES = ("name", "link", "filename")

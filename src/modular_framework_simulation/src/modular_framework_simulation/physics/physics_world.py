@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -101,10 +101,6 @@ class PhysicsWorld:
             raise UnknownEntityError("model", name, self.names())
         return body
 
-    def name_of(self, number: int) -> str:
-        """Returns the name of the model that has this number in the engine."""
-        return self._names_by_number[number]
-
     def prepare(self, model: specs.Model) -> BodyUrdf:
         """Translates a model for the engine, which may take seconds for a large mesh; any thread may do it.
 
@@ -136,14 +132,14 @@ class PhysicsWorld:
         self.add(body, model.pose)
         return body
 
-    def add(self, body: SimulatedBody, pose: Pose) -> None:
-        """Takes a body that is already in the engine under the world's care, and puts it at a pose."""
+    def add(self, body: SimulatedBody, pose_in_world: Pose) -> None:
+        """Adds a body that is already in the engine, at a pose in the world frame."""
         if body.name in self._bodies:
             raise DuplicateModelError(body.name)
-        body.set_state(BodyState(pose, Twist()))
+        body.set_state(BodyState(pose_in_world, Twist()))
         self._bodies[body.name] = body
         self._names_by_number[body.number] = body.name
-        self._initial_poses[body.name] = pose
+        self._initial_poses[body.name] = pose_in_world
         self.revision += 1
 
     def delete(self, name: str) -> None:
@@ -204,9 +200,9 @@ class PhysicsWorld:
         body, frame = self.body(name), self.entity_state(reference)
         offset = rotate_vector(frame.pose.quaternion, state.pose.position)
         lever = cross(frame.twist.angular, offset)
-        turned = twist_in_frame(state.twist, frame.pose.inverse())
-        linear = tuple(a + b + c for a, b, c in zip(turned.linear, frame.twist.linear, lever, strict=True))
-        angular = tuple(a + b for a, b in zip(turned.angular, frame.twist.angular, strict=True))
+        rotated = twist_in_frame(state.twist, frame.pose.inverse())
+        linear = tuple(a + b + c for a, b, c in zip(rotated.linear, frame.twist.linear, lever, strict=True))
+        angular = tuple(a + b for a, b in zip(rotated.angular, frame.twist.angular, strict=True))
         twist = Twist((linear[0], linear[1], linear[2]), (angular[0], angular[1], angular[2]))
         body.set_state(BodyState(frame.pose @ state.pose, twist))
         self.revision += 1
@@ -247,13 +243,8 @@ class PhysicsWorld:
             digest.update(struct.pack(f"<{len(values)}d", *values))
         return digest.hexdigest()
 
-    def model_spec(self, name: str) -> specs.Model | None:
-        """Returns a model's description with its present pose; None for a robot."""
-        body = self.body(name)
-        return replace(body.spec, pose=body.state().pose) if body.spec is not None else None
-
     def close(self) -> None:
-        """Lets go of the physics engine; may be called twice."""
+        """Closes the physics engine; may be called twice."""
         self.engine.close()
 
     def _set_surfaces(self, body: SimulatedBody, model: specs.Model) -> None:

@@ -109,7 +109,7 @@ class RobotBody:
         self.starting_positions = self._complete(positions)
         self._limit_self_collisions()
         self._set_surfaces()
-        self._disarm_default_motors()
+        self._disable_default_motors()
         world.add(self.body, pose)
         self.reset()
 
@@ -168,7 +168,7 @@ class RobotBody:
         """Sets the motors of all joints for the coming physics steps.
 
         Args:
-            drives: Commands of the driven joints by name; joints that are not named hang free.
+            drives: Commands of the driven joints by name; joints that are not named are free.
         """
         step_s = self.world.settings.time_step_s
         indices: list[int] = []
@@ -238,7 +238,7 @@ class RobotBody:
         return complete
 
     def _limit_self_collisions(self) -> None:
-        """Leaves collisions between fingers only: the planner sees to the rest of the robot."""
+        """Leaves collisions between fingers only: the planner checks the rest of the robot."""
         engine, number = self.world.engine, self.body.number
         every = sorted(self.body.link_indices.values())
         fingers = self.fingers
@@ -268,7 +268,7 @@ class RobotBody:
                 physicsClientId=engine.client,
             )
 
-    def _disarm_default_motors(self) -> None:
+    def _disable_default_motors(self) -> None:
         engine = self.world.engine
         for index in self._indices:
             engine.api.setJointMotorControl2(

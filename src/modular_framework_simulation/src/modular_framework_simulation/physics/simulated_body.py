@@ -86,9 +86,9 @@ class SimulatedBody:
 
     def state(self) -> BodyState:
         """Returns where the model frame is in the world and how it moves."""
-        centre, twist = self._base()
-        pose = centre @ self._root_in_centre @ self._model_in_root
-        return BodyState(pose, _moved_twist(twist, centre, pose))
+        centre_in_world, twist = self._centre_state()
+        model_in_world = centre_in_world @ self._root_in_centre @ self._model_in_root
+        return BodyState(model_in_world, _twist_at(twist, centre_in_world, model_in_world))
 
     def link_state(self, link: str) -> BodyState:
         """Returns where a link frame is in the world and how it moves.
@@ -104,14 +104,14 @@ class SimulatedBody:
         if index is None:
             raise UnknownEntityError("link", f"{self.name}::{link}", [f"{self.name}::{n}" for n in self.link_names()])
         if index == BASE_INDEX:
-            centre, twist = self._base()
-            pose = centre @ self._root_in_centre
-            return BodyState(pose, _moved_twist(twist, centre, pose))
+            centre_in_world, twist = self._centre_state()
+            link_in_world = centre_in_world @ self._root_in_centre
+            return BodyState(link_in_world, _twist_at(twist, centre_in_world, link_in_world))
         api, client = self._engine.api, self._engine.client
         record = api.getLinkState(self.number, index, 1, 1, physicsClientId=client)
-        centre, twist = Pose(record[0], record[1]), Twist(record[6], record[7])
-        pose = Pose(record[4], record[5]) @ self._sdf_frame_in_urdf_frame(link)
-        return BodyState(pose, _moved_twist(twist, centre, pose))
+        centre_in_world, twist = Pose(record[0], record[1]), Twist(record[6], record[7])
+        link_in_world = Pose(record[4], record[5]) @ self._sdf_frame_in_urdf_frame(link)
+        return BodyState(link_in_world, _twist_at(twist, centre_in_world, link_in_world))
 
     def set_state(self, state: BodyState) -> None:
         """Puts the model somewhere; its joints keep their positions.
@@ -120,10 +120,12 @@ class SimulatedBody:
             state: Of the model frame, in the world frame.
         """
         api, client = self._engine.api, self._engine.client
-        centre = state.pose @ self._root_in_model @ self._centre_in_root
-        api.resetBasePositionAndOrientation(self.number, centre.position, centre.quaternion, physicsClientId=client)
+        centre_in_world = state.pose @ self._root_in_model @ self._centre_in_root
+        api.resetBasePositionAndOrientation(
+            self.number, centre_in_world.position, centre_in_world.quaternion, physicsClientId=client
+        )
         if not self.static:
-            twist = _moved_twist(state.twist, state.pose, centre)
+            twist = _twist_at(state.twist, state.pose, centre_in_world)
             api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
 
     def set_joints(self, positions: dict[str, float]) -> None:
@@ -154,7 +156,8 @@ class SimulatedBody:
             values += [value for record in records for value in record[:2]]
         return values
 
-    def _base(self) -> tuple[Pose, Twist]:
+    def _centre_state(self) -> tuple[Pose, Twist]:
+        """Returns pose and velocity of the root link's centre of mass, in the world frame."""
         api, client = self._engine.api, self._engine.client
         position, quaternion = api.getBasePositionAndOrientation(self.number, physicsClientId=client)
         if self.static:
@@ -170,13 +173,13 @@ class SimulatedBody:
         return Pose()
 
 
-def _moved_twist(twist: Twist, known_at: Pose, wanted_at: Pose) -> Twist:
-    """Returns the twist of a rigid body as seen at another of its points, both poses in the world frame."""
-    x, y, z = (b - a for a, b in zip(known_at.position, wanted_at.position, strict=True))
+def _twist_at(twist: Twist, from_in_world: Pose, to_in_world: Pose) -> Twist:
+    """Returns the twist of a rigid body at another of its points."""
+    x, y, z = (b - a for a, b in zip(from_in_world.position, to_in_world.position, strict=True))
     return Twist(add(twist.linear, cross(twist.angular, (x, y, z))), twist.angular)
 
 
-def twist_in_frame(twist: Twist, frame: Pose) -> Twist:
-    """Returns a world-frame twist with its vectors turned into a frame's axes."""
-    back = frame.inverse().quaternion
-    return Twist(rotate_vector(back, twist.linear), rotate_vector(back, twist.angular))
+def twist_in_frame(twist: Twist, frame_in_world: Pose) -> Twist:
+    """Returns a twist given in the axes of the world in the axes of a frame."""
+    world_to_frame = frame_in_world.inverse().quaternion
+    return Twist(rotate_vector(world_to_frame, twist.linear), rotate_vector(world_to_frame, twist.angular))
