@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import TypeVar
-from xml.parsers import expat
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_urdf.xml_text import XmlError, refuse_doctype
+from modular_framework_urdf import xml_text
 
 Choice = TypeVar("Choice", bound=Enum)
 
@@ -154,33 +153,16 @@ def parse_xml(text: str, source: str) -> XmlNode:
     Raises:
         DescriptionError: The text is not well-formed XML, or has a DOCTYPE.
     """
-    parser = expat.ParserCreate("utf-8")
-    document = XmlNode("document", {}, source, 1)
-    stack = [document]
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        node = XmlNode(tag, attributes, source, parser.CurrentLineNumber)
-        stack[-1].children.append(node)
-        stack.append(node)
-
-    def end(_tag: str) -> None:
-        stack.pop()
-
-    def characters(data: str) -> None:
-        stack[-1].text += data
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = characters
     try:
-        refuse_doctype(text, source)
-        parser.Parse(text.encode(), True)
-    except XmlError as error:
+        return _node(xml_text.parse(text, source), source)
+    except xml_text.XmlError as error:
         raise DescriptionError(error.where, error.found, error.allowed) from error
-    except expat.ExpatError as error:
-        where = f"{source}:{error.lineno}"
-        raise DescriptionError(where, f"is not well-formed XML ({error})", "mend the file") from error
-    return document.children[0]
+
+
+def _node(element: xml_text.Element, source: str) -> XmlNode:
+    text = "".join([element.text or "", *(child.tail or "" for child in element)])
+    children = [_node(child, source) for child in element]
+    return XmlNode(element.tag, dict(element.attrib), source, element.sourceline, text, children)
 
 
 def read_xml(path: Path) -> XmlNode:
