@@ -65,8 +65,13 @@ def _package_lines(package: str, tree: SourceTree, table: LayerTable, pairs: Edg
     for room in rooms:
         yield f'    "{package}/{room}" [label="{_room_label(package, room, tree)}"];'
     inside = between(pairs, lambda module: room_of(module, package, tree))
-    for upper, lower in sorted(without_shortcuts({edge for edge in inside if all(edge)})):
+    arrows = without_shortcuts({edge for edge in inside if all(edge)})
+    for upper, lower in sorted(arrows):
         yield f'    "{package}/{upper}" -> "{package}/{lower}";'
+    for room in rooms:
+        if not any(room in arrow for arrow in arrows):  # an arrow that is not seen keeps it near the others
+            upper, lower = (rooms[1], room) if room == rooms[0] else (room, rooms[0])
+            yield f'    "{package}/{upper}" -> "{package}/{lower}" [style=invis];'
     yield "  }"
 
 
