@@ -26,7 +26,7 @@ def published(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The messages that were published."""
     messages: list[Any] = []
     monkeypatch.setattr(scene_markers.rospy, "Publisher", lambda *_, **__: None)
-    monkeypatch.setattr(scene_markers, "tell", lambda _, message: messages.append(message))
+    monkeypatch.setattr(scene_markers, "publish", lambda _, message: messages.append(message))
     return messages
 
 
