@@ -2,8 +2,9 @@
 """A Universal Robots controller in software, for everything that talks to one, with faults on command.
 
 It listens where a controller does: RTDE (30004), scripts (30001, 30002, 30003), dashboard (29999). The program that
-ur-rtde uploads is recognised and its effect carried out (ur_control_script.py). The arm is a UR5. Faults and the log of
-the commanded path are ordered at the command port (command_port.py); `help` there lists the orders.
+ur-rtde uploads is recognised and its effect carried out (ur_control_script.py). The arm is a UR5. The command port
+(command_port.py) injects faults and logs the commanded path: methods `inject_<name>` and `command_<name>` are its
+commands, which `help` lists.
 """
 from __future__ import annotations
 
@@ -41,7 +42,7 @@ class UrEmulator:
         model: name of a model in MODELS.
         positions: joint positions at the beginning [rad].
         unlock_delay_s: time after a protective stop before it can be unlocked [s].
-        command_port: TCP port for orders; 0 for any.
+        command_port: TCP port of the commands; 0 for any.
     """
 
     def __init__(self, address: str = "127.0.0.1", model: str = "UR5", positions: Sequence[float] = HOME,
@@ -58,8 +59,8 @@ class UrEmulator:
         self._stopping = threading.Event()
         self._log: IO[str] | None = None
         self.commands: dict[str, Callable[..., str | None]] = {
-            name.replace("order_", ""): self._locked(getattr(self, name)) for name in dir(self)
-            if name.startswith("order_")}
+            name.partition("_")[2]: self._locked(getattr(self, name)) for name in dir(self)
+            if name.startswith(("inject_", "command_"))}
         self._port = CommandPort(self.commands, command_port, address)
 
     def connect(self) -> None:
@@ -131,7 +132,7 @@ class UrEmulator:
         self._links.close()
 
     def inject_freeze(self) -> None:
-        """Let nothing through though connections stay open (half-open sockets), until `restore`."""
+        """Let nothing through while connections stay open (half-open sockets), until `restore`."""
         self._links.faults.frozen = True
 
     def inject_delay(self, seconds: float) -> None:

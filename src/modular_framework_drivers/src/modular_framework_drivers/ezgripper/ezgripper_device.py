@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An EZGripper that can be used from any thread and never makes one wait.
+"""An EZGripper that any thread can use without ever having to wait.
 
-A thread of its own talks to the servos: it connects, calibrates, follows goals, and, whatever goes wrong, says so and
-comes back by itself. Everybody else reads its last state and leaves a wish, each of them one attribute: there is no
-lock that a control loop could have to wait for.
+One thread communicates with the servos: it connects, calibrates and follows goals; after a fault it reports the reason
+and connects again by itself. Other threads read the last state and write the next request. Each of the two is a single
+attribute, so there is no lock that the control loop might have to wait for.
 """
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, S
 
 LOGGER = logging.getLogger("rosout.ezgripper")
 WARM = 70.0
-"""From here on a motor is reported as warm [deg C]; it switches itself off at 80."""
+"""Temperature from which on a warning is logged [deg C]; the motor switches itself off at 80."""
 UNWATCHED_TORQUE = 100
-"""What the maker lets an MX-64 hold with for any time [units of the servo]."""
+"""Torque that an MX-64 may apply for any length of time, by its maker [units of the servo]."""
 SILENT_S = 1.0
-"""A state older than this and the time a servo has to answer is none [s]."""
+"""A state older than this, plus the time a servo has for its answer, counts as lost [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
-    """The gripper as it was when it answered last.
+    """State of the gripper at its last answer.
 
     Attributes:
-        stamp_s: when, on the monotonic clock [s]; minus infinity before it is calibrated.
+        stamp_s: time of the answer on the monotonic clock [s]; minus infinity before it is calibrated.
         reading: what was measured.
-        motion: what the fingers do.
-        goal: what they do it for.
-        ready: calibrated, and has been at its start position.
-        fault: why it cannot be used just now, "" when it can.
-        faults: grows with every fault, so that one that came and went between two looks is not missed.
-        last_fault: the latest of them, "" before the first.
+        motion: state of the fingers.
+        goal: the one that is followed.
+        ready: whether it is calibrated and has been at its start position.
+        fault: why it cannot be used at the moment; "" if it can.
+        faults: number of faults so far, so that one that came and went between two reads is not missed.
+        last_fault: the latest of them; "" before the first.
     """
 
     stamp_s: float
@@ -62,11 +62,11 @@ class GripperState:
 
 @dataclass(frozen=True, slots=True)
 class _Request:
-    """What was asked for last: a goal, or with None to stop.
+    """The last request of another thread.
 
     Attributes:
-        goal: where to go.
-        faults: how many faults had been told before; a wish from before one is void.
+        goal: to follow; None to stop.
+        faults: number of faults at that time; a fault that comes later cancels the request.
     """
 
     goal: Goal | None
@@ -74,14 +74,14 @@ class _Request:
 
 
 class _Ended(Exception):
-    """The device is to be closed."""
+    """`close` was called."""
 
 
 class EzGripper:
     """One gripper. `start`, then `state`, `command` and `stop` from any thread; `close` in the end.
 
     Args:
-        settings: how to reach it and how to treat it.
+        settings: of its connection and its motions.
     """
 
     def __init__(self, settings: GripperSettings) -> None:
@@ -104,18 +104,18 @@ class EzGripper:
     # ---- any thread ----
 
     def start(self) -> None:
-        """Begin to connect. Returns at once; `state` tells how it goes."""
+        """Begins to connect; returns at once. `state` has the result."""
         self._thread = threading.Thread(target=self._run, name=self.settings.name, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Stop the fingers, go on holding with little torque, and end. May be called twice."""
+        """Stops the fingers, which keep holding with little torque, and the thread; may be called twice."""
         self._ended.set()
         if self._thread is not None:
             self._thread.join(2.0)
 
     def state(self) -> GripperState:
-        """The latest state; one that is too old has a fault that says so."""
+        """Returns the latest state; if it is too old, it has a fault that says so."""
         state = self._state
         age_s = time.monotonic() - state.stamp_s
         if age_s > SILENT_S + self.settings.link_timeout_s and not state.fault:
@@ -123,16 +123,17 @@ class EzGripper:
         return state
 
     def command(self, position: float, torque: int) -> int:
-        """Leave a goal; while there is a fault it is ignored, and one left just before a fault is told is void.
+        """Requests a motion; ignored while there is a fault, and cancelled by a fault that comes before it is handled.
 
-        So who waits for a goal looks at `state().faults` too: once it has changed, the goal may never be worked on.
+        A client that waits for its goal must therefore also watch `state().faults`: once that has changed, the goal may
+        never be followed.
 
         Args:
             position: of the knuckle joint [rad].
-            torque: greatest torque [units of the servo].
+            torque: largest torque [units of the servo].
 
         Returns:
-            The number of the goal, which `state().goal` has once it is worked on.
+            The number of the goal; `state().goal` has it once the goal is followed.
 
         Raises:
             ValueError: the position or the torque is out of its limits.
@@ -147,7 +148,7 @@ class EzGripper:
         return goal.number
 
     def stop(self) -> None:
-        """Stop the fingers where they are; what they hold they go on holding."""
+        """Requests a stop at the present position; an object that is held stays held."""
         self._request = _Request(None, self._state.faults)
 
     # ---- the gripper's thread ----
@@ -174,7 +175,7 @@ class EzGripper:
             self._bus.close()
 
     def _hold_safely(self) -> None:
-        """Leave the fingers where they are, with a torque that the motor endures without anybody looking after it."""
+        """Stops the fingers with a torque that the motor can sustain without supervision."""
         if not self._ready or self._state.fault:
             return
         try:
@@ -190,7 +191,7 @@ class EzGripper:
             raise _Ended
 
     def _connect(self) -> None:
-        """Open the line, and bring the servos into a known state; a motor with a fault is left to the next cycle."""
+        """Opens the serial line and brings the servos into a known state; the next cycle handles a fault of a motor."""
         self._bus.open()
         self._servos.set_up()
         known = self._servos.calibrated
@@ -212,7 +213,7 @@ class EzGripper:
         self._servos.drive(self._grip.update(reading.position, now_s))
 
     def _follow_anew(self, position: float) -> None:
-        """Forget the goal; the new one is `position` [rad]."""
+        """Replaces the state machine and its goal; the new goal is `position` [rad]."""
         position = min(max(position, 0.0), CLOSED_POSITION)
         self._grip = Grip(self.settings.rules, Goal(next(self._numbers), position, self.settings.start_torque))
 
@@ -221,7 +222,7 @@ class EzGripper:
         if reading.errors & MOTOR_FAULTS:
             self._handle_motor_fault(reading, now_s)
             return
-        if self._off_since_s is not None:  # the motor has come round, but not its torque limit
+        if self._off_since_s is not None:  # the motor is on again, but has lost its torque limit
             self._off_since_s = None
             self._servos.forget()
             self._follow_anew(reading.position)
@@ -244,8 +245,8 @@ class EzGripper:
             self._grip.retarget(request.goal, position, time_s)
 
     def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
-        """Say it, and let the fingers stay, for not every fault switches every motor off; after a pause give the torque
-        again, where they are."""
+        """Publishes the fault and stops the fingers, because not every fault switches every motor off; after a pause it
+        switches the torque on again, at the present position."""
         text = f"{self.settings.name}: {describe_errors(reading.errors, reading.temperature, reading.voltage)}"
         since_s = self._off_since_s
         if since_s is None:
@@ -277,7 +278,7 @@ class EzGripper:
             LOGGER.info("%s: in use", self.settings.name)
 
     def _report(self, problem: str, level: int = logging.ERROR) -> None:
-        """Publish a fault; log it when it is another one than before."""
+        """Publishes a fault; logs it if it differs from the last one."""
         text = f"{self.settings.name}: {problem}"
         if text != self._state.fault:
             LOGGER.log(level, "%s", text)

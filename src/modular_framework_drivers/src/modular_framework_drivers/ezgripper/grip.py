@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides what the gripper's motor has to do: go somewhere, stay there, or go on squeezing what is in the way.
+"""Decides how the gripper's motor is driven: to a position, or with a constant torque against an object.
 
-A gripper that meets an object must not go on pushing in position control: the motor would try with all it may until it
-shuts down with an overload, or would let go when the object gives way. So, once the fingers have stood still for a
-while short of their goal, the motor gets a constant torque towards it, which does no harm and follows the object.
+In position control a motor whose fingers meet an object pushes with all the torque it may use until it shuts down with
+an overload, and it lets go when the object gives way. So, when the fingers have stood still for some time short of
+their goal (a stall), the motor is switched to a constant torque towards the goal. It can sustain that torque, and the
+fingers follow the object.
 """
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from enum import Enum
 
 
 class Motion(Enum):
-    """What the fingers do."""
+    """State of the fingers: on their way, at the goal, or stalled against an object that they hold."""
 
     MOVING = "moving"
     REACHED = "reached"
@@ -22,12 +23,12 @@ class Motion(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Where to go.
+    """Goal of a motion.
 
     Attributes:
-        number: counts the goals, so that whoever gave one can tell when it is the one worked on.
+        number: counts the goals, so that a client recognises its own.
         position: of the knuckle joint [rad].
-        torque: greatest torque [units of the servo, 0 to 1023].
+        torque: largest torque [units of the servo, 0 to 1023].
     """
 
     number: int
@@ -37,11 +38,11 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What the motor is told.
+    """Command to the motor.
 
     Attributes:
-        position: to control to [rad]; None when it applies a torque instead.
-        torque: greatest torque, or the one to apply [units of the servo].
+        position: set point of the position control [rad]; None for torque control.
+        torque: largest torque in position control, the torque itself in torque control [units of the servo].
         direction: of the torque: 1 closes, -1 opens.
     """
 
@@ -52,14 +53,14 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class GripRules:
-    """When the fingers count as arrived or held up.
+    """Thresholds that decide when a goal is reached and when the fingers have stalled.
 
     Attributes:
-        position_tolerance: distance that counts as arrived [rad].
-        settle_s: arrived ones have been still for so long [s].
-        stall_s: held up ones have been still for so long [s].
-        still: still is who moves less than this [rad].
-        hold_torque: greatest torque to hold something with, which the motor endures for long [units of the servo].
+        position_tolerance: largest distance from the goal at which it counts as reached [rad].
+        settle_s: for how long the fingers must stand still at the goal [s].
+        stall_s: for how long they must stand still short of the goal to count as stalled [s].
+        still: largest motion that counts as standing still [rad].
+        hold_torque: largest torque to hold an object with; the motor can sustain it [units of the servo].
     """
 
     position_tolerance: float = 0.03
@@ -70,11 +71,11 @@ class GripRules:
 
 
 class Grip:
-    """The motion of the fingers; told the measured position every now and then, it says what the motor has to do.
+    """State machine of the fingers: from goals and measured positions to commands for the motor.
 
     Args:
-        rules: when is arrived, when held up.
-        goal: to begin with.
+        rules: when a goal is reached, when the fingers have stalled.
+        goal: the first one.
     """
 
     def __init__(self, rules: GripRules, goal: Goal) -> None:
@@ -87,13 +88,14 @@ class Grip:
         self._rest_since_s = 0.0
 
     def retarget(self, goal: Goal, position: float, time_s: float) -> None:
-        """Take a new goal.
+        """Sets a new goal.
 
-        Whoever holds something goes on holding it, with the new goal's torque, unless the goal is to let go; to stay
-        where one is, as a controller commands that holds its joints, is not.
+        Fingers that hold an object keep holding it, with the torque of the new goal, unless the goal opens them by more
+        than the tolerance. A goal at the present position, such as a controller sends to hold its joints, does not
+        release the object.
 
         Args:
-            goal: where to go now.
+            goal: replaces the present one.
             position: measured [rad].
             time_s: now [s].
         """
@@ -109,12 +111,12 @@ class Grip:
             self._begin(position, time_s)
 
     def stop(self, position: float) -> None:
-        """Stop moving fingers; those that stand, or hold something, go on with that."""
+        """Makes the measured position [rad] the goal of moving fingers; those that stand or hold an object are left."""
         if self.motion is Motion.MOVING:
             self.goal = replace(self.goal, position=position)
 
     def update(self, position: float, time_s: float) -> Drive:
-        """What the motor has to do with the fingers at `position` [rad], at `time_s` [s]."""
+        """Returns the command to the motor for fingers that are at `position` [rad] at `time_s` [s]."""
         if not abs(position - self._rest_position) <= self._rules.still:
             self._rest_position, self._rest_since_s = position, time_s
         still_s = time_s - self._rest_since_s
@@ -148,19 +150,22 @@ class Grip:
 
 
 class StandstillDetector:
-    """Whether fingers stand; that they are slow once is not enough, so they are where they turn round too.
+    """Detects that the fingers stand still.
+
+    One small velocity is not enough, because fingers that reverse their direction have one too: all velocities
+    measured over a time must be small.
 
     Args:
-        slow: who stands is slower than this [rad/s].
-        duration_s: and has been all the time for so long [s].
+        max_speed: largest speed that counts as standing still [rad/s].
+        duration_s: for how long it must not be exceeded [s].
     """
 
-    def __init__(self, slow: float, duration_s: float) -> None:
-        self._slow = slow
+    def __init__(self, max_speed: float, duration_s: float) -> None:
+        self._max_speed = max_speed
         self._duration_s = duration_s
         self._since_s = math.inf
 
     def update(self, velocity: float, time_s: float) -> bool:
-        """Take a measured velocity [rad/s] of `time_s` [s]; returns whether the fingers stand."""
-        self._since_s = min(self._since_s, time_s) if abs(velocity) < self._slow else math.inf
+        """Adds the velocity [rad/s] measured at `time_s` [s]; returns whether the fingers stand still."""
+        self._since_s = min(self._since_s, time_s) if abs(velocity) < self._max_speed else math.inf
         return time_s - self._since_s >= self._duration_s

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The servos of one EZGripper as one joint: set up, calibrated, read and driven in the unit of the knuckle joint.
 
-Facts of the maker's public library: the motor closes the fingers clockwise; calibration lets it close with little
-torque until it stands, and takes that place as zero; from there to fully open it turns 2500 ticks, while the knuckle
-joint goes from 1.94 rad to 0.
+From the maker's public library: the motor closes the fingers clockwise. Calibration closes them with little torque
+until they stand still and takes that position as zero. From there to fully open the motor turns 2500 ticks, and the
+knuckle joint moves from 1.94 rad to 0.
 """
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CLOSED_POSITION = 1.94
 """Of the knuckle joint with the pads together [rad]."""
 TRAVEL_TICKS = 2500
 SLACK_TICKS = 400
-"""How far beyond its ends the travel may seem to go [ticks]."""
+"""How far beyond the ends of the travel a position may be measured [ticks]."""
 CALIBRATION_TORQUE = 100
 RELAXED_TORQUE = 10
 CALIBRATION_TIMEOUT_S = 10.0
@@ -30,7 +30,7 @@ LIMIT_REGISTERS = (mx64.CW_ANGLE_LIMIT, mx64.CCW_ANGLE_LIMIT)
 
 
 class GripperError(Exception):
-    """The gripper answers, but cannot be used as it is; the text says what to do."""
+    """The gripper answers but cannot be used; the text says what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class GripperReading:
 
 @dataclass(slots=True)
 class _Servo:
-    """What is known of one servo: its zero [ticks], and what was written to its RAM last."""
+    """One servo: its zero [ticks], and the values that were written to its RAM last."""
 
     servo_id: int
     zero: int | None = None
@@ -74,12 +74,12 @@ def ticks_from_joint(position: float) -> int:
 
 
 class GripperServos:
-    """All servos of a gripper. Not for several threads at once.
+    """All servos of a gripper; to be used by one thread.
 
     Args:
         bus: the open serial line.
         servo_ids: which servos move the fingers.
-        wait: lets some seconds pass; raises when the wait is to be cut short.
+        wait: waits for some time [s]; raises to end the wait early.
     """
 
     def __init__(self, bus: DynamixelBus, servo_ids: Sequence[int], wait: Callable[[float], None]) -> None:
@@ -92,7 +92,7 @@ class GripperServos:
         return all(servo.zero is not None for servo in self._servos)
 
     def set_up(self) -> None:
-        """Check the servos' model and bring what stays in their memory into order.
+        """Checks the model of each servo and sets its permanent registers.
 
         Raises:
             BusError: one does not answer.
@@ -110,7 +110,7 @@ class GripperServos:
             self._ensure(servo, mx64.RESOLUTION_DIVIDER, 1)
 
     def calibrate(self) -> None:
-        """Close until the fingers stand, and take that for the zero. Nothing may be between them.
+        """Closes until the fingers stand still, and takes that position as zero. Nothing may be between them.
 
         Raises:
             BusError: a servo does not answer.
@@ -153,14 +153,14 @@ class GripperServos:
                 raise GripperError(f"calibration: {describe_errors(reading.errors, hottest, lowest)}")
 
     def find_again(self) -> bool:
-        """After a lost link: whether the servos have been doing all along what they were told last.
+        """Returns whether the servos, after a lost link, still have the values that were written last.
 
-        When not, they were without power: what they are told is forgotten, and the turns of their shafts are counted
-        anew, which needs no motion because the travel is less than one turn.
+        If not, they were without power. Then everything is written again at the next `drive`, and the turns of their
+        shafts are counted anew, which needs no motion because the travel is less than one turn.
 
         Raises:
             BusError: a servo does not answer.
-            GripperError: a shaft is where it cannot be; its zero is kept, so that nothing moves to find another.
+            GripperError: a shaft is outside the travel; its zero is kept, so that no new calibration moves the fingers.
         """
         faithful = all(self._remembers(servo) for servo in self._servos)
         for servo in self._servos:
@@ -181,7 +181,7 @@ class GripperServos:
             for register, value in servo.written.items())
 
     def forget(self) -> None:
-        """Write everything anew at the next drive; a motor that shut down has lost its torque limit."""
+        """Makes the next `drive` write every value; a motor that shut down has lost its torque limit."""
         for servo in self._servos:
             servo.written.clear()
 
@@ -204,13 +204,13 @@ class GripperServos:
                               min(reading.voltage for reading in readings), errors)
 
     def drive(self, drive: Drive) -> None:
-        """Tell the motors what to do; only what has changed is sent.
+        """Sends a command to the motors; only values that have changed are written.
 
         Raises:
             BusError: a servo does not answer.
         """
         for servo in self._servos:
-            # a motor that may do more than before must not yet have its old goal; it never does more than is allowed
+            # A lower torque limit is written before the new goal, a higher one after it: the motor exceeds neither.
             if drive.position is None or drive.torque < servo.written.get(mx64.TORQUE_LIMIT, 0):
                 self._write(servo, mx64.TORQUE_LIMIT, drive.torque)
             if drive.position is None:
@@ -222,7 +222,7 @@ class GripperServos:
             self._write(servo, mx64.TORQUE_ENABLE, 1)
 
     def stay(self) -> None:
-        """Tell every motor to stay where it is, with the torque it has: one that has shut down stays off.
+        """Commands every motor to its present position, with the torque it has: one that has shut down stays off.
 
         Raises:
             BusError: a servo does not answer.
@@ -236,18 +236,18 @@ class GripperServos:
 
     def _write(self, servo: _Servo, register: Register, value: int) -> None:
         if servo.written.get(register) != value:
-            servo.written.pop(register, None)  # when its answer is lost nobody knows whether the servo has done it
+            servo.written.pop(register, None)  # if the answer is lost, the value is unknown
             self._bus.write(servo.servo_id, register, value)
             servo.written[register] = value
 
     def _ensure(self, servo: _Servo, register: Register, value: int) -> None:
-        """Write to the EEPROM, which does not live for ever, only what is not there yet."""
+        """Writes a value to the EEPROM only if it is not there yet, because its number of writes is limited."""
         if mx64.from_bytes(self._bus.read(servo.servo_id, register)[0]) != value:
             self._bus.write(servo.servo_id, register, value)
 
 
 def describe_errors(errors: ServoErrors, temperature: float, voltage: float) -> str:
-    """What the motor's error bits mean, and what to do."""
+    """Describes the motor's error bits and what to do."""
     texts = []
     if errors & ServoErrors.OVERHEATING:
         texts.append(f"the motor is too hot ({temperature:.0f} degrees C) and has switched itself off; let it cool, "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Grasp action of an EZGripper without ROS controllers: from the goal to the servos and back, in one node."""
+"""The Grasp action of an EZGripper without ROS controllers: one node drives the servos itself."""
 from __future__ import annotations
 
 import threading
@@ -28,7 +28,7 @@ POLL_S = 0.01
 STOP_TIMEOUT_S = 1.0
 STANDSTILL_SPEED, STANDSTILL_S = 0.05, 0.1
 PRESSING_SHARE = 0.5
-"""Of the torque allowed; motors that give less do not press."""
+"""Share of the allowed torque from which on the fingers count as pressing."""
 
 
 class EzGripperManipulator:
@@ -46,21 +46,21 @@ class EzGripperManipulator:
         self._publisher: rospy.Publisher | None = None
 
     def connect(self) -> None:
-        """Begin to connect the gripper, and to publish."""
+        """Begins to connect the gripper and to publish."""
         self._gripper.start()
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=10)
         threading.Thread(target=self._publish, name="joint_states", daemon=True).start()
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
-        """The joint as measured last."""
+        """Returns the joint as measured last."""
         del names
         return self._message(self._gripper.state())
 
     def move(self, motion: WantedMotion) -> Outcome:
-        """Move the fingers until they stand at their goal or hold something.
+        """Moves the fingers until they stand still at their goal or hold an object.
 
         Raises:
-            GraspCommandError: the gripper has a fault or may use no torque, time is up, or the motion was stopped.
+            GraspCommandError: the gripper has a fault or may use no torque, the time is over, or a stop was requested.
         """
         torque = self._gripper.settings.start_torque
         if self._joint in motion.efforts:
@@ -68,7 +68,7 @@ class EzGripperManipulator:
             refuse_no_effort(self._joint, torque)
         before = self._gripper.state()
         self._refuse_fault(before)
-        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # what was rounded is forgiven
+        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # forgives rounding
         number = self._gripper.command(position, torque)
         end_s = time.monotonic() + motion.timeout_s
         # an object that the fingers hold may give way to the new torque
@@ -76,7 +76,7 @@ class EzGripperManipulator:
         while True:
             state = self._gripper.state()
             self._refuse_fault(state)
-            if state.faults != before.faults:    # come and gone between two looks; the goal may be void by it
+            if state.faults != before.faults:    # a fault between two reads may have cancelled the goal
                 self._stop()
                 raise GraspCommandError(state.last_fault)
             if motion.stop_requested():
@@ -105,7 +105,7 @@ class EzGripperManipulator:
             raise GraspCommandError(state.fault)
 
     def _stop(self) -> None:
-        """Stop the servo, and see that it stands."""
+        """Stops the fingers, and waits until they stand still."""
         self._gripper.stop()
         asked_s = time.monotonic()
         standstill = StandstillDetector(STANDSTILL_SPEED, STANDSTILL_S)
