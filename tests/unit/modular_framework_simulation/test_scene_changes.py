@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A planning scene is told what changed in the world, and nothing else."""
+"""A planning scene gets what changed in the world, and nothing else."""
 
 from __future__ import annotations
 
-from modular_framework_simulation.gazebo_ros.scene_changes import Attach, Detach, Move, Put, Remove, SceneChanges
+from modular_framework_simulation.gazebo_ros.scene_changes import Add, Attach, Detach, Move, Remove, SceneChanges
 from modular_framework_simulation.loop.snapshots import HeldObject, LinkSnapshot, ModelSnapshot, WorldSnapshot
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Link
@@ -35,7 +35,7 @@ def told(*snapshots: WorldSnapshot) -> SceneChanges:
 
 def test_a_new_object_is_put_once() -> None:
     changes = SceneChanges()
-    assert changes.towards(snapshot(0.0)) == [Put(CUBE, LINK, at(0.0))]
+    assert changes.towards(snapshot(0.0)) == [Add(CUBE, LINK, at(0.0))]
     changes.confirm()
     assert changes.towards(snapshot(0.0)) == []
 
@@ -43,7 +43,7 @@ def test_a_new_object_is_put_once() -> None:
 def test_what_was_not_confirmed_is_told_again() -> None:
     changes = SceneChanges()
     changes.towards(snapshot(0.0))
-    assert changes.towards(snapshot(0.0)) == [Put(CUBE, LINK, at(0.0))]
+    assert changes.towards(snapshot(0.0)) == [Add(CUBE, LINK, at(0.0))]
 
 
 def test_movements_count_from_one_millimetre_and_add_up() -> None:
@@ -61,7 +61,7 @@ def test_a_turn_of_a_hundredth_radian_counts() -> None:
 
 def test_a_deleted_object_is_removed_and_one_spawned_again_is_replaced() -> None:
     assert told(snapshot(0.0)).towards(snapshot(None)) == [Remove(CUBE)]
-    assert told(snapshot(0.0)).towards(snapshot(0.0, instance=2)) == [Remove(CUBE), Put(CUBE, LINK, at(0.0))]
+    assert told(snapshot(0.0)).towards(snapshot(0.0, instance=2)) == [Remove(CUBE), Add(CUBE, LINK, at(0.0))]
 
 
 def test_a_held_object_is_attached_and_may_travel_with_the_hand() -> None:
@@ -78,7 +78,7 @@ def test_slip_in_the_hand_is_told() -> None:
 
 def test_a_released_object_is_detached_and_put_where_it_is() -> None:
     changes = told(snapshot(0.0, held_at=-1.0))
-    assert changes.towards(snapshot(0.3)) == [Detach(CUBE, "palm"), Put(CUBE, LINK, at(0.3))]
+    assert changes.towards(snapshot(0.3)) == [Detach(CUBE, "palm"), Add(CUBE, LINK, at(0.3))]
 
 
 def test_a_held_object_that_is_deleted_is_detached_and_removed() -> None:
@@ -98,7 +98,7 @@ def three(cube_at: float = 0.0, held_at: float | None = None) -> WorldSnapshot:
 def put_again(changes: SceneChanges, world: WorldSnapshot) -> set[tuple[str, str]]:
     """The objects that are sent, all of them as new ones."""
     found = changes.towards(world)
-    assert all(isinstance(change, Put | Attach) for change in found), found
+    assert all(isinstance(change, Add | Attach) for change in found), found
     changes.confirm()
     return {change.key for change in found}
 
@@ -125,7 +125,7 @@ def test_what_another_node_removes_by_name_stays_out_until_it_moves() -> None:
     assert changes.compare({TABLE, BALL}, {}) == [CUBE]
     assert changes.towards(three()) == []
     assert changes.compare({TABLE, BALL}, {}) == [], "named once"
-    assert changes.towards(three(cube_at=0.1)) == [Put(CUBE, LINK, at(0.1))]
+    assert changes.towards(three(cube_at=0.1)) == [Add(CUBE, LINK, at(0.1))]
 
 
 def test_objects_removed_one_by_one_come_back_when_none_is_left() -> None:
@@ -153,14 +153,14 @@ def test_what_another_node_attached_is_left_to_it_until_the_gripper_holds_it() -
     assert changes.towards(three(cube_at=0.2)) == []
     assert changes.towards(three(cube_at=0.2, held_at=-1.0)) == [Attach(CUBE, LINK, "palm", at(1.2))]
     assert changes.compare({TABLE, BALL, CUBE}, {}) == []
-    assert changes.towards(three(cube_at=0.2)) == [Put(CUBE, LINK, at(0.2))], "put down by that node, somewhere"
+    assert changes.towards(three(cube_at=0.2)) == [Add(CUBE, LINK, at(0.2))], "put down by that node, somewhere"
 
 
 def test_what_another_node_detached_stays_so_until_the_gripper_lets_it_go() -> None:
     changes = told(three(held_at=-1.0))
     assert changes.compare({TABLE, BALL, CUBE}, {}) == []
     assert changes.towards(three(held_at=-1.0)) == []
-    assert changes.towards(three(cube_at=0.3)) == [Put(CUBE, LINK, at(0.3))]
+    assert changes.towards(three(cube_at=0.3)) == [Add(CUBE, LINK, at(0.3))]
 
 
 def test_an_object_that_vanished_while_the_receiver_was_away_is_removed() -> None:

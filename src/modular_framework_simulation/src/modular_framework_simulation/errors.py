@@ -23,11 +23,11 @@ class DescriptionError(SimulationError):
 
 
 class UnknownEntityError(SimulationError):
-    """A model, link or frame was asked for that the world does not have.
+    """The world has no model, link or joint of a requested name.
 
     Args:
         kind: What was not found: "model", "link" or "joint".
-        name: The name that was asked for.
+        name: The requested name.
         known: The names that exist.
     """
 

@@ -13,7 +13,19 @@ from smach.exceptions import InvalidUserCodeError
 __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
 
-class UserData:
+class _ItemsAsAttributes:
+    """Reads items as attributes; names that begin with an underscore are not items."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]  # type: ignore[index]
+        except KeyError:
+            raise AttributeError(self._missing(name)) from None
+
+
+class UserData(_ItemsAsAttributes):
     """A set of named values, read and written as attributes or as items, safe to share between threads."""
 
     def __init__(self) -> None:
@@ -67,13 +79,8 @@ class UserData:
         with self._lock:
             self._data[key] = item
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"userdata has no key '{name}'; it has: {sorted(self.keys())}") from None
+    def _missing(self, name: str) -> str:
+        return f"userdata has no key '{name}'; it has: {sorted(self.keys())}"
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name.startswith("_"):
@@ -135,7 +142,7 @@ class Const:
         )
 
 
-class Remapper:
+class Remapper(_ItemsAsAttributes):
     """The view a state has of its container's userdata: only its declared keys, under its own names."""
 
     def __init__(
@@ -186,15 +193,8 @@ class Remapper:
     def __contains__(self, key: object) -> bool:
         return isinstance(key, str) and key in self._input_keys and self._remap(key) in self._ud
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(
-                f"userdata key '{name}' has no value yet (it is called '{self._remap(name)}' in the container)"
-            ) from None
+    def _missing(self, name: str) -> str:
+        return f"userdata key '{name}' has no value yet (it is called '{self._remap(name)}' in the container)"
 
     def __setattr__(self, name: str, value: Any) -> None:
         self[name] = value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows the simulated world to move_group, so that nobody has to keep a planning scene by hand.
+"""Shows the simulated world to move_group, so that its planning scene need not be kept up by hand.
 
 A thread of its own compares the latest snapshot of the world with what the scene has and sends the differences to
 move_group's service. What the scene has is read back after changes and from time to time: other nodes change it too,
@@ -27,11 +27,11 @@ from std_msgs.msg import ColorRGBA
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.scene_changes import (
+    Add,
     Attach,
     Change,
     Detach,
     Move,
-    Put,
     Remove,
     SceneChanges,
 )
@@ -153,7 +153,7 @@ class PlanningScenePublisher:
             )
 
     def _server_is_there(self) -> bool:
-        """Asks the master twice a second; a server at another address is a new one that knows nothing."""
+        """Asks the master twice a second; a server at another address was started anew and has no objects."""
         now = time.monotonic()
         if now >= self._next_lookup_s:
             self._next_lookup_s = now + _PRESENCE_PERIOD_S
@@ -191,10 +191,10 @@ class PlanningScenePublisher:
         model, link = change.key
         identity = conversions.collision_object_id(model, link)
         attached, world = scene.robot_state.attached_collision_objects, scene.world.collision_objects
-        if isinstance(change, Put | Attach) and change.link.visuals:
+        if isinstance(change, Add | Attach) and change.link.visuals:
             scene.object_colors.append(ObjectColor(identity, ColorRGBA(*change.link.visuals[0].colour)))
         match change:
-            case Put(link=spec, pose_in_world=pose):
+            case Add(link=spec, pose_in_world=pose):
                 world.append(conversions.link_to_collision_object(model, spec, ros_names.WORLD_FRAME, pose))
             case Move(pose_in_world=pose):
                 world.append(_moved(identity, conversions.pose_to_msg(pose)))

@@ -23,7 +23,7 @@ ObjectKey = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Put:
+class Add:
     """An object is new in the world, or replaces the one of the same name."""
 
     key: ObjectKey
@@ -64,12 +64,12 @@ class Detach:
     carrier_link: str
 
 
-Change = Put | Move | Remove | Attach | Detach
+Change = Add | Move | Remove | Attach | Detach
 
 
 @dataclass(frozen=True, slots=True)
-class _Shown:
-    """How an object was last sent: its pose is in the world, or in the carrier link if it is carried."""
+class _ObjectState:
+    """An object of the scene: its pose is in the world, or in the carrier link if it is carried."""
 
     instance: int
     pose: Pose
@@ -77,8 +77,8 @@ class _Shown:
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
-    shown: _Shown
+class _Target:
+    state: _ObjectState
     link: specs.Link
 
 
@@ -93,19 +93,20 @@ class SceneChanges:
     def __init__(self, translation_m: float = 0.001, rotation_rad: float = 0.01) -> None:
         self._translation_m = translation_m
         self._rotation_rad = rotation_rad
-        self._shown: dict[ObjectKey, _Shown] = {}
-        self._pending: dict[ObjectKey, _Shown] = {}
+        self._sent: dict[ObjectKey, _ObjectState] = {}
+        self._pending: dict[ObjectKey, _ObjectState] = {}
         self._in_world: frozenset[ObjectKey] = frozenset()
         self._attached: dict[ObjectKey, str] = {}
+        # A scene without any of these was cleared, or belongs to a receiver that was started again.
         self._witnesses: frozenset[ObjectKey] = frozenset()
 
     @property
     def keys(self) -> Set[ObjectKey]:
         """Objects that were sent; `compare` needs to know where these are."""
-        return self._shown.keys()
+        return self._sent.keys()
 
     def compare(self, in_world: Set[ObjectKey], attached: Mapping[ObjectKey, str]) -> list[ObjectKey]:
-        """Takes in where the scene has the objects.
+        """Stores where the scene has the objects.
 
         Args:
             in_world: Objects of the world.
@@ -114,48 +115,48 @@ class SceneChanges:
         Returns:
             Objects that another node took out, and that stay out for now: each is named once.
         """
-        foreign = {key for key, link in self._attached.items() if link != self._shown[key].carrier_link}
+        foreign = {key for key, link in self._attached.items() if link != self._sent[key].carrier_link}
         for key in foreign & in_world:  # another node attached it, and put it down elsewhere
-            del self._shown[key]
-        expected = {key for key, shown in self._shown.items() if shown.carrier_link is None and key not in attached}
+            del self._sent[key]
+        expected = {key for key, sent in self._sent.items() if sent.carrier_link is None and key not in attached}
         witnesses = expected & self._witnesses or expected
         if not witnesses & in_world and (witnesses or not attached):  # cleared, or another receiver
-            for key in self._shown.keys() - in_world - attached.keys():
-                del self._shown[key]
-        gone = (self._in_world | self._attached.keys()) & self._shown.keys() - in_world - attached.keys()
-        self._in_world = self._witnesses = frozenset(in_world & self._shown.keys())
-        self._attached = {key: link for key, link in attached.items() if key in self._shown}
+            for key in self._sent.keys() - in_world - attached.keys():
+                del self._sent[key]
+        gone = (self._in_world | self._attached.keys()) & self._sent.keys() - in_world - attached.keys()
+        self._in_world = self._witnesses = frozenset(in_world & self._sent.keys())
+        self._attached = {key: link for key, link in attached.items() if key in self._sent}
         return sorted(gone)
 
     def towards(self, snapshot: WorldSnapshot) -> list[Change]:
-        """Returns what has to be sent; `confirm` must follow once it was taken.
+        """Returns what has to be sent; call `confirm` once the scene accepted it.
 
         Args:
             snapshot: The world as it is now.
         """
-        wanted = _wanted(snapshot)
-        self._pending = dict(self._shown)
+        targets = _targets_of(snapshot)
+        self._pending = dict(self._sent)
         changes: list[Change] = []
-        for key, shown in self._shown.items():
-            if key not in wanted or wanted[key].shown.instance != shown.instance:
+        for key, sent in self._sent.items():
+            if key not in targets or targets[key].state.instance != sent.instance:
                 changes += [Detach(key, self._attached[key])] if key in self._attached else []
                 changes.append(Remove(key))
                 del self._pending[key]
-        for key, want in wanted.items():
-            changes += self._change_of(key, want)
+        for key, target in targets.items():
+            changes += self._change_of(key, target)
         return changes
 
     def confirm(self) -> None:
         """Notes that the scene has the changes of the last `towards`."""
-        changed = {key for key, shown in self._pending.items() if self._shown.get(key) is not shown}
+        changed = {key for key, sent in self._pending.items() if self._sent.get(key) is not sent}
         kept = self._pending.keys() - changed
-        taken = {key: shown.carrier_link for key in changed if (shown := self._pending[key]).carrier_link is not None}
+        taken = {key: sent.carrier_link for key in changed if (sent := self._pending[key]).carrier_link is not None}
         self._in_world = frozenset((self._in_world & kept) | (changed - taken.keys()))
         self._attached = {key: link for key, link in self._attached.items() if key in kept} | taken
-        self._shown = self._pending
+        self._sent = self._pending
 
-    def _change_of(self, key: ObjectKey, want: _Wanted) -> list[Change]:
-        before, now = self._pending.get(key), want.shown
+    def _change_of(self, key: ObjectKey, target: _Target) -> list[Change]:
+        before, now = self._pending.get(key), target.state
         if before is not None and before.carrier_link == now.carrier_link and not self._moved(before.pose, now.pose):
             return []
         carrier = self._attached.get(key) if before is not None else None
@@ -163,11 +164,11 @@ class SceneChanges:
             return []  # another node attached it, as a pick does: the gripper will take it, or that node puts it down
         self._pending[key] = now
         if now.carrier_link is not None:
-            return [Attach(key, want.link, now.carrier_link, now.pose)]
+            return [Attach(key, target.link, now.carrier_link, now.pose)]
         if carrier is not None:
-            return [Detach(key, carrier), Put(key, want.link, now.pose)]
+            return [Detach(key, carrier), Add(key, target.link, now.pose)]
         if before is None or before.carrier_link is not None or key not in self._in_world:
-            return [Put(key, want.link, now.pose)]
+            return [Add(key, target.link, now.pose)]
         return [Move(key, now.pose)]
 
     def _moved(self, before: Pose, now: Pose) -> bool:
@@ -175,15 +176,15 @@ class SceneChanges:
         return translation > self._translation_m or rotation > self._rotation_rad
 
 
-def _wanted(snapshot: WorldSnapshot) -> dict[ObjectKey, _Wanted]:
-    wanted: dict[ObjectKey, _Wanted] = {}
+def _targets_of(snapshot: WorldSnapshot) -> dict[ObjectKey, _Target]:
+    targets: dict[ObjectKey, _Target] = {}
     held = snapshot.held
     for model in snapshot.models:
         for link in model.links:
             key = (model.name, link.spec.name)
             if held is not None and held.model == model.name:
                 pose_in_carrier = held.carrier_in_world.inverse() @ link.pose_in_world
-                wanted[key] = _Wanted(_Shown(model.instance, pose_in_carrier, held.carrier_link), link.spec)
+                targets[key] = _Target(_ObjectState(model.instance, pose_in_carrier, held.carrier_link), link.spec)
             else:
-                wanted[key] = _Wanted(_Shown(model.instance, link.pose_in_world, None), link.spec)
-    return wanted
+                targets[key] = _Target(_ObjectState(model.instance, link.pose_in_world, None), link.spec)
+    return targets

@@ -29,7 +29,7 @@ class PaceReport:
 class Pacer:
     """Sleeps as long as simulated time is ahead of real time.
 
-    A loop that fell behind runs without sleep until it has caught up, so that the average keeps the asked factor.
+    A loop that fell behind runs without sleep until it has caught up, so that the average keeps the requested factor.
 
     Args:
         real_time_factor: Simulated over real time; 0 is as fast as possible.

@@ -30,7 +30,7 @@ class _Request:
             self.started = True
         try:
             self.result = self.work()
-        except Exception as error:  # belongs to whoever asked, who gets it raised in its own thread
+        except Exception as error:  # raised in the thread of the caller
             self.error = error
         self.done.set()
 

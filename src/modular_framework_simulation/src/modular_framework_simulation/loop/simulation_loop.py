@@ -19,7 +19,7 @@ from modular_framework_simulation.physics.robot_body import RobotBody
 
 _PAUSED_TICK_S = 0.05
 _HALT_S = (0.1, 0.5)
-"""How long the robot is simulated after the end was asked for [s]: at least, for others to see it stand; at most."""
+"""How long the robot is simulated after `stop` [s]: at least, so that its standstill is published; at most."""
 _AT_REST = 0.01
 
 

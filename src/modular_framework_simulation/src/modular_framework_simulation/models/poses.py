@@ -78,7 +78,7 @@ def rotate_vector(quaternion: Quaternion, vector: Vector3) -> Vector3:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A rigid transform: where a child frame is, seen from its parent frame.
+    """A rigid transform: the pose of a child frame in its parent frame.
 
     Attributes:
         position: Origin of the child frame [m].

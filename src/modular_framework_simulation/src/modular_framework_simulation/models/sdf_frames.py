@@ -59,7 +59,7 @@ class FrameTree:
         return self.pose_in_model(base, visited) @ pose_of(pose_node)
 
     def joint_pose_in_model(self, joint: XmlNode) -> Pose:
-        """Returns the pose of a joint in the model frame; without other word it sits at its child link."""
+        """Returns the pose of a joint in the model frame; by default that of its child link."""
         return self.pose_in_model(joint.name())
 
     def _default_base(self, node: XmlNode) -> str:

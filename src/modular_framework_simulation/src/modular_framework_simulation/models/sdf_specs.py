@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a world or model file says, as plain values that no longer know XML."""
+"""What a world or model file says, as plain values."""
 
 from __future__ import annotations
 
@@ -8,28 +8,9 @@ from enum import Enum
 from pathlib import Path
 
 from modular_framework_simulation.models.poses import Pose, Vector3
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A cuboid centred on its frame; size are the full edge lengths [m]."""
-
-    size: Vector3
-
-
-@dataclass(frozen=True, slots=True)
-class Cylinder:
-    """A cylinder along z, centred on its frame [m]."""
-
-    radius: float
-    length: float
-
-
-@dataclass(frozen=True, slots=True)
-class Sphere:
-    """A ball centred on its frame [m]."""
-
-    radius: float
+from modular_framework_urdf.robot import Box as Box
+from modular_framework_urdf.robot import Cylinder as Cylinder
+from modular_framework_urdf.robot import Sphere as Sphere
 
 
 @dataclass(frozen=True, slots=True)
