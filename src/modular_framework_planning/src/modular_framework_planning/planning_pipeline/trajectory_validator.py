@@ -27,15 +27,7 @@ class TrajectoryValidator:
         self._passed: set[tuple[CollisionChecker, bytes]] = set()
 
     def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
-        """Returns what is wrong with the timed motion of a path; empty where nothing is.
-
-        Args:
-            problem: what was planned; its checker and constraints are asked.
-            path: with a trajectory.
-
-        Raises:
-            PlanningError: the check takes longer than the request allows.
-        """
+        """Returns what is wrong with a timed motion, or nothing; see SolutionValidator."""
         assert path.trajectory is not None
         motion = path.trajectory
         key = problem.checker, b"".join(rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities,
