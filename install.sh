@@ -34,7 +34,7 @@ fail() {  # message, what to do
   exit 1
 }
 
-# Shows that a step goes on: on a terminal its seconds and the last line of the log, elsewhere now and then its seconds.
+# Shows that a step is running: on a terminal its seconds and the last line of the log, elsewhere its seconds now and then.
 show_progress() {  # title
   local start=$SECONDS shown=$SECONDS line
   while sleep 1 >/dev/null && kill -0 "$$" 2>/dev/null; do
@@ -128,7 +128,7 @@ install_debian_packages() {
   local missing
   read -ra missing <<<"$(missing_debian_packages | tr '\n' ' ')"
   if [ ${#missing[@]} = 0 ]; then
-    say "[1/3] Debian packages: all there"
+    say "[1/3] Debian packages: all installed"
     return
   fi
   step "[1/3] Debian packages: updating the package lists" "check the network and /etc/apt/sources.list" \
@@ -145,7 +145,7 @@ make_python_environment() {
     say "[2/3] Python environment: up to date"
     return
   fi
-  step "[2/3] Python environment: making .venv" "remove .venv and try again" \
+  step "[2/3] Python environment: making .venv" "remove the folder .venv, then run this script again" \
     /usr/bin/python3 -m venv --system-site-packages "$VENV"
   step "[2/3] Python environment: installing requirements.txt (some minutes)" \
     "check the network; then run this script again" \
@@ -154,7 +154,7 @@ make_python_environment() {
   touch "$STAMPS/$digest"
 }
 
-# An underlay's own message and tool packages win over ours: ours are then left out of the build.
+# Where an underlay has message and tool packages of its own, ours are left out of the build.
 leave_out_packages_of_underlay() {
   local folder name ignore
   for folder in "$ROOT"/src/interfaces/*/ "$ROOT"/src/compat/*/; do
@@ -192,7 +192,7 @@ build_workspace() {
     stamp="$ROOT/build_install/.fingerprint"
   fi
   if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$fingerprint" ]; then
-    say "[3/3] Workspace: built already"
+    say "[3/3] Workspace: up to date"
     return
   fi
   step "[3/3] Workspace: building" "read the messages above; 'catkin clean -y' removes what an earlier build left" \
@@ -230,10 +230,10 @@ compile_loops() {
   } | sha256sum | cut -d' ' -f1)
   stamp="${XDG_CACHE_HOME:-$HOME/.cache}/modular_framework_planning/compiled_$digest"
   if [ -f "$stamp" ]; then
-    say "      Loops of the planner: compiled already"
+    say "      Compiled loops of the planner: up to date"
     return
   fi
-  step "      Loops of the planner: compiling (some minutes)" "read the messages above; then run this script again" \
+  step "      Compiled loops of the planner: compiling (some minutes)" "read the messages above; then run this script again" \
     run_compile_loops
   touch "$stamp"
 }
