@@ -262,7 +262,7 @@ class GroupCommands:
         return MoveGroupInfoLevel.SUCCESS, f"Remembered random joint values under the name {words[0]}"
 
     def record(self, words: Words) -> Answer:
-        """Remembers the present joint values."""
+        """Remembers the current joint values."""
         self.group.remember_joint_values(words[0])
         return MoveGroupInfoLevel.SUCCESS, f"Remembered current joint values under the name {words[0]}"
 
@@ -331,7 +331,7 @@ COMMANDS = dict((
     _command("plan [<name>|rand]", "plan to a state, or show the last plan", (0, 1), G.plan),
     _command("planner <name>", "choose a planner", (1,), G.planner),
     _command("random <name>", "remember random joint values", (1,), G.remember_random),
-    _command("record <name>", "remember the present joint values", (1,), G.record),
+    _command("record <name>", "remember the current joint values", (1,), G.record),
     _command("rotate <r> <p> <y>", "turn the end effector [rad]", (3,), G.rotate),
     _command("show [<name>]", "remembered joint values", (0, 1), G.show),
     _command("stop", "stop the motion", (0,), G.stop),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every part of a group's commander shares: the group's description, the robot's state and the servers."""
+"""Base of a group's commander: the group's description, the robot's state and the servers."""
 from __future__ import annotations
 
 from typing import Any
@@ -28,12 +28,17 @@ CODE_NAMES = {value: name for name, value in vars(MoveItErrorCodes).items()
 
 
 def code_text(code: MoveItErrorCodes) -> str:
-    """Returns an error code in words, for messages."""
+    """Returns the name of an error code, for messages."""
     return f"{CODE_NAMES.get(code.val, 'unknown code')} ({code.val})"
 
 
 def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotState) -> PoseStamped:
-    """Asks compute_fk where a link is in a state. Raises ServerError, or MoveItCommanderException if it refuses."""
+    """Returns the pose of a link in a state, by compute_fk.
+
+    Raises:
+        ServerError: compute_fk is not there.
+        MoveItCommanderException: it refuses the request.
+    """
     request = GetPositionFKRequest(fk_link_names=[link], robot_state=state)
     request.header.frame_id = frame
     answer = servers.call("compute_fk", GetPositionFK, request)
@@ -74,26 +79,26 @@ class GroupConnection:
         return len(self._group.variables)
 
     def has_end_effector_link(self) -> bool:
-        """Returns whether the group has a link that poses are meant for."""
+        """Returns whether the group has an end effector link."""
         return bool(self._end_effector_link)
 
     def get_end_effector_link(self) -> str:
-        """Returns the link that poses are meant for; "" if there is none."""
+        """Returns the end effector link, which pose targets are for; "" if there is none."""
         return self._end_effector_link
 
     def set_end_effector_link(self, link_name: str) -> None:
-        """Chooses the link that poses are meant for; raises MoveItCommanderException if the robot has no such link."""
+        """Sets the end effector link; raises MoveItCommanderException if the robot has no such link."""
         if link_name not in self._model.links:
             raise MoveItCommanderException(f"Unable to set end effector link: robot '{self._model.name}' has no link "
                                            f"'{link_name}'")
         self._end_effector_link = link_name
 
     def get_pose_reference_frame(self) -> str:
-        """Returns the frame of poses that name none."""
+        """Returns the frame of pose targets that name none."""
         return self._pose_reference_frame
 
     def set_pose_reference_frame(self, reference_frame: str) -> None:
-        """Chooses the frame of poses that name none."""
+        """Sets the frame of pose targets that name none."""
         self._pose_reference_frame = reference_frame
 
     def get_planning_frame(self) -> str:
@@ -108,16 +113,16 @@ class GroupConnection:
         return answer.planner_interfaces[0]
 
     def get_current_joint_values(self) -> list[float]:
-        """Returns the group's present joint positions [rad or m], in the order of its variables."""
+        """Returns the group's current joint positions [rad or m], in the order of its variables."""
         positions = self._state.positions(self._group_names())
         return [positions.get(joint.name, joint.default) for joint in self._group.variables]
 
     def get_current_state(self) -> RobotState:
-        """Returns the whole robot's present state."""
+        """Returns the robot's current state."""
         return self._state.message(self._group_names())
 
     def get_current_state_bounded(self) -> RobotState:
-        """Returns the whole robot's present state, each joint brought within its bounds."""
+        """Returns the robot's current state, each joint brought within its bounds."""
         return self.enforce_bounds(self.get_current_state())
 
     def enforce_bounds(self, robot_state_msg: RobotState) -> RobotState:
@@ -137,11 +142,11 @@ class GroupConnection:
         return state
 
     def get_current_pose(self, end_effector_link: str = "") -> PoseStamped:
-        """Returns the present pose of a link, or of the end effector link, in the planning frame."""
+        """Returns the current pose of a link, or of the end effector link, in the planning frame."""
         return self._pose_of(end_effector_link, self.get_current_state())
 
     def get_current_rpy(self, end_effector_link: str = "") -> list[float]:
-        """Returns the present [roll, pitch, yaw] of a link, or of the end effector link [rad]."""
+        """Returns the current [roll, pitch, yaw] of a link, or of the end effector link [rad]."""
         pose = self.get_current_pose(end_effector_link)
         return conversions.rpy_from_quaternion(conversions.pose_to_list(pose.pose)[3:])
 

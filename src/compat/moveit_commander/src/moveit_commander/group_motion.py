@@ -89,7 +89,7 @@ class GroupMotion(GroupPoseTargets):
         return self._judge(result.error_code, "go")
 
     def execute(self, trajectory: RobotTrajectory | JointTrajectory, wait: bool = True) -> bool:
-        """Moves along a trajectory that was planned before; answers as go does."""
+        """Moves along a trajectory that was planned before; returns what go returns."""
         if isinstance(trajectory, JointTrajectory):
             trajectory = RobotTrajectory(joint_trajectory=trajectory)
         if not isinstance(trajectory, RobotTrajectory):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a group shall go, in space: poses, positions and orientations of its end effector link."""
+"""Pose targets of a group: poses, positions and orientations of its end effector link."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ class GroupPoseTargets(GroupJointTargets):
         self.set_pose_targets([pose], end_effector_link)
 
     def set_pose_targets(self, poses: Sequence[PoseLike], end_effector_link: str = "") -> None:
-        """Sets several poses; reaching any one of them will do."""
+        """Sets several poses; reaching any one of them is enough."""
         link = self._link(end_effector_link, "set poses for")
         if not poses:
             raise MoveItCommanderException("Unable to set target poses: the list is empty")
@@ -42,7 +42,7 @@ class GroupPoseTargets(GroupJointTargets):
         self._active_target = Target.POSE
 
     def set_position_target(self, xyz: Sequence[float], end_effector_link: str = "") -> None:
-        """Sets the position a link shall reach [m], turned in any way."""
+        """Sets the position a link shall reach [m], with any orientation."""
         link = self._link(end_effector_link, "set the pose for")
         if len(xyz) != 3:
             raise MoveItCommanderException(f"Expected [x, y, z]; got {len(xyz)} numbers")
@@ -50,7 +50,7 @@ class GroupPoseTargets(GroupJointTargets):
         self._active_target = Target.POSITION
 
     def set_orientation_target(self, q: Sequence[float], end_effector_link: str = "") -> None:
-        """Sets how a link shall be turned (quaternion xyzw), wherever it is."""
+        """Sets the orientation a link shall reach (quaternion xyzw), at any position."""
         link = self._link(end_effector_link, "set the pose for")
         if len(q) != 4:
             raise MoveItCommanderException(f"Expected [qx, qy, qz, qw]; got {len(q)} numbers")
@@ -59,14 +59,14 @@ class GroupPoseTargets(GroupJointTargets):
         self._active_target = Target.ORIENTATION
 
     def set_rpy_target(self, rpy: Sequence[float], end_effector_link: str = "") -> None:
-        """Sets how a link shall be turned ([roll, pitch, yaw] [rad]), wherever it is."""
+        """Sets the orientation a link shall reach ([roll, pitch, yaw] [rad]), at any position."""
         self._link(end_effector_link, "set the pose for")
         if len(rpy) != 3:
             raise MoveItCommanderException(f"Expected [roll, pitch, yaw]; got {len(rpy)} numbers")
         self.set_orientation_target(conversions.quaternion_from_rpy(*rpy), end_effector_link)
 
     def shift_pose_target(self, axis: int, value: float, end_effector_link: str = "") -> None:
-        """Sets the link's present pose, moved along or turned about one axis, as the target.
+        """Sets the link's current pose, moved along or rotated about one axis, as the target.
 
         Args:
             axis: 0 to 5: x, y, z, roll, pitch, yaw.
@@ -83,15 +83,15 @@ class GroupPoseTargets(GroupJointTargets):
         self.set_pose_target(conversions.list_to_pose_stamped(numbers, pose.header.frame_id), end_effector_link)
 
     def clear_pose_target(self, end_effector_link: str) -> None:
-        """Drops the pose targets of one link."""
+        """Removes the pose targets of one link."""
         self._pose_targets.pop(end_effector_link or self._end_effector_link, None)
 
     def clear_pose_targets(self) -> None:
-        """Drops the pose targets of all links."""
+        """Removes the pose targets of all links."""
         self._pose_targets.clear()
 
     def construct_motion_plan_request(self) -> MotionPlanRequest:
-        """Returns the planning request of the present settings and the target set last."""
+        """Returns the planning request of the current settings and the target set last."""
         return MotionPlanRequest(
             group_name=self._group.name, num_planning_attempts=self._attempts,
             allowed_planning_time=self._planning_time_s, pipeline_id=self._pipeline_id, planner_id=self._planner_id,

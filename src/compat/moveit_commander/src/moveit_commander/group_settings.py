@@ -40,11 +40,11 @@ class GroupSettings(GroupConnection):
         self._storage: ConstraintsStorage | None = None
 
     def set_start_state_to_current_state(self) -> None:
-        """Lets plans start where the robot is."""
+        """Starts plans at the current state."""
         self._start_state = RobotState(is_diff=True)
 
     def set_start_state(self, msg: RobotState) -> None:
-        """Lets plans start at a given state (moveit_msgs/RobotState)."""
+        """Starts plans at a given state (moveit_msgs/RobotState)."""
         self._start_state = msg
 
     def get_goal_tolerance(self) -> tuple[float, float, float]:
@@ -52,7 +52,7 @@ class GroupSettings(GroupConnection):
         return self._joint_tolerance, self._position_tolerance, self._orientation_tolerance
 
     def get_goal_joint_tolerance(self) -> float:
-        """Returns how far each joint may be from a joint goal [rad or m]."""
+        """Returns the tolerance of joint goals [rad or m]."""
         return self._joint_tolerance
 
     def get_goal_position_tolerance(self) -> float:
@@ -60,7 +60,7 @@ class GroupSettings(GroupConnection):
         return self._position_tolerance
 
     def get_goal_orientation_tolerance(self) -> float:
-        """Returns how far an orientation may be turned from its goal about each axis [rad]."""
+        """Returns the tolerance of orientation goals about each axis [rad]."""
         return self._orientation_tolerance
 
     def set_goal_tolerance(self, value: float) -> None:
@@ -68,7 +68,7 @@ class GroupSettings(GroupConnection):
         self._joint_tolerance = self._position_tolerance = self._orientation_tolerance = value
 
     def set_goal_joint_tolerance(self, value: float) -> None:
-        """Sets how far each joint may be from a joint goal [rad or m]."""
+        """Sets the tolerance of joint goals [rad or m]."""
         self._joint_tolerance = value
 
     def set_goal_position_tolerance(self, value: float) -> None:
@@ -76,7 +76,7 @@ class GroupSettings(GroupConnection):
         self._position_tolerance = value
 
     def set_goal_orientation_tolerance(self, value: float) -> None:
-        """Sets how far an orientation may be turned from its goal about each axis [rad]."""
+        """Sets the tolerance of orientation goals about each axis [rad]."""
         self._orientation_tolerance = value
 
     def allow_looking(self, value: bool) -> None:
@@ -104,11 +104,11 @@ class GroupSettings(GroupConnection):
         self._storage = ConstraintsStorage(host)
 
     def get_path_constraints(self) -> Constraints:
-        """Returns what holds along the whole path."""
+        """Returns the path constraints."""
         return self._path_constraints
 
     def set_path_constraints(self, value: Constraints | str | None) -> None:
-        """Sets what holds along the whole path, as a message or by its name in the database; None clears it.
+        """Sets the path constraints, as a message or by its name in the database; None clears it.
 
         Raises:
             MoveItCommanderException: the database has no such name, or none is chosen, or the type is another one.
@@ -123,15 +123,15 @@ class GroupSettings(GroupConnection):
             raise MoveItCommanderException(f"Unable to set path constraints {value!r}: {NO_DATABASE}")
 
     def clear_path_constraints(self) -> None:
-        """Lets paths be free again."""
+        """Clears the path constraints."""
         self._path_constraints = Constraints()
 
     def get_trajectory_constraints(self) -> TrajectoryConstraints:
-        """Returns the constraints along the trajectory."""
+        """Returns the trajectory constraints."""
         return self._trajectory_constraints
 
     def set_trajectory_constraints(self, value: TrajectoryConstraints | None) -> None:
-        """Sets the constraints along the trajectory; None clears them."""
+        """Sets the trajectory constraints; None clears them."""
         if value is None:
             self.clear_trajectory_constraints()
         elif isinstance(value, TrajectoryConstraints):
@@ -141,7 +141,7 @@ class GroupSettings(GroupConnection):
                                            "moveit_msgs/TrajectoryConstraints is needed")
 
     def clear_trajectory_constraints(self) -> None:
-        """Takes the constraints along the trajectory away."""
+        """Clears the trajectory constraints."""
         self._trajectory_constraints = TrajectoryConstraints()
 
     def set_planning_time(self, seconds: float) -> None:
@@ -154,7 +154,7 @@ class GroupSettings(GroupConnection):
         return self._planning_time_s
 
     def set_planning_pipeline_id(self, planning_pipeline: str) -> None:
-        """Chooses the planning pipeline (e.g. ompl); "" is move_group's default. Forgets the planner id."""
+        """Chooses the planning pipeline (e.g. ompl); "" is move_group's default. Clears the planner id."""
         if planning_pipeline != self._pipeline_id:
             self._pipeline_id, self._planner_id = planning_pipeline, ""
 
@@ -171,7 +171,7 @@ class GroupSettings(GroupConnection):
         return self._planner_id
 
     def set_num_planning_attempts(self, num_planning_attempts: int) -> None:
-        """Sets how many plans are made, the shortest of which is answered."""
+        """Sets how many plans are made, the shortest of which is returned."""
         self._attempts = int(num_planning_attempts)
 
     def set_workspace(self, ws: Sequence[float]) -> None:
@@ -203,11 +203,11 @@ class GroupSettings(GroupConnection):
         self._speed_limit, self._speed_limited_link = float(speed), link_name
 
     def clear_max_cartesian_link_speed(self) -> None:
-        """Takes the bound on a link's speed away."""
+        """Clears the bound on a link's speed."""
         self._speed_limit, self._speed_limited_link = 0.0, ""
 
     def set_support_surface_name(self, value: str) -> None:
-        """Names the object that objects are picked from and placed on."""
+        """Sets the object that objects are picked from and placed on."""
         self._support_surface = value
 
 

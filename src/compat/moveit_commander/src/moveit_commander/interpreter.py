@@ -55,7 +55,7 @@ class MoveGroupCommandInterpreter:
         return list(self._groups)
 
     def execute(self, cmd: str) -> Answer:
-        """Executes a line; answers a level of MoveGroupInfoLevel and what to show. It never raises for a bad line."""
+        """Executes a line; returns a level of MoveGroupInfoLevel and what to show. It never raises for a bad line."""
         line = self.resolve_command_alias(cmd.strip())
         if not line:
             return OK

@@ -36,7 +36,12 @@ class PlanningSceneInterface:
     """
 
     def __init__(self, ns: str = "", synchronous: bool = True) -> None:
-        """Args: ns: namespace of move_group's endpoints. synchronous: whether methods wait for move_group."""
+        """Connects to move_group when it is first used; without `synchronous`, advertises the topics.
+
+        Args:
+            ns: namespace of move_group's endpoints.
+            synchronous: whether methods wait for move_group.
+        """
         ensure_node()
         self._servers = Servers(ns)
         self._synchronous = synchronous
@@ -114,7 +119,7 @@ class PlanningSceneInterface:
         self.attach_object(name if pose is None else self.make_cylinder(name, pose, height, radius), link, touch_links)
 
     def clear(self) -> None:
-        """Takes every object out of the scene, attached ones too."""
+        """Removes every object from the scene, attached ones too."""
         self.remove_attached_object()
         self.remove_world_object()
 
@@ -161,7 +166,7 @@ class PlanningSceneInterface:
         return self._servers.call("get_planning_scene", GetPlanningScene, request).scene
 
     def apply_planning_scene(self, planning_scene_message: PlanningScene) -> bool:
-        """Changes the scene; answers whether move_group took it."""
+        """Changes the scene; returns whether move_group accepted it."""
         request = ApplyPlanningSceneRequest(planning_scene_message)
         return bool(self._servers.call("apply_planning_scene", ApplyPlanningScene, request).success)
 

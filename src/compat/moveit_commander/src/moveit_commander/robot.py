@@ -66,7 +66,7 @@ class Joint:
 
 
 class Link:
-    """A link with its present pose."""
+    """A link with its current pose."""
 
     def __init__(self, robot: RobotCommander, name: str) -> None:
         self._robot = robot
@@ -139,11 +139,11 @@ class RobotCommander:
         return name in self._model.groups
 
     def get_current_state(self) -> RobotState:
-        """Returns the robot's present state."""
+        """Returns the robot's current state."""
         return self._state.message()
 
     def get_current_variable_values(self) -> dict[str, float]:
-        """Returns the present joint positions by name [rad or m]."""
+        """Returns the current joint positions by name [rad or m]."""
         return self._state.positions()
 
     def get_joint(self, name: str) -> Joint:

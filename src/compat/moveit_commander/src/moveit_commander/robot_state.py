@@ -67,7 +67,7 @@ class CurrentState:
         self._positions: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}
         self._changed = threading.Condition()
-        self._subscriber = rospy.Subscriber(topic, JointState, self._hear, queue_size=10, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(topic, JointState, self._on_joint_state, queue_size=10, tcp_nodelay=True)
         on_shutdown(_forget_all)
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ class CurrentState:
     def _fresh(self, names: Iterable[str], begun: float) -> bool:
         return all(self._arrivals.get(name, 0.0) >= begun for name in names)
 
-    def _hear(self, message: JointState) -> None:
+    def _on_joint_state(self, message: JointState) -> None:
         now = time.monotonic()
         with self._changed:
             for name, position in zip(message.name, message.position, strict=False):

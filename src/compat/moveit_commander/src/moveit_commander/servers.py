@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Speaks to move_group: services and actions under a namespace; each wait is bounded and names what it is for."""
+"""Clients of the services and actions of move_group; each wait is bounded, and its error says what it waited for."""
 from __future__ import annotations
 
 import threading
@@ -17,14 +17,18 @@ SERVICE_TIMEOUT_S = 5.0
 ACTION_TIMEOUT_S = 5.0
 POLL_PERIOD_S = 0.02
 SETTLE_S = 0.1  # the server's end of a new connection is ready a little later than ours
-SERVER_LOST_S = 5.0  # an action server that nobody advertises for so long has gone
+SERVER_LOST_S = 5.0  # an action server that is not advertised for so long has ended
 
 
 class Servers:
     """The endpoints of one move_group node."""
 
     def __init__(self, ns: str = "") -> None:
-        """Args: ns: namespace of the move_group node's endpoints; "" for that of this node."""
+        """Stores the namespace.
+
+        Args:
+            ns: namespace of the move_group node's endpoints; "" for that of this node.
+        """
         self._ns = ns
         self._actions: dict[str, ActionCaller] = {}
 
@@ -61,7 +65,7 @@ class Servers:
 
 
 class ActionCaller:
-    """Sends goals to one action server and waits for results by the wall clock: halted simulated time is no trap."""
+    """Sends goals to one action server; its waits end by the wall clock, also while simulated time stands still."""
 
     def __init__(self, name: str, kind: Any) -> None:
         self.name = name

@@ -26,7 +26,8 @@ def retime(points: Any, velocity: Any, acceleration: Any) -> tuple[Any, Any, Any
 
     Args:
         points: waypoints, shape (n >= 2, joints) [rad or m], each different from the one before.
-        velocity, acceleration: limits of the joints, shape (joints,) [1/s, 1/s^2].
+        velocity: limits of the joints, shape (joints,) [rad/s or m/s].
+        acceleration: limits of the joints, shape (joints,) [rad/s^2 or m/s^2].
 
     Returns:
         Times of the waypoints [s], shape (n,), strictly increasing; velocities and accelerations there, shape (n,
