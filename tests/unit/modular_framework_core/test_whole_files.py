@@ -124,7 +124,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     with pytest.raises(MessageFileError, match="pipe.yaml is no regular file; name a file"):
         message_files.load(tmp_path / "pipe.yaml", "joint state", JointState)
-    faults = yaml_entries.take_entries(tmp_path / "pipe.yaml", lambda entry: None)
+    faults = yaml_entries.read_each_entry(tmp_path / "pipe.yaml", lambda entry: None)
     assert "is no regular file" in str(faults[0])
     with pytest.raises(OSError, match="is no path of a file"):
         read_whole(Path("a\0b"))

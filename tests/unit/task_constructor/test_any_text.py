@@ -32,7 +32,7 @@ def check(world: World, text: str) -> None:
         task = world.build(text)
     except TaskFault as error:
         assert error.faults
-        assert all(fault.place.line >= 1 and fault.place.column >= 1 for fault in error.faults)
+        assert all(fault.location.line >= 1 and fault.location.column >= 1 for fault in error.faults)
         return
     compile(generator.generate(task, world.template_folders), "t.py", "exec")
 

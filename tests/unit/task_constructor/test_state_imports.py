@@ -46,9 +46,9 @@ INSTALL = "install it, or add the folder that has it to PYTHONPATH"
      f"1 imports 'geometry_msgs.msgs', but Python finds no 'geometry_msgs.msgs'; {INSTALL}; did you mean 'msg'?"),
     ("import xml.etree.ElementTee", "1 imports 'xml.etree.ElementTee', but Python finds no 'xml.etree.ElementTee'; "
      f"{INSTALL}; did you mean 'ElementTree'?"),
-    ("from modular_framework_core.framework_sate import FrameworkState",
-     "1 imports 'modular_framework_core.framework_sate', but Python finds no 'modular_framework_core.framework_sate'; "
-     f"{INSTALL}; did you mean 'framework_state'?"),
+    ("from modular_framework_core.state_api.framework_sate import FrameworkState",
+     "1 imports 'modular_framework_core.state_api.framework_sate', but Python finds no "
+     f"'modular_framework_core.state_api.framework_sate'; {INSTALL}; did you mean 'framework_state'?"),
     ("from . import doors", "1 imports '.', but /states is no package, or not so deep in one; import it by its whole "
      "name"),
 ])

@@ -11,8 +11,8 @@ import pytest
 from modular_framework_ros.calls import CallError
 from top_down_grasps import ros_top_down_node as node
 from top_down_grasps import surface_points
-from top_down_grasps.patience import Patience
 from top_down_grasps.planning_scene_objects import SceneObject
+from top_down_grasps.wait_limit import WaitLimit
 
 LIMIT_S = 20.0
 EMPTY = node.NoObjectError("no object of the planning scene is in the crop box")
@@ -21,14 +21,14 @@ BOX = [SceneObject("box__link", surface_points.box((0.04, 0.07, 0.1)))]
 
 
 def test_patience_ends_a_limit_after_the_first_question():
-    patience = Patience()
-    assert [patience.is_used_up(now, LIMIT_S) for now in (100.0, 119.9, 120.1)] == [False, False, True]
+    wait_limit = WaitLimit()
+    assert [wait_limit.is_exceeded(now, LIMIT_S) for now in (100.0, 119.9, 120.1)] == [False, False, True]
 
 
 def test_patience_begins_when_the_clock_of_a_simulation_does_and_again_when_it_is_reset():
-    patience = Patience()
-    assert not patience.is_used_up(0.0, LIMIT_S)
-    assert [patience.is_used_up(now, LIMIT_S) for now in (300.0, 5.0, 24.0, 26.0)] == [False, False, False, True]
+    wait_limit = WaitLimit()
+    assert not wait_limit.is_exceeded(0.0, LIMIT_S)
+    assert [wait_limit.is_exceeded(now, LIMIT_S) for now in (300.0, 5.0, 24.0, 26.0)] == [False, False, False, True]
 
 
 class Scripted(node.TopDownGraspGenerator):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a task makes of the answer of a service or action: the outcome that a field of it says, and fields to keep."""
+"""The outcome and the userdata that a task derives from the answer of a service or action."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ KeptFields = Annotated[Mapping[str, str], OutputKeys()]
 
 @dataclass(frozen=True, slots=True)
 class AnswerRules:
-    """What is made of an answer.
+    """How an outcome and userdata follow from an answer.
 
     Attributes:
         outcome_field: Field that decides about the outcome; empty when none does.
@@ -80,17 +80,17 @@ class AnswerRules:
         return {key: field_at(answer, path) for key, path in self.keep.items()}
 
 
-def end_with(state: FrameworkState, rules: AnswerRules, answer: Any, userdata: Any, what: str, said: str,
+def end_with(state: FrameworkState, rules: AnswerRules, answer: Any, userdata: Any, what: str, reason_given: str,
              aborted: bool = False) -> str:
-    """Ends a state as an answer says: keeps its fields and returns the outcome.
+    """Ends a state by an answer: keeps its fields and returns the outcome.
 
     Args:
         state: The state.
-        rules: What is made of the answer.
+        rules: How the outcome follows from it.
         answer: The answer.
         userdata: Where fields are kept.
         what: What answered, for reasons.
-        said: The reason the answer gives.
+        reason_given: Reason in the answer.
         aborted: Whether what answered calls it a failure, which the first outcome cannot be then.
     """
     try:
@@ -103,5 +103,5 @@ def end_with(state: FrameworkState, rules: AnswerRules, answer: Any, userdata: A
         return state.fail(f"{what}: {error}")
     if outcome == state.outcomes[0]:
         return state.succeed()
-    reason = f"{what}: its {rules.outcome_field} is {field_at(answer, rules.outcome_field)!r}: {said}"
+    reason = f"{what}: its {rules.outcome_field} is {field_at(answer, rules.outcome_field)!r}: {reason_given}"
     return state.end(outcome, reason)

@@ -54,7 +54,7 @@ def stage_joints(commander: IkCommander, grasp: Any, stage: str) -> dict[str, fl
     Args:
         commander: Solves inverse kinematics.
         grasp: modular_framework_core/StandardisedGrasp.
-        stage: pregrasp, grasp or postgrasp.
+        stage: Pregrasp, grasp or postgrasp.
 
     Returns:
         {joint: position} of the arm [rad or m].

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Remembers where the objects were for which grasps were generated, so that grasps of another place are noticed."""
+"""Remembers where the objects were for which grasps were generated, so that a moved object is noticed."""
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Watches the planning scene, generates top-down grasps for what stands there, and hands them to the grasp manager."""
+"""Watches the planning scene, generates top-down grasps for what stands there, and stores them in the grasp manager."""
 from __future__ import annotations
 
 import threading
@@ -18,7 +18,6 @@ from modular_framework_ros.calls import CallError, call_service, wait_for_servic
 from modular_framework_ros.start_up import start_timeout
 from top_down_grasps.generated_objects import GeneratedObjects, at_rest
 from top_down_grasps.gripper_geometry import GripperGeometryError, measure_gripper
-from top_down_grasps.patience import Patience
 from top_down_grasps.planning_scene_objects import (
     CropBox,
     SceneObject,
@@ -29,6 +28,7 @@ from top_down_grasps.planning_scene_objects import (
 from top_down_grasps.ros_generator_settings import GeneratorSettings, read_settings
 from top_down_grasps.ros_stored_grasps import StoredGrasps
 from top_down_grasps.top_down import TopDownGrasp, top_down_grasps
+from top_down_grasps.wait_limit import WaitLimit
 
 SIGNAL_TOPIC = "grasp_generated"
 SERVICE_TIMEOUT_S = 10.0
@@ -47,7 +47,7 @@ class NoObjectError(NoGraspError):
 class TopDownGraspGenerator:
     """Generates grasps when an object appears in the crop box or was moved, or on demand.
 
-    New grasps replace the ones that were generated before. An object that the robot carries is taken for the one that
+    New grasps replace the ones that were generated before. An object that the robot carries counts as the one that
     is set down under its name.
 
     Parameters: see :mod:`ros_generator_settings`; they are read again for every generation.
@@ -61,7 +61,7 @@ class TopDownGraspGenerator:
     """
 
     def __init__(self) -> None:
-        """Stores nothing but names; :meth:`connect` talks to the other nodes."""
+        """Connects to nothing yet, see :meth:`connect`."""
         self._generated = GeneratedObjects()
         self._attached: set[str] = set()
         self._stored = StoredGrasps()
@@ -95,11 +95,11 @@ class TopDownGraspGenerator:
     def watch(self) -> None:
         """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
 
-        What may come right by itself is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
+        What may still arrive is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
         there yet, a service that does not answer in time on a busy machine.
         """
         before: list[SceneObject] = []
-        patience: Patience | None = Patience()  # None: it is known what became of everything that is there
+        wait_limit: WaitLimit | None = WaitLimit()  # None: every object that is there has been handled
         scene_was_read = False
         while not rospy.is_shutdown():
             settings = read_settings()
@@ -108,25 +108,25 @@ class TopDownGraspGenerator:
                 self._generated.keep({found.name for found in objects} | self._attached)
                 scene_was_read = True
                 if self._generated.stale(objects):
-                    patience = patience or Patience()
+                    wait_limit = wait_limit or WaitLimit()
                     if at_rest(before, objects):
                         self._signal_grasps(settings, objects, refresh=True)
-                        patience = None
+                        wait_limit = None
                 before = objects
             except (NoObjectError, CallError, CommanderError) as error:
                 if isinstance(error, NoObjectError):
                     self._generated.keep(self._attached)
-                    if patience and not scene_was_read:
-                        patience, scene_was_read = Patience(), True
-                if patience and self._gives_up(error, patience, settings):
+                    if wait_limit and not scene_was_read:
+                        wait_limit, scene_was_read = WaitLimit(), True
+                if wait_limit and self._gives_up(error, wait_limit, settings):
                     self._generated.mark(before)
-                    patience = None
+                    wait_limit = None
                 before = []
             rospy.rostime.wallsleep(SCENE_PERIOD_S)
 
-    def _gives_up(self, error: Exception, patience: Patience, settings: GeneratorSettings) -> bool:
-        """Signals failure when what is missing has been waited for long enough; tells what it is until then."""
-        if patience.is_used_up(rospy.get_time(), settings.scene_timeout_s):
+    def _gives_up(self, error: Exception, wait_limit: WaitLimit, settings: GeneratorSettings) -> bool:
+        """Signals failure once the wait limit is exceeded; logs what is waited for until then."""
+        if wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
             self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s of the ROS clock)")
             return True
         rospy.loginfo_throttle(WAITING_PERIOD_S, f"top_down_grasp_generator: waiting, for {error}.")
@@ -143,11 +143,11 @@ class TopDownGraspGenerator:
 
     def _resting(self, settings: GeneratorSettings) -> list[SceneObject]:
         """Returns the objects to grasp once they rest, or as they are when that takes too long."""
-        before, patience = self._candidates(settings), Patience()
+        before, wait_limit = self._candidates(settings), WaitLimit()
         while True:
             rospy.rostime.wallsleep(SCENE_PERIOD_S)
             objects = self._candidates(settings)
-            if at_rest(before, objects) or patience.is_used_up(rospy.get_time(), settings.scene_timeout_s):
+            if at_rest(before, objects) or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
                 return objects
             before = objects
 

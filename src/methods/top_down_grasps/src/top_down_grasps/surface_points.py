@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns shapes into points on their surfaces, so that one reasoning about grasps serves every shape."""
+"""Turns shapes into points on their surfaces, so that the search for grasps is the same for every shape."""
 from __future__ import annotations
 
 import math

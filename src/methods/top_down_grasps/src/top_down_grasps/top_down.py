@@ -273,7 +273,7 @@ def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:
 def _quality(alignment: float, offset_m: float, room: float, overlap: float, position: tuple[float, float, float],
              settings: TopDownSettings) -> float:
     reach = math.dist(position[:2], settings.base_xy_m)
-    comfort = 1.0 - min(1.0, abs(reach - settings.best_reach_m) / 0.5)
+    reach_score = 1.0 - min(1.0, abs(reach - settings.best_reach_m) / 0.5)
     centred = 1.0 - min(1.0, offset_m / 0.06)
     squareness = (alignment - settings.min_side_alignment) / (1.0 - settings.min_side_alignment)
-    return 0.3 * squareness + 0.3 * centred + 0.15 * room + 0.1 * min(1.0, overlap) + 0.15 * comfort
+    return 0.3 * squareness + 0.3 * centred + 0.15 * room + 0.1 * min(1.0, overlap) + 0.15 * reach_score

@@ -328,7 +328,7 @@ class ArmCommander:
 
         Args:
             plan: What to execute.
-            stop_requested: Asked all the time; True stops the motion.
+            stop_requested: Evaluated during the motion; True stops it.
 
         Returns:
             Success, or the reason why the motion failed.
@@ -351,7 +351,7 @@ class ArmCommander:
             return self._execution_result(status, timeout_s)
 
     def stop(self) -> None:
-        """Stops the motion under way, if any."""
+        """Stops the current motion, if any."""
         self._stop_event.set()
 
     def _execution_result(self, status: int, timeout_s: float) -> ExecutionResult:

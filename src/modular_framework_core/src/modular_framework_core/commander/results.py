@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the arm commander answers: each result is true only on success, and says why otherwise."""
+"""Results of the arm commander: each is true only on success, and has the reason otherwise."""
 from __future__ import annotations
 
 from dataclasses import dataclass

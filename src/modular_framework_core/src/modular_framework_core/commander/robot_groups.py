@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Answers which joints and which tip link a planning group has, from the robot's URDF and SRDF texts."""
+"""Reads which joints and which tip link a planning group has, from the robot's URDF and SRDF texts."""
 from __future__ import annotations
 
 import math
@@ -24,8 +24,8 @@ class Joint:
     Attributes:
         name: Name of the joint.
         kind: URDF type.
-        parent: Link it hangs on.
-        child: Link it carries.
+        parent: Parent link.
+        child: Child link.
         lower: Lowest position [rad or m]; minus infinity without a limit.
         upper: Highest position [rad or m]; infinity without a limit.
         effort: Greatest effort [N m or N]; infinity without a limit.

@@ -19,15 +19,15 @@ LAUNCH_FILE = "start_framework.launch"
 
 
 def framework_home() -> Path:
-    """Return where the framework writes files of its own: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework``."""
+    """Returns where the framework writes files of its own: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework``."""
     return Path(os.environ.get("ROS_HOME") or Path.home() / ".ros") / "modular_framework"
 
 
 def states_folder() -> Path:
-    """Return the folder of the framework's states.
+    """Returns the folder of the framework's states.
 
     Raises:
-        FileNotFoundError: the package of the states is not on the Python path.
+        FileNotFoundError: The package of the states is not on the Python path.
     """
     try:
         found = importlib.util.find_spec(STATES_PACKAGE)
@@ -42,23 +42,23 @@ def states_folder() -> Path:
 
 
 def states_folders(own: Sequence[Path]) -> list[Path]:
-    """Return folders of one's own, and the framework's after them."""
+    """Returns folders of one's own, and the framework's after them."""
     return [*own, *([] if states_folder() in own else [states_folder()])]
 
 
 def templates_folders(own: Sequence[Path]) -> list[Path]:
-    """Return folders of one's own, and the framework's after them."""
+    """Returns folders of one's own, and the framework's after them."""
     return [*own, *([] if templates_folder() in own else [templates_folder()])]
 
 
 def config_folder() -> Path | None:
-    """Return the configuration folder of the API package; None when that package is not there."""
+    """Returns the configuration folder of the API package; None when that package is not there."""
     folder = _package(API_PACKAGE)
     return None if folder is None or not (folder / "config").is_dir() else folder / "config"
 
 
 def task_script(name: Path) -> Path:
-    """Return the path of a task script: as given, or in the API package's folder when it is only the name of one."""
+    """Returns the path of a task script: as given, or in the API package's folder when it is only the name of one."""
     folder = _package(API_PACKAGE)
     if name.exists() or name.name != str(name) or folder is None:
         return name
@@ -66,7 +66,7 @@ def task_script(name: Path) -> Path:
 
 
 def srdf_file(package: str = "") -> Path | None:
-    """Return the SRDF of a MoveIt configuration package; by default that of the API package's launch file.
+    """Returns the SRDF of a MoveIt configuration package; by default that of the API package's launch file.
 
     None when a package is not there, or has no SRDF, or several and does not say which.
     """
@@ -88,10 +88,10 @@ def _package(name: str) -> Path | None:
 
 
 def templates_folder() -> Path:
-    """Return the folder of the framework's templates.
+    """Returns the folder of the framework's templates.
 
     Raises:
-        FileNotFoundError: the package that has them is not in ROS_PACKAGE_PATH.
+        FileNotFoundError: The package that has them is not in ROS_PACKAGE_PATH.
     """
     try:
         return Path(rospkg.RosPack().get_path(TEMPLATES_PACKAGE)) / "templates"

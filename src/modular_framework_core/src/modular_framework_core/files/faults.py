@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults of a task file: collected while it is checked, raised together, each saying where it is and what to do."""
+"""Faults of a task file: collected while it is checked, raised together, each with its location and what to do."""
 from __future__ import annotations
 
 import difflib
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Place:
+class SourceLocation:
     """A position in a file.
 
     Attributes:
-        file: path of the file as the user gave it.
-        line: line number, from 1.
-        column: column number, from 1.
+        file: Path of the file as the user gave it.
+        line: Line number, from 1.
+        column: Column number, from 1.
     """
 
     file: str
@@ -29,18 +29,18 @@ class Place:
 class Fault:
     """One thing that is wrong in a task file."""
 
-    place: Place
+    location: SourceLocation
     message: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.message}"
+        return f"{self.location}: {self.message}"
 
 
 class TaskFault(Exception):
     """A task file cannot be used. Carries every fault that was found in it."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        """Sort the faults by place and drop repetitions."""
+        """Sorts the faults by location and drops repetitions."""
         self.faults: tuple[Fault, ...] = tuple(sorted(set(faults)))
         lines = "\n".join(f"  {fault}" for fault in self.faults)
         count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
@@ -52,53 +52,53 @@ class FaultList:
 
     def __init__(self) -> None:
         self._faults: list[Fault] = []
-        self._settled: set[Place] = set()
+        self._settled: set[SourceLocation] = set()
         self.harmless = 0
-        """How many of the faults leave known which states and userdata the task has."""
+        """Number of faults in spite of which the states and userdata of the task are known."""
 
-    def add(self, place: Place, message: str) -> None:
-        """Note a fault, unless a fault noted with ``add_cause`` at the same place explains it."""
-        if place not in self._settled:
-            self._faults.append(Fault(place, message))
+    def add(self, location: SourceLocation, message: str) -> None:
+        """Notes a fault, unless a fault noted with ``add_cause`` at the same location explains it."""
+        if location not in self._settled:
+            self._faults.append(Fault(location, message))
 
-    def add_cause(self, place: Place, message: str) -> None:
-        """Note a fault of a value that cannot be read at all: more faults of that value would only follow from it."""
-        self.add(place, message)
-        self._settled.add(place)
+    def add_cause(self, location: SourceLocation, message: str) -> None:
+        """Notes a fault of a value that cannot be read at all: more faults of that value would only follow from it."""
+        self.add(location, message)
+        self._settled.add(location)
 
     def add_unknown(
-        self, place: Place, what: str, found: str, allowed: Iterable[str], given: Container[str] = ()
+        self, location: SourceLocation, what: str, found: str, allowed: Iterable[str], given: Container[str] = ()
     ) -> None:
-        """Note a name that is none of those allowed, with the nearest one where there is one near.
+        """Notes a name that is none of those allowed, with the closest one where one is similar.
 
         Args:
-            place: where the name is.
-            what: what it names.
-            found: the name.
-            allowed: the names that are allowed.
-            given: names that stand beside it already, and cannot be what was meant.
+            location: Where the name is.
+            what: What it names.
+            found: The name.
+            allowed: The names that are allowed.
+            given: Names that are used beside it already, and so cannot be what was meant.
         """
         names = list(dict.fromkeys(allowed))
         free = [name for name in names if name not in given]
-        self.add(place, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, free)}")
+        self.add(location, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, free)}")
 
     def __len__(self) -> int:
         return len(self._faults)
 
     def raise_if_any(self) -> None:
-        """Raise ``TaskFault`` with all faults noted so far, if there are any."""
+        """Raises ``TaskFault`` with all faults noted so far, if there are any."""
         if self._faults:
             raise TaskFault(self._faults)
 
 
 def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
-    """Say which names are allowed: ``allowed: a, b``; ``empty`` is said when there are none."""
+    """Says which names are allowed: ``allowed: a, b``; ``empty`` when there are none."""
     names = list(dict.fromkeys(allowed))
     return f"allowed: {', '.join(names)}" if names else empty
 
 
 def closest(found: str, allowed: Iterable[str]) -> str | None:
-    """Return the allowed name closest to the one found (or part of it), None where none is close."""
+    """Returns the allowed name closest to the one found (or part of it), None where none is close."""
     by_lower = {str(name).lower(): str(name) for name in allowed}
     wanted = str(found).lower()
     matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
@@ -108,6 +108,6 @@ def closest(found: str, allowed: Iterable[str]) -> str | None:
 
 
 def nearest(found: str, allowed: Iterable[str]) -> str:
-    """Return ``; did you mean 'x'?`` for the closest allowed name, or nothing."""
+    """Returns ``; did you mean 'x'?`` for the closest allowed name, or nothing."""
     name = closest(found, allowed)
     return f"; did you mean '{name}'?" if name is not None else ""

@@ -10,7 +10,7 @@ from typing import Any, Union
 
 import yaml
 
-from modular_framework_core.files.faults import Fault, FaultList, Place, TaskFault, listing, nearest
+from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault, listing, nearest
 from modular_framework_core.files.shallow_yaml import MAX_DEPTH
 from modular_framework_core.files.whole_files import read_whole
 
@@ -32,13 +32,13 @@ _CORE: tuple[tuple[str, re.Pattern[str], Callable[[str], Any]], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """Text, number, truth value or nothing."""
+    """Text, number, bool or nothing."""
 
     value: str | bool | int | float | None
-    place: Place
+    location: SourceLocation
 
     def plain(self) -> Any:
-        """Return the value itself."""
+        """Returns the value itself."""
         return self.value
 
 
@@ -47,23 +47,23 @@ class Sequence:
     """A list."""
 
     items: tuple[Node, ...]
-    place: Place
+    location: SourceLocation
 
     def plain(self) -> list[Any]:
-        """Return a Python list of plain values."""
+        """Returns a Python list of plain values."""
         return [item.plain() for item in self.items]
 
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A mapping whose keys are unique; ``keys`` has the place of each key."""
+    """A mapping whose keys are unique; ``keys`` has the location of each key."""
 
     entries: dict[str, Node]
-    keys: dict[str, Place]
-    place: Place
+    keys: dict[str, SourceLocation]
+    location: SourceLocation
 
     def plain(self) -> dict[str, Any]:
-        """Return a Python dict of plain values."""
+        """Returns a Python dict of plain values."""
         return {key: value.plain() for key, value in self.entries.items()}
 
     def __iter__(self) -> Iterator[str]:
@@ -74,7 +74,7 @@ Node = Union[Scalar, Sequence, Mapping]  # noqa: UP007 - the classes above refer
 
 
 def kind_of(node: Node) -> str:
-    """Name the kind of a value, for messages."""
+    """Names the kind of a value, for messages."""
     match node:
         case Mapping():
             return "a mapping"
@@ -91,17 +91,17 @@ def kind_of(node: Node) -> str:
 
 
 def load(path: Path, faults: FaultList) -> Node:
-    """Read a YAML file.
+    """Reads a YAML file.
 
     Args:
-        path: the file.
-        faults: where faults of single values are noted that leave the rest readable: a key given twice, a key that is
-            no text, a tag other than those of text, number, truth value, nothing, list and mapping.
+        path: The file.
+        faults: Where faults of single values are noted that leave the rest readable: a key given twice, a key that is
+            no text, a tag other than those of text, number, bool, nothing, list and mapping.
 
     Raises:
-        TaskFault: the file cannot be read, is empty, is no valid YAML, or is nested too deeply.
+        TaskFault: The file cannot be read, is empty, is no valid YAML, or is nested too deeply.
     """
-    start = Place(str(path), 1, 1)
+    start = SourceLocation(str(path), 1, 1)
     try:
         text = read_whole(path)
     except FileNotFoundError as error:
@@ -114,34 +114,34 @@ def load(path: Path, faults: FaultList) -> Node:
 
 
 def loads(text: str, file: str, faults: FaultList) -> Node:
-    """Read YAML from text; ``file`` is the name used in messages. Notes faults and raises as ``load`` does."""
+    """Reads YAML from text; ``file`` is the name used in messages. Notes faults and raises as ``load`` does."""
     try:
         return _Reader(text, file, faults).read()
     except yaml.MarkedYAMLError as error:
         raise TaskFault([_syntax_fault(error, text, file)]) from error
     except yaml.reader.ReaderError as error:
-        raise TaskFault([Fault(_place_of(text, file, error.position), f"this is not valid YAML: {error.reason}")]
+        raise TaskFault([Fault(_location_of(text, file, error.position), f"this is not valid YAML: {error.reason}")]
                         ) from error
     except (UnicodeEncodeError, yaml.YAMLError) as error:
         first_line = (str(error).splitlines() or [""])[0]
-        raise TaskFault([Fault(Place(file, 1, 1), f"this is not valid YAML: {first_line}")]) from error
+        raise TaskFault([Fault(SourceLocation(file, 1, 1), f"this is not valid YAML: {first_line}")]) from error
 
 
 def _syntax_fault(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
     mark, begun = error.problem_mark or error.context_mark, error.context_mark
-    place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file, 1, 1)
+    location = SourceLocation(file, mark.line + 1, mark.column + 1) if mark else SourceLocation(file, 1, 1)
     context = f" {error.context}" if error.context else ""
-    if begun and begun.line + 1 != place.line:
+    if begun and begun.line + 1 != location.line:
         context += f" that begins in line {begun.line + 1}"
     lines = text.splitlines()
-    rest = lines[place.line - 1][place.column - 1:] if place.line <= len(lines) else ""
+    rest = lines[location.line - 1][location.column - 1:] if location.line <= len(lines) else ""
     hint = "; a tab is here: indent with spaces" if rest.startswith("\t") else ""
-    return Fault(place, f"this is not valid YAML: {error.problem}{context}{hint}")
+    return Fault(location, f"this is not valid YAML: {error.problem}{context}{hint}")
 
 
-def _place_of(text: str, file: str, position: int) -> Place:
+def _location_of(text: str, file: str, position: int) -> SourceLocation:
     before = text[:position]
-    return Place(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
+    return SourceLocation(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
 
 
 class _Reader:
@@ -157,115 +157,115 @@ class _Reader:
         self._open: set[str] = set()
 
     def read(self) -> Node:
-        """Return the one document of the file."""
+        """Returns the one document of the file."""
         root: Node | None = None
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
                 if root is not None:
-                    raise TaskFault([Fault(self._place(event), "the file has a second document; a task is one "
-                                                               "document, remove the '---'")])
+                    raise TaskFault([Fault(self._location(event), "the file has a second document; a task is one "
+                                                                  "document, remove the '---'")])
                 root = self._node(next(self._events))
         if root is None:
-            raise TaskFault([Fault(Place(self._file, 1, 1),
+            raise TaskFault([Fault(SourceLocation(self._file, 1, 1),
                                    "the file is empty; a task needs name, source, outcomes and states")])
         return root
 
-    def _place(self, event: Any) -> Place:
-        return Place(self._file, event.start_mark.line + 1, event.start_mark.column + 1)
+    def _location(self, event: Any) -> SourceLocation:
+        return SourceLocation(self._file, event.start_mark.line + 1, event.start_mark.column + 1)
 
     def _node(self, event: Any) -> Node:
-        place = self._place(event)
+        location = self._location(event)
         if isinstance(event, yaml.AliasEvent):
-            return self._alias(event.anchor, place)
+            return self._alias(event.anchor, location)
         before = self._count
-        self._counted(1, place)
+        self._counted(1, location)
         if event.anchor:
             self._open.add(event.anchor)
         is_scalar = isinstance(event, yaml.ScalarEvent)
-        node: Node = self._scalar(event, place) if is_scalar else self._collection(event, place)
+        node: Node = self._scalar(event, location) if is_scalar else self._collection(event, location)
         if event.anchor:
             self._open.discard(event.anchor)
             self._anchors[event.anchor] = node, self._count - before
         return node
 
-    def _counted(self, more: int, place: Place) -> None:
+    def _counted(self, more: int, location: SourceLocation) -> None:
         self._count += more
         if self._count > MAX_NODES:
-            raise TaskFault([Fault(place, f"the file has more than {MAX_NODES} values once aliases are expanded")])
+            raise TaskFault([Fault(location, f"the file has more than {MAX_NODES} values once aliases are expanded")])
 
-    def _alias(self, name: str, place: Place) -> Node:
+    def _alias(self, name: str, location: SourceLocation) -> Node:
         if name in self._open:
-            raise TaskFault([Fault(place, "this value contains itself through an alias")])
+            raise TaskFault([Fault(location, "this value contains itself through an alias")])
         if name not in self._anchors:
             reason = f"this is not valid YAML: the alias '*{name}' refers to no anchor before it"
-            raise TaskFault([Fault(place, reason)])
+            raise TaskFault([Fault(location, reason)])
         node, count = self._anchors[name]
-        self._counted(count, place)
+        self._counted(count, location)
         return node
 
-    def _collection(self, event: Any, place: Place) -> Node:
+    def _collection(self, event: Any, location: SourceLocation) -> Node:
         is_list = isinstance(event, yaml.SequenceStartEvent)
         if event.tag not in (None, "!", _TAG + ("seq" if is_list else "map")):
-            self._faults.add(place, f"the tag {event.tag} cannot be used here")
+            self._faults.add(location, f"the tag {event.tag} cannot be used here")
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise TaskFault([Fault(place, f"the file is nested more than {MAX_DEPTH} levels deep")])
-        node = self._list(place) if is_list else self._mapping(place)
+            raise TaskFault([Fault(location, f"the file is nested more than {MAX_DEPTH} levels deep")])
+        node = self._list(location) if is_list else self._mapping(location)
         self._depth -= 1
         return node
 
-    def _list(self, place: Place) -> Sequence:
+    def _list(self, location: SourceLocation) -> Sequence:
         items: list[Node] = []
         while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
             items.append(self._node(event))
-        return Sequence(tuple(items), place)
+        return Sequence(tuple(items), location)
 
-    def _scalar(self, event: Any, place: Place) -> Scalar:
+    def _scalar(self, event: Any, location: SourceLocation) -> Scalar:
         text, tag = event.value, event.tag
         if tag in ("!", _TAG + "str") or (tag is None and not event.implicit[0]):
-            return Scalar(text, place)
+            return Scalar(text, location)
         for kind, pattern, make in _CORE:
             if tag in (None, _TAG + kind) and pattern.fullmatch(text):
                 try:
-                    return Scalar(make(text), place)
+                    return Scalar(make(text), location)
                 except ValueError as error:
-                    self._faults.add(place, f"the number '{text[:20]}...' cannot be read: {error}")
-                    return Scalar(None, place)
+                    self._faults.add(location, f"the number '{text[:20]}...' cannot be read: {error}")
+                    return Scalar(None, location)
         if tag is not None:
-            self._faults.add(place, f"the tag or value '{text}' of type {tag} cannot be used here")
-        return Scalar(text if tag is None else None, place)
+            self._faults.add(location, f"the tag or value '{text}' of type {tag} cannot be used here")
+        return Scalar(text if tag is None else None, location)
 
-    def _mapping(self, place: Place) -> Mapping:
+    def _mapping(self, location: SourceLocation) -> Mapping:
         entries: dict[str, Node] = {}
-        keys: dict[str, Place] = {}
+        keys: dict[str, SourceLocation] = {}
         merged: list[Mapping] = []
         while not isinstance(event := next(self._events), yaml.MappingEndEvent):
-            key_place = self._place(event)
+            key_location = self._location(event)
             is_merge = isinstance(event, yaml.ScalarEvent) and event.value == _MERGE_KEY and event.implicit[0]
             key = None if is_merge else self._key(self._node(event))
             value = self._node(next(self._events))
             if is_merge:
                 merged += self._merged(value)
             elif key in entries:
-                self._faults.add(key_place, f"the key '{key}' is given twice; first in line {keys[key].line}; remove "
-                                            "one of them")
+                self._faults.add(key_location, f"the key '{key}' is given twice; first in line {keys[key].line}; "
+                                               "remove one of them")
             elif key is not None:
-                entries[key], keys[key] = value, key_place
+                entries[key], keys[key] = value, key_location
         for other in merged:
             for key in other:
                 if key not in entries:
                     entries[key], keys[key] = other.entries[key], other.keys[key]
-        return Mapping(entries, keys, place)
+        return Mapping(entries, keys, location)
 
     def _merged(self, value: Node) -> list[Mapping]:
         found = list(value.items) if isinstance(value, Sequence) else [value]
         mappings = [item for item in found if isinstance(item, Mapping)]
         if len(mappings) != len(found):
-            self._faults.add(value.place, f"'<<' takes a mapping or a list of mappings, found {kind_of(value)}")
+            self._faults.add(value.location, f"'<<' takes a mapping or a list of mappings, found {kind_of(value)}")
         return mappings
 
     def _key(self, value: Node) -> str | None:
         if isinstance(value, Scalar) and isinstance(value.value, str) and value.value:
             return value.value
-        self._faults.add(value.place, f"a key must be text, found {kind_of(value)}; put it in quotes")
+        self._faults.add(value.location, f"a key must be text, found {kind_of(value)}; put it in quotes")
         return None

@@ -39,7 +39,7 @@ def write_whole(path: Path, content: str | bytes, mode: int = 0o644) -> None:
     except ValueError as error:
         raise OSError(f"{str(path)!r} is no path of a file: {error}") from error
     finally:
-        with contextlib.suppress(OSError):  # it is gone when all went well
+        with contextlib.suppress(OSError):  # it is gone after success
             if temporary:
                 os.unlink(temporary)
 

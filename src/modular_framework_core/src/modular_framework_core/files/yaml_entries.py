@@ -12,7 +12,7 @@ import yaml
 from modular_framework_core.files import shallow_yaml
 from modular_framework_core.files.whole_files import read_whole
 
-_NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: nobody asks for its tag
+_NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: its tag is not needed
 
 
 class EntryError(ValueError):
@@ -151,8 +151,8 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         yield entry
 
 
-def take_entries(path: Path, take: Callable[[Entry], None]) -> list[EntryError]:
-    """Hands every entry of a file to a function and goes on when one is not usable.
+def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryError]:
+    """Calls a function with every entry of a file, and continues after one that is not usable.
 
     Args:
         path: File to read.
@@ -167,7 +167,7 @@ def take_entries(path: Path, take: Callable[[Entry], None]) -> list[EntryError]:
             try:
                 if isinstance(entry, EntryError):
                     raise entry
-                take(entry)
+                handle(entry)
             except EntryError as error:
                 faults.append(error)
     except EntryError as error:

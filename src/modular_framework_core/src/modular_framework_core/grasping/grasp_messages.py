@@ -38,7 +38,7 @@ def generate_pose_stamped_message(reference_frame_name: str, position: Sequence[
     Args:
         reference_frame_name: Frame the pose is given in.
         position: x, y, z [m].
-        orientation: roll, pitch, yaw [rad], or a quaternion x, y, z, w.
+        orientation: Roll, pitch, yaw [rad], or a quaternion x, y, z, w.
 
     Returns:
         The message.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Judges what a grasp command asks of the manipulator, and whether the manipulator did it."""
+"""Checks what a grasp command asks of the manipulator, and decides whether the manipulator reached it."""
 from __future__ import annotations
 
 import math
@@ -44,8 +44,8 @@ class Outcome:
     Attributes:
         positions: {joint: position} after the motion [rad or m].
         stalled: True when something stopped the fingers before they got to their targets.
-        text: What the controller said.
-        pressing: True when they press so hard that they would have moved with nothing in their way.
+        text: Message of the controller.
+        pressing: True when they press with an effort that moves free fingers.
     """
 
     positions: Mapping[str, float]
@@ -56,7 +56,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a stage was reached, and why that is the answer."""
+    """Whether a stage was reached, and the reason."""
 
     reached: bool
     reason: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves the Grasp action: moves the manipulator to the stages of a grasp and tells honestly how that ended."""
+"""Serves the Grasp action: moves the manipulator to the stages of a grasp and reports where the fingers ended."""
 from __future__ import annotations
 
 import threading
@@ -33,9 +33,9 @@ STAGE_FIELDS = {Stage.PREGRASP: ("pregrasp", "pregrasped"), Stage.GRASP: ("grasp
 
 
 class GraspServer:
-    """Action server of modular_framework_core/Grasp. A new goal replaces the one under way; a cancel stops the fingers.
+    """Action server of modular_framework_core/Grasp. A new goal replaces the current one; a cancel stops the fingers.
 
-    Only ``posture`` of the commanded stage moves anything here: bringing the hand to ``pose`` is the arm's part.
+    Only ``posture`` of the commanded stage moves anything here: the arm brings the hand to ``pose``.
 
     Parameters:
         ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.

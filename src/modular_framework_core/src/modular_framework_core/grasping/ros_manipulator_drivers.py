@@ -27,8 +27,9 @@ from modular_framework_ros.calls import wait_for_action, wait_for_result, wait_u
 
 REST_SPEED = 0.02  # [rad/s or m/s]
 REST_TIMEOUT_S = 1.0
-HELD_UP = (FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED, FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED)
-"""How a trajectory ends whose joints something holds up; any other end is no stall."""
+STALL_ERROR_CODES = (FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
+                     FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED)
+"""How a trajectory ends whose joints are blocked; any other end is no stall."""
 
 
 class JointMonitor:
@@ -45,19 +46,19 @@ class JointMonitor:
         self._subscriber: rospy.Subscriber | None = None
 
     def connect(self) -> None:
-        """Starts listening."""
+        """Subscribes to the joint states."""
         self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=1)
 
     def positions(self, names: Mapping[str, float] | list[str]) -> dict[str, float]:
-        """Returns the positions of the joints that were heard of."""
+        """Returns the positions of the joints that have been received."""
         with self._lock:
             return {name: self._positions[name] for name in names if name in self._positions}
 
     def wait_for_rest(self, motion: Motion) -> bool:
-        """Waits until every joint was heard of once more and is slower than a crawl; False when that takes too long.
+        """Waits until a new state of every joint was received and all are slow; False when that takes too long.
 
-        A controller ends a goal some milliseconds before the joints' last positions are heard, and a finger may still
-        move on within the goal's tolerance. A joint without a speed counts as resting.
+        A controller ends a goal some milliseconds before the joints' last positions arrive, and a finger may still
+        move within the goal's tolerance. A joint without a velocity counts as resting.
         """
         begun = time.monotonic()
         wait_until(lambda: motion.stop_requested() or self._at_rest_since(motion.targets, begun), REST_TIMEOUT_S)
@@ -174,13 +175,13 @@ class TrajectoryDriver:
         status = wait_for_result(self._client, motion.timeout_s, motion.stop_requested)
         result = self._client.get_result()
         _refuse_unfinished(status, self._action, motion)
-        held_up = status == GoalStatus.ABORTED and result is not None and result.error_code in HELD_UP
+        stalled = status == GoalStatus.ABORTED and result is not None and result.error_code in STALL_ERROR_CODES
         text = (result.error_string if result else "") or self._client.get_goal_status_text()
-        if status != GoalStatus.SUCCEEDED and not held_up:
+        if status != GoalStatus.SUCCEEDED and not stalled:
             did = "rejected the posture" if status == GoalStatus.REJECTED else "gave up"
             raise GraspCommandError(f"controller action '{self._action}' {did}: {text or 'no reason given'}")
         rests = monitor.wait_for_rest(motion)
-        return Outcome(monitor.positions(motion.targets), held_up and rests, text)
+        return Outcome(monitor.positions(motion.targets), stalled and rests, text)
 
 
 def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], duration_s: float) -> ManipulatorDriver:
@@ -213,17 +214,17 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
 
 
 class Manipulator(Protocol):
-    """Whatever moves the fingers and knows where they are."""
+    """Moves the fingers and knows their positions."""
 
     def connect(self) -> None:
-        """Begins to know."""
+        """Starts to receive joint positions."""
 
     def move(self, motion: Motion) -> Outcome:
         """Moves the fingers and waits for the end.
 
         Raises:
             GraspCommandError: It could not be done, or was stopped; the text says why.
-            CallError: Somebody did not answer.
+            CallError: Another node did not answer.
         """
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
@@ -244,7 +245,7 @@ class ControlledManipulator:
         self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
 
     def connect(self) -> None:
-        """Starts to listen to the joints."""
+        """Subscribes to the joint states."""
         self._monitor.connect()
 
     def move(self, motion: Motion) -> Outcome:
@@ -255,7 +256,7 @@ class ControlledManipulator:
         return self._drivers[key].move(motion, self._monitor)
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
-        """Makes a message of the positions heard of last."""
+        """Makes a message of the latest positions."""
         return self._monitor.message(names)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells fingers that something stopped from fingers that had too little torque to move."""
+"""Distinguishes fingers that an object stopped from fingers that had too little torque to move."""
 from __future__ import annotations
 
 import math
@@ -40,7 +40,7 @@ class StallEvidence:
 
     Args:
         tolerance: Greatest distance that counts as reached [rad or m]; it has to be a small share of the joints'
-            ranges, since neither how far they came nor whether they are shut can be told within it.
+            ranges, since within it neither their motion nor a shut hand can be detected.
     """
 
     def __init__(self, tolerance: float) -> None:
@@ -49,20 +49,20 @@ class StallEvidence:
         self._moving_efforts: dict[tuple[str, float], float] = {}
 
     def judge(self, outcome: Outcome, attempt: Attempt) -> Outcome:
-        """Takes a stall for one only when it was no lack of torque that kept the fingers from moving.
+        """Accepts a stall only when it was not a lack of torque that kept the fingers from moving.
 
         Some joint that is short of its target must have moved toward it, or press, or go on holding since the stall
         before, or have moved this way earlier with no more effort: then something new is in its way.
 
         Args:
-            outcome: What the controller says.
+            outcome: Result reported by the controller.
             attempt: What was commanded.
 
         Returns:
-            The outcome; not stalled, and with the reason, when nothing of that holds.
+            The outcome; not stalled, and with the reason, when none of that holds.
         """
         judged = outcome
-        if outcome.stalled and not (outcome.pressing or self._goes_on_holding(attempt) or
+        if outcome.stalled and not (outcome.pressing or self._still_holds(attempt) or
                                     any(self._was_stopped(name, outcome, attempt) for name in attempt.targets)):
             judged = replace(outcome, stalled=False, text="the fingers have not moved, so nothing shows that something "
                              "stopped them; give them more torque, or begin farther open"
@@ -71,7 +71,7 @@ class StallEvidence:
         self._remember(outcome, attempt)
         return judged
 
-    def _goes_on_holding(self, attempt: Attempt) -> bool:
+    def _still_holds(self, attempt: Attempt) -> bool:
         held = self._held
         return held is not None and all(abs(held.positions.get(name, math.inf) - attempt.begun.get(name, math.inf)) <=
                                         self._tolerance for name in attempt.targets)

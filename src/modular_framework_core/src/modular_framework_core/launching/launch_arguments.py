@@ -38,7 +38,7 @@ def check_arguments(path: str, arguments: list[str]) -> None:
         arguments: What is given, `name:=value`.
 
     Raises:
-        roslaunch.core.RLException: it names every wrong argument and what was probably meant.
+        roslaunch.core.RLException: It names every wrong argument and what was probably meant.
     """
     known = roslaunch.arg_dump.get_args([path])
     faults = []

@@ -33,10 +33,10 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
     """Remembers the first process that ended badly, and how the task ended.
 
     Attributes:
-        task_name: name of the node whose exit code is the launch's own.
-        ends_with_task: whether the end of the task ends the launch.
-        task_exit_code: exit code of that node; None while it runs.
-        dead_node: name and exit code of the first other node that died; None if none did.
+        task_name: Name of the node whose exit code is the launch's own.
+        ends_with_task: Whether the end of the task ends the launch.
+        task_exit_code: Exit code of that node; None while it runs.
+        dead_node: Name and exit code of the first other node that died; None if none did.
         last_process: roslaunch's name of the process that ended the launch.
     """
 
@@ -77,9 +77,9 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
 
     Args:
         package: ROS package of the launch file.
-        launch_file: name of the file in the package's folder `launch`.
-        arguments: launch arguments, `name:=value`; the launch file has `end_with_task`.
-        task_name: name of the node that runs the task.
+        launch_file: Name of the file in the package's folder `launch`.
+        arguments: Launch arguments, `name:=value`; the launch file has `end_with_task`.
+        task_name: Name of the node that runs the task.
 
     Returns:
         The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an

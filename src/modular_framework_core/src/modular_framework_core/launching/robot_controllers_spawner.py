@@ -23,9 +23,9 @@ class ControllerFile:
     """A controller file, read and checked.
 
     Attributes:
-        path: where it was read from.
-        parameters: the whole mapping, for the parameter server.
-        controllers: names of the controllers, in the order of the file: the keys whose mapping has a `type`.
+        path: Where it was read from.
+        parameters: The whole mapping, for the parameter server.
+        controllers: Names of the controllers, in the order of the file: the keys whose mapping has a `type`.
     """
 
     path: Path
@@ -38,8 +38,8 @@ class SpawnPlan:
     """What is to do so that all controllers run.
 
     Attributes:
-        load: controllers the manager does not know yet.
-        start: controllers that do not run yet.
+        load: Controllers the manager does not know yet.
+        start: Controllers that do not run yet.
     """
 
     load: tuple[str, ...]
@@ -47,10 +47,10 @@ class SpawnPlan:
 
 
 def read_controller_file(path: Path) -> ControllerFile:
-    """Read `<robot package>/controllers/<file>`.
+    """Reads `<robot package>/controllers/<file>`.
 
     Raises:
-        ControllerFileError: no such file, not YAML, not a mapping, or no controller in it.
+        ControllerFileError: No such file, not YAML, not a mapping, or no controller in it.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -78,8 +78,8 @@ def with_joint_states(file: ControllerFile, running_types: Iterable[str]) -> Con
     """Returns the file with a joint state controller, where neither it nor the controller manager has one.
 
     Args:
-        file: what was read.
-        running_types: types of the controllers that are loaded already.
+        file: What was read.
+        running_types: Types of the controllers that are loaded already.
     """
     types = [file.parameters[name]["type"] for name in file.controllers]
     if any(kind.rpartition("/")[2] == JOINT_STATES_TYPE.rpartition("/")[2] for kind in (*types, *running_types)):
@@ -94,21 +94,21 @@ def _is_type(value: object) -> bool:
 
 
 def plan_spawn(wanted: Sequence[str], states: Mapping[str, str]) -> SpawnPlan:
-    """What is to do for the controllers `wanted`, given the state of those the manager has loaded.
+    """Plans what is to do for the controllers `wanted`, given the state of those the manager has loaded.
 
     Args:
-        wanted: controller names.
-        states: state by name, as list_controllers reports them.
+        wanted: Controller names.
+        states: State by name, as list_controllers reports them.
     """
     return SpawnPlan(load=tuple(name for name in wanted if name not in states),
                      start=tuple(name for name in wanted if states.get(name) != "running"))
 
 
 def ready_topics(robot_hardware: object, topic_of: Mapping[str, object]) -> dict[str, str]:
-    """Which topic to wait for on behalf of which hardware.
+    """Returns which topic to wait for on behalf of which hardware.
 
     Args:
-        robot_hardware: parameter of that name: a list of hardware names, or None.
+        robot_hardware: Parameter of that name: a list of hardware names, or None.
         topic_of: `topic_to_wait_for` of each hardware that has one.
 
     Returns:

@@ -53,7 +53,7 @@ class RobotControllersSpawner:
 
     Args:
         robot_package: ROS package with a folder `controllers`.
-        controller_file: file in that folder.
+        controller_file: File in that folder.
     """
 
     def __init__(self, robot_package: str, controller_file: str) -> None:
@@ -69,10 +69,10 @@ class RobotControllersSpawner:
             raise SpawnError(str(error)) from error
 
     def run(self) -> None:
-        """Upload the parameters, wait for the hardware, load and start the controllers, check that they run.
+        """Uploads the parameters, waits for the hardware, loads and starts the controllers, checks that they run.
 
         Raises:
-            SpawnError: something is missing or refused.
+            SpawnError: Something is missing or refused.
         """
         for name, value in self._file.parameters.items():
             rospy.set_param(f"/{name}", value)
@@ -90,7 +90,7 @@ class RobotControllersSpawner:
                       ", ".join(plan.load) or "none")
 
     def _add_joint_states(self) -> None:
-        """Adds a joint state controller where there is none: without one nobody knows where the joints are."""
+        """Adds a joint state controller where there is none: without one the joint positions are not published."""
         loaded = self._call("list_controllers", ListControllers).controller
         completed = with_joint_states(self._file, [entry.type for entry in loaded])
         if completed is not self._file:
@@ -150,7 +150,7 @@ class RobotControllersSpawner:
             subscriber.unregister()
 
     def _wait(self, done: Callable[[], bool], what: Callable[[], str], advice: str) -> None:
-        """Poll `done` in real time; warn every `~timeout`, give up after `~give_up_after`."""
+        """Polls `done` in real time; warns every `~timeout`, gives up after `~give_up_after`."""
         started = warned = time.monotonic()
         while not done():
             now = time.monotonic()
@@ -177,7 +177,7 @@ def _set_when_true(message: Bool, event: threading.Event) -> None:
 
 
 def main() -> int:
-    """Run the node: 0 when all controllers run, 1 when not, 2 for a wrong call."""
+    """Runs the node: 0 when all controllers run, 1 when not, 2 for a wrong call."""
     rospy.init_node("custom_controller_spawner")
     arguments = rospy.myargv(sys.argv)[1:]
     if len(arguments) != 2:

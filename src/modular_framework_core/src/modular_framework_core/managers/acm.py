@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides which pairs of links and objects may touch, without ever loosening or tightening a pair nobody asked about.
+"""Decides which pairs of links and objects may touch, and changes no other pair than those of a request.
 
 The reference matrix comes from the planning scene. Objects that appear later are added to it; the manipulator may then
-be allowed to touch itself or some objects. Forbidding again restores what the reference said.
+be allowed to touch itself or some objects. Forbidding again restores the reference.
 """
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class _Table:
 
 @dataclass(frozen=True, slots=True)
 class AcmAnswer:
-    """A matrix and what the requester should hear about it.
+    """A matrix with warnings for the requester.
 
     Attributes:
         matrix: Pairs that may touch from now on.
@@ -209,7 +209,7 @@ class AcmManager:
             return AcmAnswer(self._matrix())
 
     def allow_self_collision(self, allow: bool, links: Sequence[str] = ()) -> AcmAnswer:
-        """Lets links touch each other, or restores what the reference says.
+        """Lets links touch each other, or restores the reference.
 
         Args:
             allow: False restores the reference.
@@ -230,7 +230,7 @@ class AcmManager:
             return AcmAnswer(self._matrix(), _link_warnings(chosen))
 
     def allow_object_collision(self, objects: Iterable[str], allow: bool, links: Sequence[str] = ()) -> AcmAnswer:
-        """Lets links touch objects, or restores what the reference says.
+        """Lets links touch objects, or restores the reference.
 
         Args:
             objects: Models or ids; none means every object added so far.

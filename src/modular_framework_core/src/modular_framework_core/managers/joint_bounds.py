@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Knows the joints of the robot and where they can go, so that a named joint state is checked before it is used."""
+"""Reads the joints of the robot and their bounds, so that a named joint state is checked before it is used."""
 from __future__ import annotations
 
 import math
@@ -31,7 +31,7 @@ def bounds_from_urdf(text: str) -> Mapping[str, Bounds]:
     return MappingProxyType(bounds)
 
 
-def fault_of(joint: str, position: float, bounds: Mapping[str, Bounds]) -> str:
+def bounds_fault(joint: str, position: float, bounds: Mapping[str, Bounds]) -> str:
     """Says what is wrong with a joint's position; nothing when it is all right or no joint is known.
 
     Args:

@@ -117,7 +117,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
 
 
 class _YamlLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Reads numbers as JSON has them, too: YAML 1.1 takes 1e-07, NaN and Infinity for words."""
+    """Reads numbers as JSON has them, too: YAML 1.1 reads 1e-07, NaN and Infinity as text."""
 
 
 _YamlLoader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+[eE][-+]?\d+|NaN|Infinity)$"),
@@ -125,7 +125,7 @@ _YamlLoader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?(
 
 
 def _parsed(text: str) -> Any:
-    for parse in (orjson.loads, json.loads):  # only the slower one knows NaN and Infinity
+    for parse in (orjson.loads, json.loads):  # only the slower one reads NaN and Infinity
         try:
             return parse(text)
         except json.JSONDecodeError:
@@ -138,13 +138,13 @@ def _parsed(text: str) -> Any:
 def flow_text(message: Any) -> str:
     """Writes a message as one line of JSON."""
     text = orjson.dumps(message, default=_plain).decode()
-    if "null" in text:  # written for numbers that are not finite, which only the slower writer has words for
+    if "null" in text:  # written for numbers that are not finite, which only the slower writer can write
         return json.dumps(message, default=_plain)
     return text
 
 
 def _plain(value: Any) -> Any:
-    """Takes apart what a writer of JSON does not know."""
+    """Converts what a JSON writer cannot write."""
     match value:
         case genpy.Message():
             return {name: getattr(value, name) for name in value.__slots__}

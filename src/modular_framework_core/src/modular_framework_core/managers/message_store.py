@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps messages of one kind so that components which never meet can hand them to each other.
+"""Keeps messages of one kind so that components exchange them without knowing each other.
 
 A message stored with a name stays until it is overwritten or removed. A message stored without a name joins a queue:
 the oldest is handed out first and leaves the queue for good.

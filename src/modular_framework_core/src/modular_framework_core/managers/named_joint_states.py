@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
-from modular_framework_core.managers.joint_bounds import Bounds, fault_of
+from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
+from modular_framework_core.managers.joint_bounds import Bounds, bounds_fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def parse_joint_state(entry: Entry, bounds: Mapping[str, Bounds]) -> NamedJointS
         raise entry.fault("holds no joint; write one 'joint: position' line for each joint")
     positions = tuple(joint.number() for joint in joints)
     for joint, position in zip(joints, positions, strict=True):
-        fault = fault_of(joint.key, position, bounds)
+        fault = bounds_fault(joint.key, position, bounds)
         if fault:
             raise joint.fault(fault)
     return NamedJointState(entry.key, tuple(joint.key for joint in joints), positions)
@@ -63,5 +63,5 @@ def load_joint_states(
         The usable states in file order, and one error for each entry (or for the file) that is not usable.
     """
     states: list[NamedJointState] = []
-    faults = take_entries(path, lambda entry: states.append(parse_joint_state(entry, bounds or {})))
+    faults = read_each_entry(path, lambda entry: states.append(parse_joint_state(entry, bounds or {})))
     return states, faults

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
 from modular_framework_core.rotations import quaternion_from_rpy
 
 POSITION_KEYS = ("x", "y", "z")
@@ -129,5 +129,5 @@ def load_poses(path: Path) -> tuple[list[NamedPose], list[EntryError]]:
         The usable poses in file order, and one error for each entry (or for the file) that is not usable.
     """
     poses: list[NamedPose] = []
-    faults = take_entries(path, lambda entry: poses.append(parse_pose(entry)))
+    faults = read_each_entry(path, lambda entry: poses.append(parse_pose(entry)))
     return poses, faults

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
 
 WAYPOINT_KEYS = ("name", "interpolate_time", "pause_time")
 
@@ -127,5 +127,5 @@ def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajec
             raise entry.fault("holds no waypoint; write at least one")
         trajectories.append(time_trajectory(entry.key, waypoints, lookup))
 
-    faults = take_entries(path, take)
+    faults = read_each_entry(path, take)
     return trajectories, faults

@@ -9,7 +9,7 @@ from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, Plann
 from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
 from modular_framework_core.managers.acm import AcmAnswer, AcmError, AcmManager, CollisionMatrix
-from modular_framework_core.managers.ros_simulated_objects import new_loose_objects
+from modular_framework_core.managers.ros_simulated_objects import new_movable_objects
 from modular_framework_core.srv import (
     GetModifiedACM,
     GetModifiedACMRequest,
@@ -53,7 +53,7 @@ def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
 
 
 def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
-    """Gives a matrix to move_group, and waits until it plans with it.
+    """Sends a matrix to move_group, and waits until it plans with it.
 
     Raises:
         CallError: move_group is not there within this time [s], or does not take the matrix.
@@ -75,7 +75,7 @@ class AcmServices:
         ``manipulator_prefix`` (string): text in the names of the manipulator's links; used without the indices.
         Both are read each time a reference matrix is set.
         ``~grip_interfaces`` (bool, false): serves ``update_acm_entry`` with GRIP's type, which has a field ``publish``.
-        ``simulation`` (bool): True adds the loose objects of the simulation before a request about objects is served.
+        ``simulation`` (bool): True adds the movable objects of the simulation before a request about objects is served.
 
     Services:
         ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM):
@@ -198,7 +198,7 @@ class AcmServices:
     def _add_simulated_objects(self) -> None:
         """Adds what a world file or another node has put into the simulation since the last request."""
         try:
-            for name in new_loose_objects(self.manager.objects):
+            for name in new_movable_objects(self.manager.objects):
                 self.manager.add_object(name)
         except CallError as error:
             rospy.logwarn("get_modified_acm: the objects of the simulation cannot be looked up, only those that were "

@@ -18,7 +18,7 @@ from modular_framework_core.managers.message_numbers import unusable_position
 from modular_framework_core.managers.message_store import Change, MessageNotFoundError, MessageStore
 from modular_framework_core.msg import ManagerChange
 
-OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes tells of every one
+OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes reports every one
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ class MessageServices:
         self.kind = kind
         self._file = named_file
         self.store: MessageStore[Any] = MessageStore(kind.noun, complete_grasp_id if kind is GRASP else None,
-                                                     self._tell)
+                                                     self._publish_change)
         self._services: list[rospy.Service] = []
         self._changes: rospy.Publisher | None = None
         if named_file is not None:
@@ -137,7 +137,7 @@ class MessageServices:
         while self._services:
             self._services.pop().shutdown("the manager is closed")
 
-    def _tell(self, change: Change) -> None:
+    def _publish_change(self, change: Change) -> None:
         if self._changes is not None:
             self._changes.publish(ManagerChange(rospy.Time.now(), self.kind.noun, change.action.value, change.name,
                                                 change.named, change.anonymous))

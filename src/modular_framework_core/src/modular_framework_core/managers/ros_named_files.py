@@ -77,7 +77,7 @@ def read_poses(path: Path) -> NamedMessages:
 
 
 def read_robot_poses(path: Path) -> NamedMessages:
-    """Reads the poses of a robot's end effectors from a file of poses; its faults are told by ``read_poses``."""
+    """Reads the poses of a robot's end effectors from a file of poses; its faults are reported by ``read_poses``."""
     poses, _ = load_poses(path)
     return {pose.name: robot_pose_message(pose) for pose in poses if pose.is_robot_pose}, []
 
@@ -94,7 +94,7 @@ def robot_bounds() -> Mapping[str, Bounds]:
         return {}
 
 
-def lookup_in(services: MessageServices) -> JointLookup:
+def joint_lookup(services: MessageServices) -> JointLookup:
     """Makes a lookup of joint states that live in the same process."""
 
     def lookup(name: str) -> Mapping[str, float] | None:

@@ -14,7 +14,7 @@ from modular_framework_core.managers.ros_acm_services import AcmServices
 from modular_framework_core.managers.ros_message_services import MessageKind, MessageServices, NamedFile
 from modular_framework_core.managers.ros_named_files import (
     NamedMessages,
-    lookup_in,
+    joint_lookup,
     lookup_over_service,
     read_joint_states,
     read_poses,
@@ -86,7 +86,7 @@ def run_all() -> None:
         files[2] = ""
     joint_states = MessageServices(kinds.JOINT_STATE, named(files[0], read_joint_states))
     services = [joint_states,
-                MessageServices(kinds.TRAJECTORY, named(files[1], trajectory_reader(lookup_in(joint_states)))),
+                MessageServices(kinds.TRAJECTORY, named(files[1], trajectory_reader(joint_lookup(joint_states)))),
                 MessageServices(kinds.POSE, named(files[2], read_poses)),
                 MessageServices(kinds.ROBOT_POSE, named(files[2], read_robot_poses)),
                 MessageServices(kinds.PLAN), MessageServices(kinds.GRASP)]

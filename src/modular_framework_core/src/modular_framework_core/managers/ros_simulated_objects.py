@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the loose objects of a simulation, so that a world file's objects need not be added to the matrix by hand."""
+"""Finds the movable objects of a simulation, so that a world file's objects need not be added to the matrix by hand."""
 from __future__ import annotations
 
 from collections.abc import Collection
@@ -16,14 +16,14 @@ SIMULATION_PARAMETER = "simulation"
 SERVICE_TIMEOUT_S = 3.0
 
 
-def new_loose_objects(known: Collection[str]) -> list[str]:
+def new_movable_objects(known: Collection[str]) -> list[str]:
     """Returns the objects of the planning scene that are models of the simulation and free to move.
 
     Tables, pedestals and other static models are left out: the manipulator must never be allowed to touch them by
     a request that names no object. Without a simulation (parameter ``simulation`` not true) there are none.
 
     Args:
-        known: Ids that need not be looked at.
+        known: Ids that are left out.
 
     Returns:
         Ids of the planning scene, ``<model>__<link>``.

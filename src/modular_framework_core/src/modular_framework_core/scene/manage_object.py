@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Understands what a user asks for on the command line when an object is to enter or leave the simulation."""
+"""Parses the command line that adds an object to the simulation or removes it."""
 from __future__ import annotations
 
 import argparse

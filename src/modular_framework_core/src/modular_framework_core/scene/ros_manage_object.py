@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Brings an object into the simulation or takes it out, everywhere or nowhere.
+"""Adds an object to the simulation or removes it, everywhere or nowhere.
 
 The simulation, the map of object types and the collision matrix must agree on which objects exist. When one of them
-refuses, what was done before is taken back, and the exit code says so.
+refuses, what was done before is undone, and the exit code says so.
 """
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SERVICE_TIMEOUT_S = 15.0
 
 
 class RefusedError(RuntimeError):
-    """A service said no; the text says which and why."""
+    """A service refused; the text says which and why."""
 
 
 def call(name: str, service_type: Any, request: Any, refusal: str = "its node logged the reason") -> Any:
@@ -32,7 +32,7 @@ def call(name: str, service_type: Any, request: Any, refusal: str = "its node lo
         name: Name of the service.
         service_type: Its type.
         request: Its request.
-        refusal: What it means when the service says no and gives no reason.
+        refusal: What it means when the service refuses without a reason.
 
     Returns:
         The answer.
@@ -48,7 +48,7 @@ def call(name: str, service_type: Any, request: Any, refusal: str = "its node lo
 
 
 def ask(name: str, service_type: Any, request: Any) -> Any:
-    """Calls a service whose "no" is an answer like any other.
+    """Calls a service whose refusal is an answer like any other.
 
     Raises:
         RefusedError: It is absent or fails.
@@ -65,7 +65,7 @@ def spawn(request: ObjectRequest) -> None:
     """Spawns an object, or leaves everything as it was.
 
     Raises:
-        RefusedError: A service said no, or the file cannot be read.
+        RefusedError: A service refused, or the file cannot be read.
     """
     if request.sdf_file is None:
         raise RefusedError(f"no SDF file is known for '{request.name}'")
@@ -84,11 +84,11 @@ def spawn(request: ObjectRequest) -> None:
         try:
             call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.ADD_ENTRY, request.name))
         except RefusedError:
-            _take_back("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
+            _undo("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
             raise
     except RefusedError:
-        _take_back("delete_gazebo_mapping", srv.DeleteGazeboMapping,
-                   srv.DeleteGazeboMappingRequest(object_name=request.name))
+        _undo("delete_gazebo_mapping", srv.DeleteGazeboMapping,
+              srv.DeleteGazeboMappingRequest(object_name=request.name))
         raise
 
 
@@ -98,7 +98,7 @@ def delete(request: ObjectRequest) -> None:
     The simulation decides whether the object exists: only objects that were spawned here are in the map of types.
 
     Raises:
-        RefusedError: A service said no.
+        RefusedError: A service refused.
     """
     mapping = srv.GetGazeboTypeRequest(object_name=request.name)
     was_spawned_here = ask("get_object_type", srv.GetGazeboType, mapping).success
@@ -112,7 +112,7 @@ def _acm(action: int, name: str) -> srv.UpdateACMEntryRequest:
     return srv.UpdateACMEntryRequest(action=action, entry_name=name)
 
 
-def _take_back(name: str, service_type: Any, request: Any) -> None:
+def _undo(name: str, service_type: Any, request: Any) -> None:
     try:
         call(name, service_type, request)
     except RefusedError as error:

@@ -57,7 +57,7 @@ class SensorFrames:
         """Nothing is read or advertised before :meth:`connect`."""
         self._path = path
         self._broadcaster: tf2_ros.StaticTransformBroadcaster | None = None
-        self._told: set[str] = set()
+        self._published: set[str] = set()
 
     def connect(self) -> None:
         """Reads the file, publishes the frames and advertises the service."""
@@ -72,8 +72,8 @@ class SensorFrames:
         if frames and self._broadcaster is not None:
             self._broadcaster.sendTransform([transform_message(frame) for frame in frames])
             rospy.loginfo("Sensor frames: %s.", ", ".join(f"{frame.frame} in {frame.parent_frame}" for frame in frames))
-        gone = sorted(self._told - {frame.frame for frame in frames})
-        self._told |= {frame.frame for frame in frames}
+        gone = sorted(self._published - {frame.frame for frame in frames})
+        self._published |= {frame.frame for frame in frames}
         stay = [f"frame '{name}' is not in the file any more; TF keeps it until this node is started again"
                 for name in gone]
         return [*map(str, faults), *stay]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads and writes MoveIt's text scenes, which tell a planner what stands around a real robot.
+"""Reads and writes MoveIt's text scenes, the collision objects around a real robot.
 
 A scene is a name, then objects, then a line with a single dot. Two layouts are in use: the older one begins an object
 with the number of its shapes, the newer one with the pose of the object, and ends it with named subframes.
@@ -27,12 +27,12 @@ class SceneShape:
 
     Attributes:
         kind: box, sphere, cylinder, cone, plane or mesh.
-        size: numbers of the shape as in ``SIZES``; empty for a mesh.
+        size: Numbers of the shape as in ``SIZES``; empty for a mesh.
         position: x, y, z in the frame of the object [m].
-        quaternion_xyzw: orientation in the frame of the object.
-        vertices: corners of a mesh, each x, y, z [m].
-        triangles: each three indices into ``vertices``.
-        color: red, green, blue, alpha in 0..1; all 0 for none.
+        quaternion_xyzw: Orientation in the frame of the object.
+        vertices: Corners of a mesh, each x, y, z [m].
+        triangles: Each three indices into ``vertices``.
+        color: Red, green, blue, alpha in 0..1; all 0 for none.
     """
 
     kind: str
@@ -49,10 +49,10 @@ class SceneObject:
     """One object of a scene.
 
     Attributes:
-        name: id of the object.
+        name: Id of the object.
         position: x, y, z in the planning frame [m].
-        quaternion_xyzw: orientation in the planning frame.
-        shapes: what it is made of.
+        quaternion_xyzw: Orientation in the planning frame.
+        shapes: What it is made of.
         subframes: (name, position, quaternion_xyzw) of named places on the object, in its frame.
     """
 
@@ -87,7 +87,7 @@ class _Lines:
     def peek(self) -> str:
         return self._lines[self._next][1] if self._next < len(self._lines) else ""
 
-    def take(self, expected: str) -> str:
+    def next_line(self, expected: str) -> str:
         if self._next >= len(self._lines):
             raise SceneFileError(f"{self._path}: the file ends where {expected} is expected; a scene ends with '.'")
         self._next += 1
@@ -99,7 +99,7 @@ class _Lines:
 
     def numbers(self, count: int, what: str) -> Vector:
         expected = f"{what} ({count} finite number{'s' if count > 1 else ''})"
-        words = self.take(expected).split()
+        words = self.next_line(expected).split()
         try:
             values = tuple(float(word) for word in words)
         except ValueError as error:
@@ -126,22 +126,22 @@ def read_scene_file(path: Path) -> Scene:
     """Reads a scene file.
 
     Args:
-        path: the file.
+        path: The file.
 
     Returns:
         Its name and its objects.
 
     Raises:
-        SceneFileError: the file cannot be read or is no scene.
+        SceneFileError: The file cannot be read or is no scene.
     """
     try:
         lines = _Lines(path, path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         present = ", ".join(sorted(file.name for file in path.parent.glob("*.scene"))) or "none"
         raise SceneFileError(f"{path}: cannot be read ({error}); scenes in its folder: {present}") from error
-    name = lines.take("the name of the scene")
+    name = lines.next_line("the name of the scene")
     objects: list[SceneObject] = []
-    while (line := lines.take("an object ('* name') or the end ('.')")) != ".":
+    while (line := lines.next_line("an object ('* name') or the end ('.')")) != ".":
         if not line.startswith("* "):
             raise lines.fault("an object ('* name') or the end ('.')")
         body = line[2:].strip()
@@ -164,13 +164,13 @@ def _read_object(name: str, lines: _Lines) -> SceneObject:
     if has_pose:
         places, = lines.counts(1, f"the number of subframes of object '{name}'")
         for _ in range(places):
-            subframes.append((lines.take("the name of a subframe"), lines.numbers(3, "the position of a subframe"),
+            subframes.append((lines.next_line("the name of a subframe"), lines.numbers(3, "the position of a subframe"),
                               lines.quaternion("the orientation of a subframe")))
     return SceneObject(name, position, quaternion, shapes, tuple(subframes))
 
 
 def _read_shape(lines: _Lines) -> SceneShape:
-    kind = lines.take("the kind of a shape")
+    kind = lines.next_line("the kind of a shape")
     vertices: tuple[Vector, ...] = ()
     triangles: tuple[tuple[int, ...], ...] = ()
     size: Vector = ()
@@ -203,14 +203,14 @@ def scene_text(scene: Scene, old_layout: bool = False) -> str:
     """Writes a scene.
 
     Args:
-        scene: what to write.
-        old_layout: without poses of objects, which are put into the poses of the shapes, and without subframes.
+        scene: What to write.
+        old_layout: Without poses of objects, which are put into the poses of the shapes, and without subframes.
 
     Returns:
         The text of a scene file.
 
     Raises:
-        SceneFileError: a name does not fit on a line of its own, or the old layout has no place for a subframe.
+        SceneFileError: A name does not fit on a line of its own, or the old layout has no place for a subframe.
     """
     lines = [_name(scene.name, "scene")]
     for thing in scene.objects:
@@ -237,7 +237,7 @@ def _name(name: str, what: str) -> str:
 
 
 def _shape_lines(shape: SceneShape, thing: SceneObject | None) -> list[str]:
-    """Lines of a shape; its pose is taken along with that of the object, if one is given."""
+    """Lines of a shape; its pose is combined with that of the object, if one is given."""
     position, quaternion = shape.position, shape.quaternion_xyzw
     if thing is not None:
         turned = _rotated(thing.quaternion_xyzw, position)

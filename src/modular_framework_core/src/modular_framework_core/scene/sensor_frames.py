@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from modular_framework_core.files.yaml_entries import Entry, EntryError, take_entries
+from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
 from modular_framework_core.managers.named_poses import NamedPose, frame_name, parse_pose
 from modular_framework_core.rotations import quaternion_from_rpy
 
@@ -101,5 +101,5 @@ def load_sensor_frames(
             raise entry.fault(f"frame '{frame.frame}' is its own origin; name another origin frame")
         frames[frame.frame] = frame
 
-    faults = take_entries(path, take)
+    faults = read_each_entry(path, take)
     return list(frames.values()), faults

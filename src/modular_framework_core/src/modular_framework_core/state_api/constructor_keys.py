@@ -22,12 +22,12 @@ Names = tuple[str, ...] | None
 
 
 def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str, ast.expr]) -> dict[str, Names]:
-    """Return what a constructor declares by itself.
+    """Returns what a constructor declares by itself.
 
     Args:
-        constructor: the constructor.
-        of_smach: whether its base is ``smach.State`` or ``FrameworkState``, whose order of arguments is known.
-        aliases: assignments of the module, name -> value.
+        constructor: The constructor.
+        of_smach: Whether its base is ``smach.State`` or ``FrameworkState``, whose order of arguments is known.
+        aliases: Assignments of the module, name -> value.
 
     Returns:
         By key of ``STATE_KEYS``: the names; None when they cannot be known. A key is left out when the option of that
@@ -50,7 +50,7 @@ def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str,
 
 
 def _given(call: ast.Call, of_smach: bool) -> tuple[dict[str, ast.expr], bool]:
-    """Return the arguments of a call of the base's constructor, and whether it may be given others."""
+    """Returns the arguments of a call of the base's constructor, and whether it may be given others."""
     is_super = isinstance(call.func, ast.Attribute) and isinstance(call.func.value, ast.Call)
     positional = call.args if is_super else call.args[1:]
     given = {str(item.arg): item.value for item in call.keywords if item.arg is not None}
@@ -79,7 +79,7 @@ def _names(value: ast.expr, aliases: Mapping[str, ast.expr]) -> Names:
 
 
 def _changed(constructor: ast.FunctionDef) -> Iterator[str]:
-    """Yield the keys whose option is changed before it is passed on, or to which names are added afterwards."""
+    """Yields the keys whose option is changed before it is passed on, or to which names are added afterwards."""
     for item in ast.walk(constructor):
         match item:
             case ast.Name(id=name, ctx=ast.Store()) if name in STATE_KEYS:

@@ -37,13 +37,13 @@ class FrameworkState(smach.State):
     """A state whose first outcome is the positive one and whose last outcome is the negative one.
 
     Attributes:
-        outcomes: the outcomes in the order they were declared.
-        reason: why the last execution did not succeed; "" after a success or before the first execution.
-        feedback: what the state is doing now, in words, for whoever watches the task; a state may set it while it runs.
+        outcomes: The outcomes in the order they were declared.
+        reason: Why the last execution did not succeed; "" after a success or before the first execution.
+        feedback: What the state is doing now, in words, for whoever watches the task; a state may set it while it runs.
     """
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Hold options to their annotations; make what ``execute`` waits for end when the state is asked to stop."""
+        """Checks options against their annotations; lets a request to stop end the waits in ``execute``."""
         super().__init_subclass__(**options)
         if "__init__" in vars(cls):
             cls.__init__ = checks_options(cls.__init__, without=STATE_KEYS)  # type: ignore[method-assign]
@@ -57,17 +57,17 @@ class FrameworkState(smach.State):
         output_keys: Iterable[str] = (),
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Declare the interface of the state.
+        """Declares the interface of the state.
 
         Args:
-            outcomes: names of the outcomes, at least two; first = positive, last = negative.
-            input_keys: userdata keys that are only read (ordinary Python objects arrive read-only).
-            output_keys: userdata keys that are only written.
-            io_keys: userdata keys that are read and written; commanders and clients, whose methods the state
+            outcomes: Names of the outcomes, at least two; first = positive, last = negative.
+            input_keys: Userdata keys that are only read (ordinary Python objects arrive read-only).
+            output_keys: Userdata keys that are only written.
+            io_keys: Userdata keys that are read and written; commanders and clients, whose methods the state
                 calls, must be declared here.
 
         Raises:
-            ValueError: when fewer than two different outcomes are given.
+            ValueError: When fewer than two different outcomes are given.
         """
         names = [outcomes] if isinstance(outcomes, str) else list(outcomes)
         if len(names) < 2 or len(set(names)) != len(names):
@@ -84,17 +84,17 @@ class FrameworkState(smach.State):
         self._preempt_event = threading.Event()
 
     def succeed(self) -> str:
-        """Return the positive outcome."""
+        """Returns the positive outcome."""
         self.reason = ""
         return self.outcomes[0]
 
     def fail(self, reason: str) -> str:
-        """Record and log why the state did not reach its aim, and return the negative outcome.
+        """Records and logs why the state failed, and returns the negative outcome.
 
         A state that has been asked to stop counts as stopped: whatever it waited for was given up for that.
 
         Args:
-            reason: one sentence: what was attempted, what was got, and what was expected.
+            reason: One sentence: what was attempted, what was got, and what was expected.
         """
         if self.stop_requested():
             return self.stopped()
@@ -103,11 +103,11 @@ class FrameworkState(smach.State):
         return self.outcomes[-1]
 
     def end(self, outcome: str, reason: str) -> str:
-        """Return an outcome that is neither plain success nor plain failure; the last outcome counts as a failure.
+        """Returns an outcome that is neither plain success nor plain failure; the last outcome counts as a failure.
 
         Args:
-            outcome: one of the state's outcomes.
-            reason: why this one.
+            outcome: One of the state's outcomes.
+            reason: Why this one.
         """
         if outcome == self.outcomes[-1]:
             return self.fail(reason)
@@ -116,25 +116,25 @@ class FrameworkState(smach.State):
         return outcome
 
     def stop_requested(self) -> bool:
-        """Return whether this state, or the whole task, has been asked to stop."""
+        """Returns whether this state, or the whole task, has been asked to stop."""
         return bool(self.preempt_requested()) or smach.is_shutdown()
 
     def stopped(self) -> str:
-        """Acknowledge a request to stop; return ``preempted`` where declared, the negative outcome otherwise."""
+        """Acknowledges a request to stop; returns ``preempted`` where declared, the negative outcome otherwise."""
         self.service_preempt()
         self.reason = "stopped on request"
         return "preempted" if "preempted" in self.outcomes else self.outcomes[-1]
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float | None, period_s: float = 0.02) -> bool:
-        """Wait for a condition, for a request to stop, or for the timeout, whichever comes first.
+        """Waits for a condition, for a request to stop, or for the timeout, whichever comes first.
 
         Args:
-            condition: asked every ``period_s`` seconds.
-            timeout_s: longest wait [s, wall time]; None = no limit (a request to stop still ends it).
-            period_s: time between two questions [s].
+            condition: Evaluated every ``period_s`` seconds.
+            timeout_s: Longest wait [s, wall time]; None = no limit (a request to stop still ends it).
+            period_s: Time between two evaluations [s].
 
         Returns:
-            True when the condition held. When False, ``stop_requested()`` tells a stop from a timeout.
+            True when the condition held. When False, ``stop_requested()`` distinguishes a stop from a timeout.
         """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self.stop_requested():
@@ -146,17 +146,17 @@ class FrameworkState(smach.State):
         return False
 
     def request_preempt(self) -> None:
-        """Ask the state to stop. States that drive hardware extend this to cancel their motion at once."""
+        """Asks the state to stop. States that drive hardware extend this to cancel their motion at once."""
         super().request_preempt()
         self._preempt_event.set()
 
     def recall_preempt(self) -> None:
-        """Take the request to stop back."""
+        """Withdraws the request to stop."""
         super().recall_preempt()
         self._preempt_event.clear()
 
     def service_preempt(self) -> None:
-        """Mark the request to stop as dealt with."""
+        """Marks the request to stop as handled."""
         super().service_preempt()
         self._preempt_event.clear()
 

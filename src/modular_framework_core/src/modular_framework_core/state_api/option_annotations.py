@@ -28,23 +28,23 @@ _MAPPINGS = ("dict", "Dict", "Mapping")
 
 
 def from_annotation(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> OptionType:
-    """Return the type an annotation stands for.
+    """Returns the type an annotation stands for.
 
     Args:
-        annotation: the annotation of an argument, or None.
-        aliases: assignments of the module, name -> value, for types that have a name of their own.
+        annotation: The annotation of an argument, or None.
+        aliases: Assignments of the module, name -> value, for types that have a name of their own.
     """
     return _Reader(aliases).read(annotation)
 
 
 def from_hint(hint: Any) -> OptionType:
-    """Return the type an annotation stands for that Python has evaluated: read from how Python writes it."""
+    """Returns the type an annotation stands for that Python has evaluated: read from how Python writes it."""
     text = hint.__name__ if inspect.isclass(hint) and not hasattr(hint, "__origin__") else repr(hint)
     return _Reader({}).read(ast.Constant(text))
 
 
 def uses_in(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> tuple[Use, ...]:
-    """Return what an annotation says about the use of an option; arguments as ``from_annotation``."""
+    """Returns what an annotation says about the use of an option; arguments as ``from_annotation``."""
     return tuple(dict.fromkeys(_uses(annotation, aliases, frozenset())))
 
 
@@ -55,9 +55,9 @@ def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], seen: froze
         case ast.BinOp(left=left, right=right):
             yield from _uses(left, aliases, seen)
             yield from _uses(right, aliases, seen)
-        case ast.Subscript(value=ast.Name(id="Annotated"), slice=ast.Tuple(elts=[inner, *said])):
+        case ast.Subscript(value=ast.Name(id="Annotated"), slice=ast.Tuple(elts=[inner, *limit])):
             yield from _uses(inner, aliases, seen)
-            for item in said:
+            for item in limit:
                 yield from _uses(item, aliases, seen)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords) if name in KINDS:
             try:
@@ -68,7 +68,7 @@ def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], seen: froze
 
 
 def _value(node: ast.expr, aliases: MappingABC[str, ast.expr]) -> Any:
-    """Return a plain value that is written out, or has a name in the module."""
+    """Returns a plain value that is written out, or has a name in the module."""
     return ast.literal_eval(aliases.get(node.id, node) if isinstance(node, ast.Name) else node)
 
 
@@ -117,7 +117,7 @@ class _Reader:
             values = [item.value for item in inner if isinstance(item, ast.Constant)]
             return Choice(tuple(values)) if len(values) == len(inner) else Anything()
         if name == "Annotated":
-            return functools.reduce(_limited, map(self._said, inner[1:]), self.read(inner[0]))
+            return functools.reduce(_limited, map(self._limit_in, inner[1:]), self.read(inner[0]))
         if name == "Optional":
             return self._any_of([*inner, ast.Constant(value=None)])
         if name == "Union":
@@ -143,8 +143,8 @@ class _Reader:
             found = [Choice(tuple(dict.fromkeys(choices))), *others]
         return found[0] if len(found) == 1 else AnyOf(tuple(found))
 
-    def _said(self, node: ast.expr) -> Limits | Length | None:
-        """Return what ``Limits(...)`` or ``Length(...)`` says; None where it is something else, or no plain numbers."""
+    def _limit_in(self, node: ast.expr) -> Limits | Length | None:
+        """Returns the value of ``Limits(...)`` or ``Length(...)``; None for something else or no plain numbers."""
         match node:
             case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=arguments, keywords=keywords):
                 kinds: dict[str, type[Limits | Length]] = {"Limits": Limits, "Length": Length}
@@ -159,12 +159,12 @@ class _Reader:
         return _value(node, self._aliases)
 
 
-def _limited(kind: OptionType, said: Limits | Length | None) -> OptionType:
-    match kind, said:
+def _limited(kind: OptionType, limit: Limits | Length | None) -> OptionType:
+    match kind, limit:
         case AnyOf(types=types), _:
-            return AnyOf(tuple(_limited(item, said) for item in types))
+            return AnyOf(tuple(_limited(item, limit) for item in types))
         case Plain(kind="float" | "int", limits=limits), Limits():
-            return replace(kind, limits=Limits(**({} if limits is None else limits.bounds()) | said.bounds()))
+            return replace(kind, limits=Limits(**({} if limits is None else limits.bounds()) | limit.bounds()))
         case ListOf(), Length():
-            return replace(kind, length=said)
+            return replace(kind, length=limit)
     return kind

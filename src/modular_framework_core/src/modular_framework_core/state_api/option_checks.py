@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Holds a state to the annotations of its options where it is made: the rules a task is checked by, for every maker."""
+"""Checks the options of a state against their annotations where it is made, by the rules that tasks are checked by."""
 from __future__ import annotations
 
 import functools
@@ -11,12 +11,12 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from modular_framework_core.files.faults import Place
+from modular_framework_core.files.faults import SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
 from modular_framework_core.state_api.option_annotations import from_hint
 from modular_framework_core.state_api.option_types import Anything, OptionType, complaint
 
-_HERE = Place("", 0, 0)
+_HERE = SourceLocation("", 0, 0)
 
 
 class _NoTaskValueError(Exception):
@@ -24,21 +24,21 @@ class _NoTaskValueError(Exception):
 
 
 def checks_options(constructor: Callable[..., None], without: Iterable[str] = ()) -> Callable[..., None]:
-    """Return a constructor that refuses options their annotations do not allow.
+    """Returns a constructor that refuses options their annotations do not allow.
 
-    Judged are values that a task could hold: text, numbers, truth values, None, lists and mappings of these. Defaults
-    are not judged, be they handed on or not, nor are annotations that cannot be evaluated.
+    Only values that a task could hold are checked: text, numbers, bools, None, lists and mappings of these. Defaults
+    are not checked, nor are options whose annotations cannot be evaluated.
 
     Args:
         constructor: ``__init__`` of a class.
-        without: options to leave alone.
+        without: Options that are not checked.
 
     Raises:
-        ValueError: by the constructor returned: options do not fit; tells all of them.
+        ValueError: By the constructor returned: options do not fit; names all of them.
     """
     signature = inspect.signature(constructor)
     variable = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    left_alone = {*without, *(item.name for item in signature.parameters.values() if item.kind in variable)}
+    unchecked = {*without, *(item.name for item in signature.parameters.values() if item.kind in variable)}
     declared: dict[str, OptionType] = {}
 
     @functools.wraps(constructor)
@@ -48,9 +48,9 @@ def checks_options(constructor: Callable[..., None], without: Iterable[str] = ()
         try:
             given = signature.bind(state, *arguments, **options).arguments
         except TypeError:
-            given = {}  # the constructor itself says it best
+            given = {}  # the constructor's own error is clearer
         judged = {name: value for name, value in given.items()
-                  if name not in left_alone and value is not signature.parameters[name].default}
+                  if name not in unchecked and value is not signature.parameters[name].default}
         wrong = [f"option '{name}' {found}" for name, value in judged.items()
                  if (found := _complaint(declared.get(name, Anything()), value))]
         if wrong:
@@ -61,16 +61,16 @@ def checks_options(constructor: Callable[..., None], without: Iterable[str] = ()
 
 
 def declared_types(constructor: Callable[..., None]) -> dict[str, OptionType]:
-    """Return the types of a constructor's options, by name, as its annotations say once Python has evaluated them."""
+    """Returns the types of a constructor's options, by name, as its annotations say once Python has evaluated them."""
     written = inspect.unwrap(constructor)
     hints = getattr(written, "__annotations__", {})
     return {name: from_hint(_evaluated(hint, getattr(written, "__globals__", {}))) for name, hint in hints.items()}
 
 
 def _evaluated(hint: Any, names: dict[str, Any]) -> Any:
-    holder = SimpleNamespace(__annotations__={"hint": hint})
+    annotated = SimpleNamespace(__annotations__={"hint": hint})
     try:
-        return get_type_hints(holder, names, include_extras=True)["hint"]
+        return get_type_hints(annotated, names, include_extras=True)["hint"]
     except Exception:  # whatever an annotation does that refers to what is not there
         return Any
 
@@ -86,7 +86,7 @@ def _complaint(allowed: OptionType, value: Any) -> str:
 
 
 def _node(value: Any) -> Node:
-    """Return a value as the tree a task file with it is read into."""
+    """Returns a value as the tree a task file with it is read into."""
     match value:
         case None | bool() | str() | int() | float():
             return Scalar(value, _HERE)

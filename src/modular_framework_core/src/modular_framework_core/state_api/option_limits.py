@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which numbers and how many items an option of a state takes, said once: in the annotation of its constructor.
+"""Which numbers and how many items an option of a state takes, declared once: in the annotation of its constructor.
 
-``--check`` reads it from the source before a task runs, ``--explain`` and ``--schema`` tell it, and ``FrameworkState``
+``--check`` reads it from the source before a task runs, ``--explain`` and ``--schema`` show it, and ``FrameworkState``
 holds to it where the state is made::
 
     def __init__(self, offset: Vector, speed: Share = 1.0, steps: Annotated[int, Limits(at_least=1)] = 3): ...
@@ -32,10 +32,10 @@ class Limits:
     everything; ``Limits(above=0.0, at_most=1.0)`` does not. NaN is never among them.
 
     Attributes:
-        above: lower bound, itself not allowed.
-        at_least: lower bound, itself allowed.
-        below: upper bound, itself not allowed.
-        at_most: upper bound, itself allowed.
+        above: Lower bound, itself not allowed.
+        at_least: Lower bound, itself allowed.
+        below: Upper bound, itself not allowed.
+        at_most: Upper bound, itself allowed.
     """
 
     above: float | None = None
@@ -44,17 +44,17 @@ class Limits:
     at_most: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a bound that is no number."""
+        """Refuses a bound that is no number."""
         for name, bound in self.bounds().items():
             if isinstance(bound, bool) or not isinstance(bound, int | float):
                 raise TypeError(f"Limits: {name} is {bound!r}; write a number")
 
     def bounds(self) -> dict[str, float]:
-        """Return the bounds that are set, by name."""
+        """Returns the bounds that are set, by name."""
         return {name: bound for name in _BOUNDS if (bound := getattr(self, name)) is not None}
 
     def remedy(self, number: float) -> str:
-        """Say what to do about a number that is not allowed; nothing when it is."""
+        """Says what to do about a number that is not allowed; nothing when it is."""
         bounded_infinity = self.bounds() and abs(number) == math.inf
         if not bounded_infinity and not abs(number) <= sys.float_info.max:
             return "write a finite number"
@@ -62,14 +62,14 @@ class Limits:
         return next((_BOUNDS[name][2].format(self.bounds()[name]) for name in broken), "")
 
     def describe(self, what: str) -> str:
-        """Say which numbers are allowed; ``what`` is "a number" or "a whole number"."""
+        """Says which numbers are allowed; ``what`` is "a number" or "a whole number"."""
         parts = [f"{name.replace('_', ' ')} {bound:g}" for name, bound in self.bounds().items()]
         if not parts:
             return what.replace("a ", "a finite ", 1)
         return f"{what} {'of ' if parts[0].startswith('at') else ''}{' and '.join(parts)}"
 
     def schema(self) -> dict[str, float]:
-        """Return the words of JSON Schema that say the same."""
+        """Returns the words of JSON Schema that say the same."""
         return {_BOUNDS[name][1]: bound for name, bound in self.bounds().items()}
 
 
@@ -80,7 +80,7 @@ class Length:
     items: int
 
     def __post_init__(self) -> None:
-        """Refuse a length that is no whole number."""
+        """Refuses a length that is no whole number."""
         if isinstance(self.items, bool) or not isinstance(self.items, int):
             raise TypeError(f"Length: items is {self.items!r}; write a whole number")
 

@@ -15,27 +15,27 @@ class Anything:
     """Every value: the source does not say more."""
 
     def describe(self) -> str:
-        """Say what is allowed."""
+        """Says what is allowed."""
         return "any value"
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
-        """Return the innermost value that does not fit, with what was allowed there; None when all fits."""
+        """Returns the innermost value that does not fit, with what was allowed there; None when all fits."""
         return None
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON Schema of the values."""
+        """Returns the JSON Schema of the values."""
         return {}
 
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """Text, number, whole number, truth value or nothing; numbers may have limits."""
+    """Text, number, integer, bool or nothing; numbers may have limits."""
 
     kind: str
     limits: Limits | None = None
 
     def describe(self) -> str:
-        """Say what is allowed."""
+        """Says what is allowed."""
         what = PLAIN[self.kind][0]
         return what if self.limits is None else self.limits.describe(what)
 
@@ -48,7 +48,7 @@ class Plain:
         return None if fits and not self.remedy(value) else (node, self)
 
     def remedy(self, value: Any) -> str:
-        """Say what to do about a number beyond the limits; nothing about other values."""
+        """Says what to do about a number beyond the limits; nothing about other values."""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         return self.limits.remedy(value) if self.limits is not None and is_number else ""
 
@@ -73,7 +73,7 @@ class Choice:
     values: tuple[Any, ...]
 
     def describe(self) -> str:
-        """Say what is allowed."""
+        """Says what is allowed."""
         return "one of " + ", ".join(repr(value) for value in self.values)
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
@@ -95,7 +95,7 @@ class ListOf:
     length: Length | None = None
 
     def describe(self) -> str:
-        """Say what is allowed."""
+        """Says what is allowed."""
         what = "a list" if self.length is None else f"a list of {self.length.items} items"
         return what if isinstance(self.item, Anything) else f"{what}, each item {self.item.describe()}"
 
@@ -118,7 +118,7 @@ class MappingOf:
     value: OptionType
 
     def describe(self) -> str:
-        """Say what is allowed."""
+        """Says what is allowed."""
         return "a mapping" if isinstance(self.value, Anything) else f"a mapping to {self.value.describe()}"
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
@@ -140,7 +140,7 @@ class AnyOf:
     types: tuple[OptionType, ...]
 
     def describe(self) -> str:
-        """Say what is allowed."""
+        """Says what is allowed."""
         joint = ", or " if any(isinstance(item, ListOf | MappingOf) for item in self.types) else " or "
         return joint.join(item.describe() for item in self.types)
 
@@ -161,16 +161,16 @@ OptionType = Union[Anything, Plain, Choice, ListOf, MappingOf, AnyOf]  # noqa: U
 
 
 def or_reference(schema: dict[str, Any]) -> dict[str, Any]:
-    """Return a JSON Schema that also takes a reference ``params.<key>``, which may stand wherever a value may."""
+    """Returns a JSON Schema that also takes a reference ``params.<key>``, which may stand wherever a value may."""
     return {"anyOf": [schema, {"type": "string", "pattern": r"^params\."}]} if schema else {}
 
 
 def complaint(allowed: OptionType, node: Node) -> tuple[Node, str] | None:
-    """Say what is wrong with a value.
+    """Says what is wrong with a value.
 
     Args:
-        allowed: what is allowed.
-        node: the value.
+        allowed: What is allowed.
+        node: The value.
 
     Returns:
         The innermost value that does not fit, and ``must be ..., found ...`` with what to do where that is clear; None

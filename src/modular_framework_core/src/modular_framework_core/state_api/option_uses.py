@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What an option of a state stands for beyond its value: a name that must exist, or userdata the state needs.
 
-It is said once, in the annotation of the state's constructor; ``--check`` reads it from the source::
+It is declared once, in the annotation of the state's constructor; ``--check`` reads it from the source::
 
     def __init__(self, pose_name: Annotated[str, Named("pose")], request: Annotated[Mapping[str, Any], Fields()]): ...
 """
@@ -26,10 +26,10 @@ class Named:
     """The option is a name, or a list of names; an empty one stands for none.
 
     Attributes:
-        kind: what it names: joint_state, trajectory, pose, plan or grasp, a state of the manipulator's group
+        kind: What it names: joint_state, trajectory, pose, plan or grasp, a state of the manipulator's group
             (posture), or a planning group (group); ``option:<name>`` for the kind that another option says.
-        made: whether the state itself stores something under the name.
-        userdata: whether the name ``userdata`` takes what userdata has under ``selected_<kind>``, an input key then.
+        made: Whether the state itself stores something under the name.
+        userdata: Whether the name ``userdata`` takes what userdata has under ``selected_<kind>``, an input key then.
     """
 
     kind: str
@@ -43,8 +43,8 @@ class Key:
 
     Attributes:
         direction: "input" or "output".
-        name: the key; ``{}`` in it stands for the kind of message that the option says; empty: the option is the key.
-        when: value of the option for which the key is needed; empty for any that is not empty.
+        name: The key; ``{}`` in it stands for the kind of message that the option says; empty: the option is the key.
+        when: Value of the option for which the key is needed; empty for any that is not empty.
     """
 
     direction: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells what a state does and takes, out of its signature and docstring, and what a machine with a template takes."""
+"""Explains what a state does and takes, from its signature and docstring, and what a machine with a template takes."""
 from __future__ import annotations
 
 import inspect
@@ -18,7 +18,7 @@ _ENTRY = re.compile(r"^(\w+)(?: \([^)]*\))?:\s*(.*)$")
 
 
 def explain(source: StateSource) -> str:
-    """Return a page about a state: what it does, its options with types and defaults, its outcomes and userdata."""
+    """Returns a page about a state: what it does, its options with types and defaults, its outcomes and userdata."""
     doc = inspect.cleandoc(source.doc)
     section = _SECTION.search(doc)
     summary = (doc[:section.start()] if section else doc).strip() or "(its class has no docstring)"
@@ -35,7 +35,7 @@ def explain(source: StateSource) -> str:
 
 
 def explain_template(template: TemplateSource) -> str:
-    """Return a page about a template: what its machines do, the keys of their header, the userdata they provide."""
+    """Returns a page about a template: what its machines do, the keys of their header, the userdata they provide."""
     lines = [f"{template.name}: template, {template.file}", "", template.doc or "(its class has no docstring)", "",
              "Keys of the task, or of a nested machine:"]
     for key in machine_keys(template):
@@ -46,7 +46,7 @@ def explain_template(template: TemplateSource) -> str:
 
 
 def option_meanings(doc: str) -> dict[str, str]:
-    """Return what the section ``Args`` of a docstring says about each option, on one line each."""
+    """Returns the text of the section ``Args`` of a docstring about each option, on one line each."""
     parts = _SECTION.split(inspect.cleandoc(doc))
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
     meanings: dict[str, str] = {}

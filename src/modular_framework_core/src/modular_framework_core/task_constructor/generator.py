@@ -50,10 +50,10 @@ class GenerationError(Exception):
 
 
 def literal(value: Any) -> str:
-    """Write a value as a Python literal. The one way values get into generated code.
+    """Writes a value as a Python literal. The one way values get into generated code.
 
     Raises:
-        GenerationError: the value is no text, number, truth value, None, list, tuple or dict of these.
+        GenerationError: The value is no text, number, bool, None, list, tuple or dict of these.
     """
     if isinstance(value, jinja2.Undefined):
         str(value)  # raises jinja2.UndefinedError, which names what the template asked for
@@ -69,12 +69,12 @@ def literal(value: Any) -> str:
 
 
 def default_output_directory() -> Path:
-    """Return where generated modules go: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework/state_machines``."""
+    """Returns where generated modules go: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework/state_machines``."""
     return default_folders.framework_home() / "state_machines"
 
 
 def digest_line(task: TaskSpec, templates: Iterable[Path]) -> str:
-    """Return one line that changes whenever the module of a task would: with its script, a template or a state."""
+    """Returns one line that changes whenever the module of a task would: with its script, a template or a state."""
     files = [Path(task.script), *sorted({state.source.file for state in task.root.leaf_states()}), Path(__file__)]
     files += sorted(file for folder in templates for file in folder.iterdir() if file.is_file())
     digest = hashlib.sha256()
@@ -84,7 +84,7 @@ def digest_line(task: TaskSpec, templates: Iterable[Path]) -> str:
 
 
 def is_up_to_date(module: Path, digest: str) -> bool:
-    """Return whether a generated module is there and was made from files with this digest."""
+    """Returns whether a generated module is there and was made from files with this digest."""
     try:
         with module.open(encoding="utf-8") as stream:
             return f"# {digest}\n" in [next(stream, "") for _ in range(3)]
@@ -93,15 +93,15 @@ def is_up_to_date(module: Path, digest: str) -> bool:
 
 
 def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept") -> str:
-    """Return the source of the module of a task.
+    """Returns the source of the module of a task.
 
     Args:
-        task: the checked task.
-        templates: directories templates may include other files from, in order.
-        digest: what ``digest_line`` gave, for the header.
+        task: The checked task.
+        templates: Directories templates may include other files from, in order.
+        digest: What ``digest_line`` gave, for the header.
 
     Raises:
-        GenerationError: a template cannot be filled, or the result does not compile.
+        GenerationError: A template cannot be filled, or the result does not compile.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([str(directory) for directory in templates]),
@@ -127,12 +127,12 @@ def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept"
 
 
 def module_path(task: TaskSpec, directory: Path) -> Path:
-    """Return where the module of a task belongs in a directory."""
+    """Returns where the module of a task belongs in a directory."""
     return directory / f"{task.name}.py"
 
 
 def write(task: TaskSpec, text: str, directory: Path) -> Path:
-    """Write a generated module to ``<directory>/<task name>.py``, executable, in one step.
+    """Writes a generated module to ``<directory>/<task name>.py``, executable, in one step.
 
     Returns:
         The path of the file.
@@ -183,7 +183,7 @@ def _import_line(source: StateSource) -> str:
 
 
 def _module_name(source: StateSource) -> str:
-    """Return the dotted name a state file can be imported by; "" when it is in no package on the Python path."""
+    """Returns the dotted name a state file can be imported by; "" when it is in no package on the Python path."""
     parts = [source.file.stem]
     folder = source.file.parent
     while (folder / "__init__.py").is_file():

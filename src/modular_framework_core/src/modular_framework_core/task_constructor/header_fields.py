@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 
-from modular_framework_core.files.faults import FaultList, Place
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -13,48 +13,48 @@ _NODE_NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 
 
 def text(node: Node, what: str, faults: FaultList) -> str | None:
-    """Return a text that is not empty."""
+    """Returns a text that is not empty."""
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value:
         return node.value
-    faults.add(node.place, f"{what} must be a text, found {kind_of(node)}")
+    faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
     return None
 
 
 def identifier(node: Node, what: str, faults: FaultList) -> str | None:
-    """Return a text that can be the name of a Python module and class."""
+    """Returns a text that can be the name of a Python module and class."""
     name = text(node, what, faults)
     if name is None:
         return None
     if name.isidentifier() and name.isascii() and not keyword.iskeyword(name):
         return name
-    faults.add(node.place, f"{what} '{name}' must be letters, digits and underscores, and start with a letter")
+    faults.add(node.location, f"{what} '{name}' must be letters, digits and underscores, and start with a letter")
     return None
 
 
 def node_name(node: Node, faults: FaultList) -> str | None:
-    """Return a text that can be the name of a ROS node."""
+    """Returns a text that can be the name of a ROS node."""
     name = text(node, "node_name", faults)
     if name is None or _NODE_NAME.fullmatch(name):
         return name
-    faults.add(node.place, f"node_name '{name}' must be letters, digits and underscores, and start with a letter")
+    faults.add(node.location, f"node_name '{name}' must be letters, digits and underscores, and start with a letter")
     return None
 
 
-def label(name: str, place: Place, faults: FaultList) -> None:
-    """Check the label of a state."""
+def label(name: str, location: SourceLocation, faults: FaultList) -> None:
+    """Checks the label of a state."""
     if not _LABEL.fullmatch(name):
-        faults.add(place, f"the label '{name}' must be letters, digits, _ and -, and start with a letter")
+        faults.add(location, f"the label '{name}' must be letters, digits, _ and -, and start with a letter")
 
 
 def names(
     node: Node, what: str, faults: FaultList, *, may_be_empty: bool = False, example: str = "[success, fail]"
 ) -> tuple[str, ...] | None:
-    """Return a list of different names."""
+    """Returns a list of different names."""
     if not isinstance(node, Sequence):
-        faults.add(node.place, f"{what} must be a list such as {example}, found {kind_of(node)}")
+        faults.add(node.location, f"{what} must be a list such as {example}, found {kind_of(node)}")
         return None
     if not node.items and not may_be_empty:
-        faults.add(node.place, f"{what} is an empty list; it needs at least one name")
+        faults.add(node.location, f"{what} is an empty list; it needs at least one name")
         return None
     found: list[str] = []
     for item in node.items:
@@ -62,7 +62,7 @@ def names(
         if name is None:
             return None
         if name in found:
-            faults.add(item.place, f"{what} has '{name}' twice")
+            faults.add(item.location, f"{what} has '{name}' twice")
             return None
         found.append(name)
     return tuple(found)
@@ -71,14 +71,14 @@ def names(
 def name_map(
     node: Node, what: str, faults: FaultList, *, example: str = "{success: NextState}"
 ) -> dict[str, Scalar] | None:
-    """Return a mapping from name to name, with the place of each value."""
+    """Returns a mapping from name to name, with the location of each value."""
     if not isinstance(node, Mapping):
-        faults.add(node.place, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
+        faults.add(node.location, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
         return None
     result: dict[str, Scalar] = {}
     for key, value in node.entries.items():
         if isinstance(value, Scalar) and isinstance(value.value, str) and value.value:
             result[key] = value
         else:
-            faults.add(value.place, f"{what}: the value of '{key}' must be a name, found {kind_of(value)}")
+            faults.add(value.location, f"{what}: the value of '{key}' must be a name, found {kind_of(value)}")
     return result if len(result) == len(node.entries) else None

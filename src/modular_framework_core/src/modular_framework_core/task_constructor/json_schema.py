@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Describes the language of tasks as a JSON Schema, so that editors complete and check task scripts while typing."""
+"""Describes the language of tasks as a JSON Schema, so that editors complete and checks task scripts while typing."""
 from __future__ import annotations
 
 from typing import Any
@@ -15,7 +15,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[str, Any]:
-    """Return the JSON Schema (draft 7) of tasks that use these states and templates.
+    """Returns the JSON Schema (draft 7) of tasks that use these states and templates.
 
     States whose file cannot be read as a state are left out. What a schema cannot say (that a transition leads to a
     label that exists, for example) is left to ``state_machine_generator --check``.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Notes keys that are unknown, and lets a misspelt one stand for the one that was meant.
+"""Notes unknown keys, and reads a misspelt one as the key that was meant.
 
-One slip is one fault: once ``sorce`` is noted where it stands, its value is read as that of ``source``, so that nobody
-is sent after a missing key, and all else that is wrong is found too.
+One mistake is one fault: once ``sorce`` is noted, its value is read as that of ``source``, so that no missing key is
+reported as well, and all other faults are found too.
 """
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ SIMILAR = 0.75
 
 
 def meant_key(found: str, missing: Iterable[str]) -> str | None:
-    """Return which of the keys that are not given a misspelt key stands for; None when it is like none of them."""
+    """Returns which of the keys that are not given a misspelt key stands for; None when it is like none of them."""
     matches = difflib.get_close_matches(found, list(missing), n=1, cutoff=SIMILAR)
     return matches[0] if matches else None
 
 
 def value_of(node: Mapping, key: str) -> Node | None:
-    """Return the value of a key, or, where that is not given, of the key that is spelt nearly like it."""
+    """Returns the value of a key, or, where that is not given, of the key that is spelt nearly like it."""
     if key in node.entries:
         return node.entries[key]
     return next((value for found, value in node.entries.items() if meant_key(found, [key])), None)
 
 
 def spelt_as_meant(node: Mapping, known: Collection[str], what: str, faults: FaultList) -> Mapping:
-    """Return a mapping that has known keys only.
+    """Returns a mapping that has known keys only.
 
     Args:
-        node: the mapping as written.
-        known: the keys it may have.
-        what: what its keys are, for messages.
-        faults: where each unknown key is noted.
+        node: The mapping as written.
+        known: The keys it may have.
+        what: What its keys are, for messages.
+        faults: Where each unknown key is noted.
 
     Returns:
         The mapping; a key that is spelt nearly like one that is not given has become that one, others that are unknown
@@ -52,4 +52,4 @@ def spelt_as_meant(node: Mapping, known: Collection[str], what: str, faults: Fau
         if meant is not None:
             entries[meant], keys[meant] = value, node.keys[key]
             faults.harmless += 1
-    return Mapping(entries, keys, node.place)
+    return Mapping(entries, keys, node.location)

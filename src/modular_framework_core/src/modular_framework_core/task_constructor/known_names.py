@@ -23,9 +23,9 @@ class KnownNames:
     """Names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group.
 
     Attributes:
-        names: kind -> the names there are; a kind that is left out is not known, and any name of it may be right.
-        origins: kind -> where its names come from, for messages.
-        manipulator_group: planning group whose named states are the postures; "" when it is not known.
+        names: Kind -> the names there are; a kind that is left out is not known, and any name of it may be right.
+        origins: Kind -> where its names come from, for messages.
+        manipulator_group: Planning group whose named states are the postures; "" when it is not known.
     """
 
     names: Mapping[str, frozenset[str]] = field(default_factory=dict)
@@ -33,20 +33,20 @@ class KnownNames:
     manipulator_group: str = ""
 
     def with_names(self, more: Mapping[str, frozenset[str]]) -> KnownNames:
-        """Return these names with more of them; kinds that are not known stay so."""
+        """Returns these names with more of them; kinds that are not known stay so."""
         merged = {kind: names | more.get(kind, frozenset()) for kind, names in self.names.items()}
         return KnownNames(merged | {"plan": merged.get("plan", frozenset()) | more.get("plan", frozenset())},
                           self.origins, self.manipulator_group)
 
     def with_robot(self, srdf: str, origin: str) -> KnownNames:
-        """Return these names with the planning groups and postures of a robot.
+        """Returns these names with the planning groups and postures of a robot.
 
         Args:
-            srdf: text of the robot's SRDF.
-            origin: where it comes from, for messages.
+            srdf: Text of the robot's SRDF.
+            origin: Where it comes from, for messages.
 
         Raises:
-            ValueError: the text cannot be read as SRDF.
+            ValueError: The text cannot be read as SRDF.
         """
         robot = read_srdf(srdf, origin)
         groups = frozenset(robot.groups)
@@ -58,10 +58,10 @@ class KnownNames:
 
 
 def names_of_config(folder: Path) -> KnownNames:
-    """Return the names in the YAML files of a configuration folder; a file that is not there leaves its kind unknown.
+    """Returns the names in the YAML files of a configuration folder; a file that is not there leaves its kind unknown.
 
     Raises:
-        ValueError: the folder is not there, or a file cannot be read; names it.
+        ValueError: The folder is not there, or a file cannot be read; names it.
     """
     if not folder.is_dir():
         raise ValueError(f"configuration folder {folder} is not a directory; name the one with named_joint_states.yaml")
@@ -81,14 +81,14 @@ def names_of_config(folder: Path) -> KnownNames:
 
 
 def names_of_installation(config: Path | None, moveit_package: str = "") -> KnownNames:
-    """Return the names of a configuration folder and of a MoveIt configuration package's robot.
+    """Returns the names of a configuration folder and of a MoveIt configuration package's robot.
 
     Args:
-        config: the folder; None for that of the API package, where that is installed.
-        moveit_package: name of the package; "" for that of the API package's launch file.
+        config: The folder; None for that of the API package, where that is installed.
+        moveit_package: Name of the package; "" for that of the API package's launch file.
 
     Raises:
-        ValueError: a file cannot be read, or what was named is not there.
+        ValueError: A file cannot be read, or what was named is not there.
     """
     folder = config or default_folders.config_folder()
     names = KnownNames() if folder is None else names_of_config(folder)
@@ -100,7 +100,7 @@ def names_of_installation(config: Path | None, moveit_package: str = "") -> Know
 
 
 def _mapping_in(file: Path) -> dict[Any, Any] | None:
-    """Return the mapping in a YAML file; None when the file is not there."""
+    """Returns the mapping in a YAML file; None when the file is not there."""
     try:
         content = shallow_yaml.load(read_whole(file))
     except FileNotFoundError:

@@ -18,12 +18,12 @@ class LoadingError(Exception):
 
 
 def load_module(file: str | Path) -> ModuleType:
-    """Import a Python file by its path, once: a second call returns the same module.
+    """Imports a Python file by its path, once: a second call returns the same module.
 
     No bytecode is kept: generated files are written again and again, and a cache decides by size and second.
 
     Raises:
-        LoadingError: the file is not there, or raises while it is imported.
+        LoadingError: The file is not there, or raises while it is imported.
     """
     path = Path(file).resolve()
     name = f"modular_framework_loaded_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
@@ -43,7 +43,7 @@ def load_module(file: str | Path) -> ModuleType:
 
 
 def load_state_class(file: str, class_name: str) -> Any:
-    """Return a state class out of a file."""
+    """Returns a state class out of a file."""
     module = load_module(file)
     if not hasattr(module, class_name):
         raise LoadingError(f"{file} does not define the class {class_name}")
@@ -51,12 +51,12 @@ def load_state_class(file: str, class_name: str) -> Any:
 
 
 def machine_factory(module: ModuleType) -> Callable[[], smach.Container]:
-    """Return the function that makes the state machine a module is about.
+    """Returns the function that makes the state machine a module is about.
 
     That is ``create_state_machine``; in a module without it, the last container class the module defines.
 
     Raises:
-        LoadingError: the module has neither.
+        LoadingError: The module has neither.
     """
     factory = getattr(module, "create_state_machine", None)
     if callable(factory):

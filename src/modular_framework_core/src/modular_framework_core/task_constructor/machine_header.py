@@ -2,7 +2,7 @@
 """Reads the fields of a machine's header; notes what is wrong with them."""
 from __future__ import annotations
 
-from modular_framework_core.files.faults import FaultList, Place, listing
+from modular_framework_core.files.faults import FaultList, SourceLocation, listing
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks
 from modular_framework_core.task_constructor.key_spelling import spelt_as_meant, value_of
@@ -19,13 +19,13 @@ class HeaderReader:
     """Reads headers of the machines of one task."""
 
     def __init__(self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList) -> None:
-        """Use these templates; the states serve to distinguish a state from a misspelt template."""
+        """Uses these templates; the states serve to distinguish a state from a misspelt template."""
         self._states = states
         self._templates = templates
         self._faults = faults
 
     def spelt(self, header: Mapping, label: str, *, is_root: bool) -> Mapping:
-        """Return a header with known keys only; note the unknown ones, and those that are missing."""
+        """Returns a header with known keys only; notes the unknown ones, and those that are missing."""
         template = self.template_named(value_of(header, "source"))
         templates = self._all_templates() if template is None else [template]
         known = list(dict.fromkeys(key.name for item in templates for key in machine_keys(item)
@@ -35,47 +35,47 @@ class HeaderReader:
         for key in required_keys(is_root=is_root):
             if key.name not in spelt.entries:
                 owner = "the task" if is_root else f"machine {who}"
-                self._faults.add(header.place, f"{owner} has no '{key.name}'; add it: {key.form}")
+                self._faults.add(header.location, f"{owner} has no '{key.name}'; add it: {key.form}")
         return spelt
 
     def template_named(self, node: Node | None) -> TemplateSource | None:
-        """Return the template a source names, without a word when there is none."""
+        """Returns the template a source names; None, without a fault, when there is none."""
         return self._templates.get(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
 
     def template(self, header: Mapping, label: str) -> TemplateSource | None:
-        """Return the template of a machine."""
+        """Returns the template of a machine."""
         node = header.entries.get("source")
         name = None if node is None else header_fields.text(node, "source", self._faults)
         if node is None or name is None:
             return None
         template = self._templates.get(name)
         if template is None and self._states.resolve(name) is not None:
-            self._faults.add(node.place, f"'{label}' contains states, but its source '{name}' is a state; "
-                                         f"{listing(self._templates.names())}")
+            self._faults.add(node.location, f"'{label}' contains states, but its source '{name}' is a state; "
+                                            f"{listing(self._templates.names())}")
         elif template is None:
-            self._faults.add_unknown(node.place, "template", name, self._templates.names())
+            self._faults.add_unknown(node.location, "template", name, self._templates.names())
         elif template.fault:
-            self._faults.add(node.place, f"'{label}': the template '{name}' cannot be used: {template.fault}")
+            self._faults.add(node.location, f"'{label}': the template '{name}' cannot be used: {template.fault}")
         return template
 
     def outcomes(self, header: Mapping) -> tuple[str, ...] | None:
-        """Return the outcomes of a machine; None when they are there and wrong."""
+        """Returns the outcomes of a machine; None when they are there and wrong."""
         if "outcomes" not in header.entries:
             return DEFAULT_OUTCOMES
         return header_fields.names(header.entries["outcomes"], "outcomes", self._faults)
 
     def shares_userdata(self, header: Mapping) -> bool:
-        """Return whether a machine works on the userdata of the machine around it."""
+        """Returns whether a machine works on the userdata of the machine around it."""
         node = header.entries.get("userdata")
         if node is None:
             return False
         if isinstance(node, Scalar) and node.value == SHARED_USERDATA:
             return True
-        self._faults.add(node.place, f"userdata can only be {SHARED_USERDATA}, found {kind_of(node)}")
+        self._faults.add(node.location, f"userdata can only be {SHARED_USERDATA}, found {kind_of(node)}")
         return False
 
     def default_outcome(self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...]) -> str | None:
-        """Return the outcome of a concurrent machine when no entry of its outcome map is met; None for others."""
+        """Returns the outcome of a concurrent machine when no entry of its outcome map is met; None for others."""
         node = header.entries.get("default_outcome")
         if not template.concurrent or not outcomes:
             return None
@@ -83,43 +83,43 @@ class HeaderReader:
             return outcomes[-1]
         name = header_fields.text(node, "default_outcome", self._faults)
         if name is not None and name not in outcomes:
-            self._faults.add_unknown(node.place, "default_outcome", name, outcomes)
+            self._faults.add_unknown(node.location, "default_outcome", name, outcomes)
         return name
 
     def outcome_map(
         self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...], links: list[ChildLinks]
     ) -> dict[str, dict[str, str]]:
-        """Return the outcome map of a concurrent machine; an empty one for others."""
+        """Returns the outcome map of a concurrent machine; an empty one for others."""
         node = header.entries.get("outcome_map")
         if not template.concurrent or node is None or not outcomes:
             return {}
         return machine_checks.check_outcome_map(node, outcomes, links, self._faults)
 
     def key_names(self, header: Mapping, key: str) -> tuple[str, ...]:
-        """Return a list of userdata keys."""
+        """Returns a list of userdata keys."""
         if key not in header.entries:
             return ()
         return header_fields.names(header.entries[key], key, self._faults, may_be_empty=True) or ()
 
     def initial_state(self, header: Mapping, labels: list[str]) -> str:
-        """Return the label of the state a machine begins with; "" for the first one."""
+        """Returns the label of the state a machine begins with; "" for the first one."""
         node = header.entries.get("initial_state")
         name = None if node is None else header_fields.text(node, "initial_state", self._faults)
         if node is None or name is None:
             return ""
         if name not in labels:
-            self._faults.add_unknown(node.place, "initial_state", name, labels)
+            self._faults.add_unknown(node.location, "initial_state", name, labels)
             return ""
         return name
 
     def external_names(self, header: Mapping) -> dict[str, frozenset[str]]:
-        """Return the names that other nodes put into the managers: kind of message -> names."""
+        """Returns the names that other nodes put into the managers: kind of message -> names."""
         node = header.entries.get("external_names")
         if node is None:
             return {}
         if not isinstance(node, Mapping):
-            self._faults.add(node.place, f"external_names must be a mapping such as {{plan: [homing]}}, found "
-                                         f"{kind_of(node)}")
+            self._faults.add(node.location, f"external_names must be a mapping such as {{plan: [homing]}}, found "
+                                            f"{kind_of(node)}")
             return {}
         spelt = spelt_as_meant(node, MANAGER_KINDS, "external_names: kind", self._faults)
         found = {kind: header_fields.names(value, f"external_names: {kind}", self._faults, may_be_empty=True,
@@ -127,9 +127,9 @@ class HeaderReader:
                  for kind, value in spelt.entries.items()}
         return {kind: frozenset(names or ()) for kind, names in found.items()}
 
-    def place_of(self, header: Mapping, key: str) -> Place:
-        """Return where the value of a key is; where the header is when the key is left out."""
-        return header.entries[key].place if key in header.entries else header.place
+    def location_of(self, header: Mapping, key: str) -> SourceLocation:
+        """Returns where the value of a key is; where the header is when the key is left out."""
+        return header.entries[key].location if key in header.entries else header.location
 
     def _all_templates(self) -> list[TemplateSource]:
         found = (self._templates.get(name) for name in self._templates.names())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The keys of a machine's header, said once: for the check of a task, for ``--explain`` and for the JSON Schema."""
+"""The keys of a machine's header, defined once: for the check of a task, for ``--explain`` and for the JSON Schema."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ class MachineKey:
     """A key of the header of a machine.
 
     Attributes:
-        name: spelling.
-        form: what its value looks like, in words.
-        meaning: what it is for.
+        name: Spelling.
+        form: What its value looks like, in words.
+        meaning: What it is for.
         schema: JSON Schema of its value.
-        at_root: whether the task itself has it; ``nested`` whether a nested machine has it: "required", "optional" or
+        at_root: Whether the task itself has it; ``nested`` whether a nested machine has it: "required", "optional" or
             "" for not at all.
-        nested: see ``at_root``.
+        nested: See ``at_root``.
     """
 
     name: str
@@ -78,7 +78,7 @@ _KEYS = (
 
 
 def machine_keys(template: TemplateSource) -> list[MachineKey]:
-    """Return the keys of machines with a template, in the order they are usually written."""
+    """Returns the keys of machines with a template, in the order they are usually written."""
     absent = {"initial_state"} if template.concurrent else {"default_outcome", "outcome_map"}
     absent |= set() if template.takes_keys else {"input_keys", "output_keys"}
     own = [MachineKey(name, "any value", f"Of this template, which reads it as options.{name}.", {})
@@ -87,10 +87,10 @@ def machine_keys(template: TemplateSource) -> list[MachineKey]:
 
 
 def required_keys(*, is_root: bool) -> list[MachineKey]:
-    """Return the keys that no machine can do without."""
+    """Returns the keys that no machine can do without."""
     return [key for key in _KEYS if (key.at_root if is_root else key.nested) == "required"]
 
 
 def root_keys() -> list[str]:
-    """Return the names of the keys a task may have, whatever its template."""
+    """Returns the names of the keys a task may have, whatever its template."""
     return [key.name for key in _KEYS if key.at_root]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from modular_framework_core.files.faults import FaultList, Place, listing, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation, listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
 from modular_framework_core.state_api.option_types import complaint
 from modular_framework_core.state_api.option_uses import (
@@ -27,13 +27,13 @@ _WORDS = {"posture": "posture", "group": "planning group"}
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
-    """Check the options of all states of a task.
+    """Checks the options of all states of a task.
 
     Args:
-        root: the outermost machine.
-        known: the names there are beside those that states of the task make.
-        faults: where faults are noted.
-        complete: whether all states of the task could be read, so that no other makes a plan.
+        root: The outermost machine.
+        known: The names there are beside those that states of the task make.
+        faults: Where faults are noted.
+        complete: Whether all states of the task could be read, so that no other makes a plan.
     """
     states = list(root.leaf_states())
     maybe_made = frozenset(_unexplained(states))
@@ -59,19 +59,19 @@ class _Checker:
         self._outputs = _declared(state, ("output_keys", "io_keys"))
 
     def check(self) -> None:
-        """Note everything that is wrong."""
+        """Notes everything that is wrong."""
         source = self._state.source
         for option in source.options.values():
             node = self._state.nodes.get(option.name)
             if node is not None and complaint(option.type, node):
-                continue  # noted already: more would only follow from it
+                continue  # noted already: other faults would only follow from it
             value = option.default if node is None else node.plain()
             for use in option.uses:
                 self._check_use(use, option.name, value, node)
         self._check_reads()
 
     def _check_use(self, use: Any, name: str, value: Any, node: Node | None) -> None:
-        place = self._state.place if node is None else node.place
+        location = self._state.location if node is None else node.location
         match use:
             case Named():
                 self._check_name(use, name, node)
@@ -79,10 +79,10 @@ class _Checker:
                 if not value or (when and value not in (when, [when])):
                     return
                 needed = str(value) if not key else key.format(kind_of(str(value)))
-                self._need(direction, needed, f"option '{name}' {value!r}", place)
+                self._need(direction, needed, f"option '{name}' {value!r}", location)
             case Fields() if node is not None:
-                for place, text in _references(node):
-                    self._need("input", text.removeprefix(USERDATA_PREFIX).split(".")[0], f"'{text}'", place)
+                for location, text in _references(node):
+                    self._need("input", text.removeprefix(USERDATA_PREFIX).split(".")[0], f"'{text}'", location)
             case OutputKeys() if isinstance(node, Mapping):
                 for key in node:
                     self._need("output", key, f"option '{name}'", node.keys[key])
@@ -102,12 +102,12 @@ class _Checker:
             if use.userdata and name == FROM_USERDATA:
                 keys = tuple(dict.fromkeys((f"selected_{kind_word}", f"selected_{kind}")))
                 if self._inputs is not None and not self._inputs.intersection(keys):
-                    self._need("input", keys[-1], f"option '{option}' 'userdata'", item.place)
+                    self._need("input", keys[-1], f"option '{option}' 'userdata'", item.location)
                 continue
             names = self._known.names.get(kind)
             made = name in self._maybe_made and kind not in _WORDS
             if names is not None and kind not in self._open and name not in names and not made:
-                self._faults.add(item.place, self._unknown(option, kind, name, names))
+                self._faults.add(item.location, self._unknown(option, kind, name, names))
 
     def _unknown(self, option: str, kind: str, name: str, names: frozenset[str]) -> str:
         word = _WORDS.get(kind, kind.replace("_", " "))
@@ -125,19 +125,19 @@ class _Checker:
             return kind
         return str(self._state.options.get(kind.removeprefix("option:"), ""))
 
-    def _need(self, direction: str, key: str, what: str, place: Place, listed: str = "") -> None:
+    def _need(self, direction: str, key: str, what: str, location: SourceLocation, listed: str = "") -> None:
         declared = self._inputs if direction == "input" else self._outputs
         if declared is None or key in declared:
             return
         does, listed = "takes" if direction == "input" else "writes", listed or f"{direction}_keys"
         source = self._state.source
         where = f"{listed} in {source.file.name}" if listed in source.own_keys else listed
-        self._faults.add(place, f"state '{self._state.label}' ({source.name}): {what} {does} the userdata key '{key}', "
-                                f"but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; add it to "
-                                f"{where}")
+        self._faults.add(location, f"state '{self._state.label}' ({source.name}): {what} {does} the userdata key "
+                                   f"'{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
+                                   f"add it to {where}")
 
     def _check_reads(self) -> None:
-        """Note keys that the source reads and the task's own lists of keys leave out."""
+        """Notes keys that the source reads and the task's own lists of keys leave out."""
         source, inputs = self._state.source, self._inputs
         if inputs is None:
             return
@@ -147,23 +147,23 @@ class _Checker:
             if key in inputs:
                 continue
             listed = "io_keys" if key in (source.default_names("io_keys") or ()) else "input_keys"
-            place = self._state.nodes[listed].place if listed in self._state.nodes else self._state.place
-            self._need("input", key, source.file.name, place, listed)
+            location = self._state.nodes[listed].location if listed in self._state.nodes else self._state.location
+            self._need("input", key, source.file.name, location, listed)
 
 
 def _declared(state: StateSpec, lists: tuple[str, ...]) -> frozenset[str] | None:
-    """Return the keys of some lists together; None where one of them is not known."""
+    """Returns the keys of some lists together; None where one of them is not known."""
     found = [declared_keys(state, name) for name in lists]
     return None if None in found else frozenset(key for keys in found for key in keys or ())
 
 
-def _references(node: Node) -> Iterator[tuple[Place, str]]:
-    """Yield the references to userdata in the fields of a message, with their places."""
-    return ((place, text) for place, text in _texts(node) if text.startswith(USERDATA_PREFIX))
+def _references(node: Node) -> Iterator[tuple[SourceLocation, str]]:
+    """Yields the references to userdata in the fields of a message, with their locations."""
+    return ((location, text) for location, text in _texts(node) if text.startswith(USERDATA_PREFIX))
 
 
 def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
-    """Return the names that states of the task store messages under: kind -> names."""
+    """Returns the names that states of the task store messages under: kind -> names."""
     found: dict[str, set[str]] = {}
     for state in states:
         for option in state.source.options.values():
@@ -175,9 +175,9 @@ def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
 
 
 def _unexplained(states: list[StateSpec]) -> Iterator[str]:
-    """Yield the texts in options of which no annotation says that they name a message to be read.
+    """Yields the texts in options whose annotations do not declare the name of a message to be read.
 
-    Such a state may store a message under that name: one of the user's own, or a service that is called with it.
+    A state with such an option may store a message under that name: a state of the user's, or a service called with it.
     """
     for state in states:
         for name, node in state.nodes.items():
@@ -186,11 +186,11 @@ def _unexplained(states: list[StateSpec]) -> Iterator[str]:
                 yield from (text for _, text in _texts(node))
 
 
-def _texts(node: Node) -> Iterator[tuple[Place, str]]:
-    """Yield all texts in a value, with their places."""
+def _texts(node: Node) -> Iterator[tuple[SourceLocation, str]]:
+    """Yields all texts in a value, with their locations."""
     match node:
         case Scalar(value=str(text)):
-            yield node.place, text
+            yield node.location, text
         case Sequence(items=items):
             for item in items:
                 yield from _texts(item)
@@ -200,17 +200,17 @@ def _texts(node: Node) -> Iterator[tuple[Place, str]]:
 
 
 def _may_make(state: StateSpec, kind: str) -> bool:
-    """Return whether a state may store messages of a kind under names that cannot be told from the task.
+    """Returns whether a state may store messages of a kind under names that the task does not show.
 
-    So does what loads files of messages, what calls a service of the kind's manager by its name, and a state whose own
-    source speaks of such a service and has no option for the name.
+    It may if it loads files of messages, if it calls a service of the kind's manager by its name, or if its source
+    names such a service and it has no option for the name.
     """
     plural = _PLURALS.get(kind, f"{kind}s")
     if state.source.name == "load" and state.options.get("kind") == kind:
         return True
     services = (f"add_{kind}", f"load_{plural}", f"reload_{plural}", f"store_{kind}(")
     words = [str(value) for value in state.options.values() if isinstance(value, str)]
-    says_itself = any(isinstance(use, Named) and use.made and use.kind == kind
-                      for option in state.source.options.values() for use in option.uses)
-    texts = words if says_itself else [*words, state.source.text]
+    declares_names = any(isinstance(use, Named) and use.made and use.kind == kind
+                         for option in state.source.options.values() for use in option.uses)
+    texts = words if declares_names else [*words, state.source.text]
     return any(service in text for service in services for text in texts)

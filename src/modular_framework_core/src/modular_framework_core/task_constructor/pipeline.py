@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The task constructor in one call, and its command line."""
+"""The task constructor as one call, and its command line."""
 from __future__ import annotations
 
 import argparse
@@ -26,17 +26,17 @@ def check_task(
     script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path],
     known: KnownNames | None = None,
 ) -> TaskSpec:
-    """Read and check a task; nothing is run or written.
+    """Reads and checks a task; nothing is run or written.
 
     Args:
-        script: the task.
-        states_directories: where its states are, in order.
-        templates_directories: where its templates are, in order.
-        known: names of messages and postures there are, as far as that is known.
+        script: The task.
+        states_directories: Where its states are, in order.
+        templates_directories: Where its templates are, in order.
+        known: Names of messages and postures there are, as far as that is known.
 
     Raises:
-        TaskFault: something is wrong with the task; carries all faults.
-        FileNotFoundError: one of the directories is not there.
+        TaskFault: Something is wrong with the task; carries all faults.
+        FileNotFoundError: One of the directories is not there.
     """
     return load_task(script, StateCatalogue(states_directories), TemplateCatalogue(templates_directories), known)
 
@@ -45,13 +45,13 @@ def construct_task(
     script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path], output: Path,
     known: KnownNames | None = None,
 ) -> tuple[TaskSpec, Path]:
-    """Check a task and write its module into the directory ``output``; return the task and the path of the module.
+    """Checks a task and writes its module into the directory ``output``; returns the task and the path of the module.
 
     A module that is there already is kept when nothing it was made from has changed.
 
     Raises:
-        TaskFault, FileNotFoundError: as ``check_task``.
-        GenerationError: a template is at fault.
+        TaskFault, FileNotFoundError: As ``check_task``.
+        GenerationError: A template is at fault.
     """
     task = check_task(script, states_directories, templates_directories, known)
     digest = generator.digest_line(task, templates_directories)
@@ -62,12 +62,12 @@ def construct_task(
 
 
 def directories_from(text: str) -> list[Path]:
-    """Split a setting that names one or several directories, separated by ``:`` as in PATH."""
+    """Splits a setting that names one or several directories, separated by ``:`` as in PATH."""
     return [Path(part).expanduser() for part in text.split(":") if part.strip()]
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the command ``state_machine_generator``.
+    """Runs the command ``state_machine_generator``.
 
     Returns:
         0 when what was asked for was done; 1 when the task (or what it needs) is at fault; 2 for a wrong command.
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def no_states_in(folder: Path) -> str:
-    """Say that a folder of states has none."""
+    """Says that a folder of states has none."""
     return (f"states directory {folder} has no state: no .py file but those that begin with '_'; name the folder that "
             "has your states, or leave it out (the framework's own states are found without it)")
 
@@ -133,7 +133,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _checked(given: argparse.Namespace, task: TaskSpec) -> str:
-    """Draw a checked task where asked to; return what to tell."""
+    """Draws a checked task where asked to; returns the message."""
     if given.graph:
         task_graph.write(task, given.graph)
         return str(given.graph)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from modular_framework_core.files.faults import FaultList, Place
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.state_api.option_types import complaint
@@ -22,14 +22,14 @@ class StateBuilder:
     """Builds the states of one task; notes what is wrong with them in the list of faults of the task."""
 
     def __init__(self, states: StateCatalogue, faults: FaultList) -> None:
-        """Use these states."""
+        """Uses these states."""
         self._states = states
         self._faults = faults
         self._imports_checked: set[str] = set()
 
     def spelt(self, label: str, body: Mapping) -> Mapping:
-        """Return the fields of a state with known keys only; note the unknown ones, and a source that is missing."""
-        source = self._quiet_source(value_of(body, "source"))
+        """Returns the fields of a state with known keys only; notes the unknown ones, and a source that is missing."""
+        source = self._source_without_faults(value_of(body, "source"))
         if source is None:  # its options are not known
             given = [key for key in body.entries if key == "source" or meant_key(key, ["source"]) is None]
             body = spelt_as_meant(body, [*_RESERVED, *given], f"state '{label}': key", self._faults)
@@ -38,12 +38,12 @@ class StateBuilder:
             what = f"state '{label}' ({source.name}): key"
             body = spelt_as_meant(body, [*_RESERVED, *source.options, *free], what, self._faults)
         if "source" not in body.entries:
-            self._faults.add(body.place, f"state '{label}' has no 'source'; add it: the name of a state's file, or "
-                                         "of a template")
+            self._faults.add(body.location, f"state '{label}' has no 'source'; add it: the name of a state's file, or "
+                                            "of a template")
         return body
 
-    def _quiet_source(self, node: Node | None) -> StateSource | None:
-        """Return the state a source names, without a word when it cannot be used."""
+    def _source_without_faults(self, node: Node | None) -> StateSource | None:
+        """Returns the state a source names; None, without a fault, when it cannot be used."""
         name = self._states.resolve(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
         try:
             return None if name is None else self._states.get(name)
@@ -51,15 +51,15 @@ class StateBuilder:
             return None
 
     def build(
-        self, label: str, place: Place, body: Mapping, scope: ParamsScope
+        self, label: str, location: SourceLocation, body: Mapping, scope: ParamsScope
     ) -> tuple[StateSpec | None, tuple[str, ...] | None]:
-        """Check a state.
+        """Checks a state.
 
         Args:
-            label: its name.
-            place: where it is defined.
-            body: its fields, references resolved.
-            scope: the params it sees, its own included.
+            label: Its name.
+            location: Where it is defined.
+            body: Its fields, references resolved.
+            scope: The params it sees, its own included.
 
         Returns:
             The state, None when its source cannot be used; and its outcomes, None when they are not known.
@@ -74,11 +74,11 @@ class StateBuilder:
         self._check_imports(label, body, source)
         for option in source.options.values():
             if option.required and option.name not in options:
-                self._faults.add(place, f"{what} '{option.name}' is missing; it has no default")
+                self._faults.add(location, f"{what} '{option.name}' is missing; it has no default")
             elif option.name in options and option.name not in STATE_KEYS:
                 wrong = complaint(option.type, options[option.name])
                 if wrong is not None:
-                    self._faults.add(wrong[0].place, f"{what} '{option.name}' {wrong[1]}")
+                    self._faults.add(wrong[0].location, f"{what} '{option.name}' {wrong[1]}")
         self._faults.harmless += len(self._faults) - before
         for key in STATE_KEYS:
             if key in options:
@@ -86,21 +86,21 @@ class StateBuilder:
                 header_fields.names(options[key], f"state '{label}': {key}", self._faults, may_be_empty=may_be_empty)
         outcomes = self._state_outcomes(options, source)
         if "outcomes" in options and outcomes is not None and len(outcomes) < 2 and source.is_framework_state:
-            self._faults.add(options["outcomes"].place, f"state '{label}': outcomes has only '{outcomes[0]}'; it needs "
-                             "at least two, the first for success and the last for failure, as [success, fail]")
+            self._faults.add(options["outcomes"].location, f"state '{label}': outcomes has only '{outcomes[0]}'; it "
+                             "needs at least two, the first for success and the last for failure, as [success, fail]")
         values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
         return (
-            StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), place,
+            StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), location,
                       plain_remapping(body), options),
             outcomes,
         )
 
     def _check_imports(self, label: str, body: Mapping, source: StateSource) -> None:
-        """Note imports of a state that Python does not find, at the first state that is made of it."""
+        """Notes imports of a state that Python does not find, at the first state that is made of it."""
         if source.name not in self._imports_checked:
             self._imports_checked.add(source.name)
             for missing in source.missing_imports:
-                self._faults.add(body.entries["source"].place, f"state '{label}': {missing}")
+                self._faults.add(body.entries["source"].location, f"state '{label}': {missing}")
 
     def _state_source(self, body: Mapping, label: str) -> StateSource | None:
         node = body.entries.get("source")
@@ -109,18 +109,18 @@ class StateBuilder:
             return None
         found = self._states.resolve(name)
         if found is None:
-            self._faults.add_unknown(node.place, f"state '{label}': source", name, self._states.names())
+            self._faults.add_unknown(node.location, f"state '{label}': source", name, self._states.names())
             return None
         try:
             return self._states.get(found)
         except StateSourceError as error:
-            self._faults.add(node.place, f"state '{label}': {error}")
+            self._faults.add(node.location, f"state '{label}': {error}")
             return None
 
     def _options_from_params(
         self, label: str, body: Mapping, scope: ParamsScope, source: StateSource
     ) -> dict[str, Node]:
-        """Return the values of a state's own params that are options of it; note those that are of no use."""
+        """Returns the values of a state's own params that are options of it; notes those that are of no use."""
         params = body.entries.get("params")
         if not isinstance(params, Mapping):
             return {}
@@ -140,12 +140,12 @@ class StateBuilder:
 
 
 def plain_remapping(body: Mapping) -> dict[str, str]:
-    """Return the remapping of a state or nested machine: its key -> key around it; none when it cannot be read."""
+    """Returns the remapping of a state or nested machine: its key -> key around it; none when it cannot be read."""
     return _plain_names(body.entries.get("remapping"))
 
 
 def plain_transitions(body: Mapping) -> dict[str, str]:
-    """Return the transitions of a state or nested machine as outcome -> target; none when they cannot be read."""
+    """Returns the transitions of a state or nested machine as outcome -> target; none when they cannot be read."""
     return _plain_names(body.entries.get("transitions"))
 
 

@@ -34,12 +34,12 @@ class StateOption:
     """An option of a state: a keyword argument of its constructor.
 
     Attributes:
-        name: spelling, the same in the task script.
-        required: whether it has no default.
-        default: the default when it is written as a literal, else None.
-        default_known: whether ``default`` is the real default.
-        type: what values it takes, as far as its annotation says.
-        uses: what it names, and what userdata it needs, as far as its annotation says.
+        name: Spelling, the same in the task script.
+        required: Whether it has no default.
+        default: The default when it is written as a literal, else None.
+        default_known: Whether ``default`` is the real default.
+        type: What values it takes, as far as its annotation says.
+        uses: What it names, and what userdata it needs, as far as its annotation says.
     """
 
     name: str
@@ -55,17 +55,17 @@ class StateSource:
     """A state class that was found in a file.
 
     Attributes:
-        name: name of the file without ``.py``: what ``source`` says in a task.
-        file: absolute path.
-        class_name: name of the class.
-        options: what its constructor takes, by name.
-        takes_any_option: whether its constructor takes further keyword arguments (or is not known).
-        is_framework_state: whether it is derived from ``FrameworkState``, which needs two outcomes at least.
-        doc: docstring of the class.
-        missing_imports: what the file imports that Python does not find, a message each.
-        userdata: what the class reads of userdata.
-        text: the source, for what can be told only by a word in it.
-        own_keys: outcomes and userdata keys that the constructor declares itself; None where they cannot be known.
+        name: Name of the file without ``.py``: what ``source`` says in a task.
+        file: Absolute path.
+        class_name: Name of the class.
+        options: What its constructor takes, by name.
+        takes_any_option: Whether its constructor takes further keyword arguments (or is not known).
+        is_framework_state: Whether it is derived from ``FrameworkState``, which needs two outcomes at least.
+        doc: Docstring of the class.
+        missing_imports: What the file imports that Python does not find, a message each.
+        userdata: What the class reads of userdata.
+        text: The source, for checks that search it for a word.
+        own_keys: Outcomes and userdata keys that the constructor declares itself; None where they cannot be known.
     """
 
     name: str
@@ -81,7 +81,7 @@ class StateSource:
     own_keys: dict[str, tuple[str, ...] | None] = field(default_factory=dict)
 
     def default_names(self, key: str) -> tuple[str, ...] | None:
-        """Return the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
+        """Returns the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
         if key in self.own_keys:
             return self.own_keys[key]
         option = self.options.get(key)
@@ -95,7 +95,7 @@ class StateSource:
 
 
 def class_name_of(source_name: str) -> str:
-    """Return the class name that belongs to a file name: ``wait_for_signal`` -> ``WaitForSignal``."""
+    """Returns the class name that belongs to a file name: ``wait_for_signal`` -> ``WaitForSignal``."""
     return "".join(word.capitalize() for word in source_name.split("_"))
 
 
@@ -103,13 +103,13 @@ class StateCatalogue:
     """The states in one or several directories; a name found twice is taken from the first directory that has it."""
 
     def __init__(self, directories: Iterable[Path]) -> None:
-        """List the directories.
+        """Lists the directories.
 
         Args:
-            directories: where to look, in order.
+            directories: Where to look, in order.
 
         Raises:
-            FileNotFoundError: a directory is not there.
+            FileNotFoundError: A directory is not there.
         """
         self.empty_directories: list[Path] = []
         """Directories in which there is no state."""
@@ -125,24 +125,24 @@ class StateCatalogue:
                 self._files.setdefault(file.stem, file.resolve())
 
     def names(self) -> list[str]:
-        """Return the names ``source`` may have, sorted."""
+        """Returns the names ``source`` may have, sorted."""
         return sorted(self._files)
 
     def resolve(self, name: str) -> str | None:
-        """Return the catalogue's spelling of a name: itself, or without the prefix ``state_``; None if unknown."""
+        """Returns the catalogue's spelling of a name: itself, or without the prefix ``state_``; None if unknown."""
         if name in self._files:
             return name
         short = name.removeprefix("state_")
         return short if short in self._files else None
 
     def get(self, name: str) -> StateSource:
-        """Read a state.
+        """Reads a state.
 
         Args:
-            name: a name out of ``names()``.
+            name: A name out of ``names()``.
 
         Raises:
-            StateSourceError: the file does not define a usable state class.
+            StateSourceError: The file does not define a usable state class.
         """
         if name not in self._read:
             try:
@@ -192,7 +192,7 @@ def _base_name(base: ast.expr) -> str:
 
 
 def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
-    """Return the plain assignments of a module: the names a type may have been given."""
+    """Returns the plain assignments of a module: the names a type may have been given."""
     return {node.targets[0].id: node.value for node in tree.body
             if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)}
 
@@ -203,7 +203,7 @@ def _aliases_of(file: Path, changed_ns: int) -> dict[str, ast.expr]:
 
 
 def _imported(tree: ast.Module, file: Path) -> dict[str, ast.expr]:
-    """Return the plain assignments that a file imports by name from modules of its own package and of the framework."""
+    """Returns the plain assignments that a file imports by name from its own package and the framework."""
     own = next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
     found: dict[str, ast.expr] = {}
     for node in tree.body:
@@ -219,7 +219,7 @@ def _imported(tree: ast.Module, file: Path) -> dict[str, ast.expr]:
 def _constructor_options(
     node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
 ) -> tuple[dict[str, StateOption], bool]:
-    """Return the options of a class and whether it takes others: its own constructor's, or that of its base."""
+    """Returns the options of a class and whether it takes others: its own constructor's, or that of its base."""
     for item in node.body:
         if isinstance(item, ast.FunctionDef) and item.name == "__init__":
             return _arguments(item.args, aliases)
@@ -236,7 +236,7 @@ def _constructor_options(
 def _own_keys(
     node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
 ) -> dict[str, tuple[str, ...] | None]:
-    """Return what the constructor of a class, or that of its base, declares by itself."""
+    """Returns what the constructor of a class, or that of its base, declares by itself."""
     bases = [_base_name(base) for base in node.bases]
     for item in node.body:
         if isinstance(item, ast.FunctionDef) and item.name == "__init__":

@@ -12,24 +12,24 @@ from pathlib import Path
 
 from modular_framework_core.files.faults import nearest
 
-_CHANGES_THE_SEARCH = ("sys.path", "sys.modules", "sys.meta_path", "addsitedir", "__path__")
-"""Words of a file that may change what is found, which cannot be told without running it."""
+_PATH_CHANGES = ("sys.path", "sys.modules", "sys.meta_path", "addsitedir", "__path__")
+"""Words of a file that may change what is found, which only running it would show."""
 
 
 def missing_imports(tree: ast.Module, file: Path) -> tuple[str, ...]:
-    """Say what a file imports that is not found; nothing where that cannot be told without running something.
+    """Says what a file imports that is not found; nothing where only running it would show.
 
-    Looked at are the imports at the top of the file, which are run when it is loaded, not those in ``try``, ``if`` or
+    Only the imports at the top of the file count, which are run when it is loaded: not those in ``try``, ``if`` or
     functions, and no names within modules.
 
     Args:
-        tree: the file as parsed.
-        file: its absolute path.
+        tree: The file as parsed.
+        file: Its absolute path.
 
     Returns:
         One message for each import that would fail, beginning with file and line.
     """
-    if _changes_the_search(file):
+    if _changes_import_path(file):
         return ()
     found: list[str] = []
     for line, name in _top_imports(tree, file):
@@ -40,7 +40,7 @@ def missing_imports(tree: ast.Module, file: Path) -> tuple[str, ...]:
 
 
 def _top_imports(tree: ast.Module, file: Path) -> Iterator[tuple[int, str]]:
-    """Yield line and module of each import; a relative one by its whole name, or as it is written outside packages."""
+    """Yields line and module of each import; a relative one by its full name, or as it is written outside packages."""
     package = _package_of(file)
     for node in tree.body:
         if isinstance(node, ast.Import):
@@ -61,52 +61,52 @@ def _package_of(file: Path) -> str:
 
 
 def _complaint(name: str, file: Path) -> str:
-    """Say which part of a module's name is not found, and what to do; nothing when all of it may be there."""
+    """Says which part of a module's name is not found, and what to do; nothing when all of it may be there."""
     if name.startswith("."):
         return f"{file.parent} is no package, or not so deep in one; import it by its whole name"
     parts = name.split(".")
-    spec = _top_spec(parts[0])
+    spec = _top_level_spec(parts[0])
     folders: Sequence[str] | None = None
     for number, last in enumerate(parts, start=1):
-        whole = ".".join(parts[:number])
+        full_name = ".".join(parts[:number])
         if number > 1:
-            folders = _folders_of(whole.rpartition(".")[0], spec)
+            folders = _folders_of(full_name.rpartition(".")[0], spec)
             if folders is None:
                 return ""
-            spec = None if whole in sys.modules else PathFinder.find_spec(whole, folders)
-        if spec is None and whole not in sys.modules:
-            return f"Python finds no '{whole}'; {_what_to_do(last, folders, file)}"
+            spec = None if full_name in sys.modules else PathFinder.find_spec(full_name, folders)
+        if spec is None and full_name not in sys.modules:
+            return f"Python finds no '{full_name}'; {_what_to_do(last, folders, file)}"
     return ""
 
 
-def _top_spec(name: str) -> ModuleSpec | None:
+def _top_level_spec(name: str) -> ModuleSpec | None:
     try:
         return importlib.util.find_spec(name)
-    except ValueError:  # it is loaded and does not say from where
+    except ValueError:  # it is loaded, but its origin is not known
         return ModuleSpec(name, None)
 
 
 def _folders_of(package: str, spec: ModuleSpec | None) -> Sequence[str] | None:
-    """Return where the modules of a package are; None where only the package itself knows."""
+    """Returns where the modules of a package are; None where only the package itself knows."""
     if package in sys.modules:
         return getattr(sys.modules[package], "__path__", None)
     if spec is None or spec.submodule_search_locations is None:
         return None
-    if spec.origin is not None and _changes_the_search(Path(spec.origin)):
+    if spec.origin is not None and _changes_import_path(Path(spec.origin)):
         return None
     return list(spec.submodule_search_locations)
 
 
-def _changes_the_search(file: Path) -> bool:
+def _changes_import_path(file: Path) -> bool:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return True
-    return any(word in text for word in _CHANGES_THE_SEARCH)
+    return any(word in text for word in _PATH_CHANGES)
 
 
 def _what_to_do(name: str, folders: Sequence[str] | None, file: Path) -> str:
-    """Say how a module may be found; ``folders`` are those of its package, None for a module of its own."""
+    """Says how a module may be found; ``folders`` are those of its package, None for a module of its own."""
     beside = file.parent / name
     if folders is None and (beside.with_suffix(".py").is_file() or beside.is_dir()):
         return f"it is beside the state, where Python does not look; add {file.parent} to PYTHONPATH"

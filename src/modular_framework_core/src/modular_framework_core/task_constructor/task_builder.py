@@ -6,7 +6,7 @@ import builtins
 from pathlib import Path
 
 from modular_framework_core.files import located_yaml
-from modular_framework_core.files.faults import FaultList, Place
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks, userdata_checks
 from modular_framework_core.task_constructor.key_spelling import meant_key, value_of
@@ -25,16 +25,16 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateC
 def load_task(
     script: Path, states: StateCatalogue, templates: TemplateCatalogue, known: KnownNames | None = None
 ) -> TaskSpec:
-    """Read and check a task.
+    """Reads and checks a task.
 
     Args:
-        script: the YAML file.
-        states: the states it may use.
-        templates: the templates its machines may be written with.
-        known: the names of messages and postures there are, as far as that is known.
+        script: The YAML file.
+        states: The states it may use.
+        templates: The templates its machines may be written with.
+        known: The names of messages and postures there are, as far as that is known.
 
     Raises:
-        TaskFault: something is wrong with it; carries all faults.
+        TaskFault: Something is wrong with it; carries all faults.
     """
     faults = FaultList()
     document = located_yaml.load(script, faults)
@@ -47,7 +47,7 @@ class TaskBuilder:
     def __init__(
         self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList, known: KnownNames | None = None
     ) -> None:
-        """Use these states, templates and names; note what is wrong in ``faults``."""
+        """Uses these states, templates and names; notes what is wrong in ``faults``."""
         self._templates = templates
         self._faults = faults
         self._known = known or KnownNames()
@@ -56,10 +56,10 @@ class TaskBuilder:
         self._taken = {class_name_of(name) for name in states.names()} | set(dir(builtins))
 
     def build(self, document: Node, script: str) -> TaskSpec:
-        """Return the task; raise ``TaskFault`` with everything that is wrong."""
+        """Returns the task; raises ``TaskFault`` with everything that is wrong."""
         if not isinstance(document, Mapping):
-            self._faults.add(document.place, f"a task must be a mapping, found {kind_of(document)}; its keys: "
-                                             f"{', '.join(root_keys())}")
+            self._faults.add(document.location, f"a task must be a mapping, found {kind_of(document)}; its keys: "
+                                                f"{', '.join(root_keys())}")
             self._faults.raise_if_any()
         assert isinstance(document, Mapping)
         self._faults.harmless = len(self._faults)
@@ -88,7 +88,7 @@ class TaskBuilder:
     def _machine(
         self, label: str, header: Mapping, scope: ParamsScope, parent: str | None
     ) -> MachineSpec | None:
-        """Build a machine from its header, whose references are resolved; ``parent`` is the class name around it."""
+        """Builds a machine from its header, whose references are resolved; ``parent`` is the class name around it."""
         read = self._headers
         template = read.template(header, label)
         known_outcomes = read.outcomes(header)
@@ -99,18 +99,18 @@ class TaskBuilder:
         initial_state = read.initial_state(header, labels)
         if template is None:
             return None
-        outcomes_place = read.place_of(header, "outcomes")
+        outcomes_location = read.location_of(header, "outcomes")
         before = len(self._faults)
         if template.concurrent:
             machine_checks.check_concurrent(links, self._faults)
         else:
             first = [initial_state] if initial_state else labels[:1]
-            machine_checks.check_sequential(links, labels, first, known_outcomes, outcomes_place, self._faults)
+            machine_checks.check_sequential(links, labels, first, known_outcomes, outcomes_location, self._faults)
         before_map = len(self._faults)
         default_outcome = read.default_outcome(header, template, outcomes)
         outcome_map = read.outcome_map(header, template, outcomes, links)
         if template.concurrent and known_outcomes and links and len(self._faults) == before_map:
-            machine_checks.check_outcomes_produced(outcomes, {*outcome_map, default_outcome}, outcomes_place,
+            machine_checks.check_outcomes_produced(outcomes, {*outcome_map, default_outcome}, outcomes_location,
                                                    self._faults)
         self._faults.harmless += len(self._faults) - before
         return MachineSpec(
@@ -128,18 +128,18 @@ class TaskBuilder:
             output_keys=read.key_names(header, "output_keys"),
             initial_state=initial_state,
             options={key: header.entries[key].plain() for key in template.options if key in header.entries},
-            place=header.place,
+            location=header.location,
         )
 
     def _resolved(self, node: Mapping, scope: ParamsScope, *, is_machine: bool) -> Mapping:
-        """Resolve the references of a header or state, leaving what is read later, or not at all."""
+        """Resolves the references of a header or state, except those that are read later or not at all."""
         unread = {key for key in node.entries if key in UNREAD or (is_machine and meant_key(key, UNREAD))}
         entries = {key: value if key in unread else scope.resolve(value, self._faults)
                    for key, value in node.entries.items()}
-        return Mapping(entries, node.keys, node.place)
+        return Mapping(entries, node.keys, node.location)
 
     def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
-        """Return a class name no other machine and no state of the task has."""
+        """Returns a class name no other machine and no state of the task has."""
         base = label
         if parent_type is not None and "name" in header.entries:
             base = header_fields.identifier(header.entries["name"], "name", self._faults) or label
@@ -156,43 +156,44 @@ class TaskBuilder:
 
     # ---- children ------------------------------------------------------------------------------------------
     def _children(
-        self, entries: list[tuple[str, Place, Mapping]], scope: ParamsScope, parent_type: str, outcomes: tuple[str, ...]
+        self, entries: list[tuple[str, SourceLocation, Mapping]], scope: ParamsScope, parent_type: str,
+        outcomes: tuple[str, ...]
     ) -> tuple[list[ChildSpec], list[ChildLinks]]:
         specs: list[ChildSpec] = []
         links: list[ChildLinks] = []
         first_lines: dict[str, int] = {}
-        for label, place, body in entries:
-            header_fields.label(label, place, self._faults)
+        for label, location, body in entries:
+            header_fields.label(label, location, self._faults)
             if label in outcomes:
-                self._faults.add(place, f"the label '{label}' is also an outcome of the machine; rename one of them")
-            spec, link = self._child(label, place, body, scope, parent_type)
+                self._faults.add(location, f"the label '{label}' is also an outcome of the machine; rename one of them")
+            spec, link = self._child(label, location, body, scope, parent_type)
             if label in first_lines:
-                self._faults.add(place, f"the label '{label}' is given twice; first in line {first_lines[label]}")
+                self._faults.add(location, f"the label '{label}' is given twice; first in line {first_lines[label]}")
                 continue
-            first_lines[label] = place.line
+            first_lines[label] = location.line
             links.append(link)
             if spec is not None:
                 specs.append(spec)
         return specs, links
 
-    def _child_entries(self, header: Mapping) -> tuple[list[tuple[str, Place, Mapping]], list[str]]:
-        """Return label, place and content of each entry of ``states`` that can be read, and the labels of all."""
+    def _child_entries(self, header: Mapping) -> tuple[list[tuple[str, SourceLocation, Mapping]], list[str]]:
+        """Returns label, location and content of each entry of ``states`` that can be read, and the labels of all."""
         node = header.entries.get("states")
         if node is None:
             return [], []
         if not isinstance(node, Sequence) or not node.items:
             found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
-            self._faults.add(node.place, f"states must be a list of '- Label: {{source: ...}}', found {found}")
+            self._faults.add(node.location, f"states must be a list of '- Label: {{source: ...}}', found {found}")
             return [], []
-        entries: list[tuple[str, Place, Mapping]] = []
+        entries: list[tuple[str, SourceLocation, Mapping]] = []
         labels: list[str] = []
         for item in node.items:
             if not isinstance(item, Mapping):
-                self._faults.add(item.place, f"a state must be '- Label: {{source: ...}}', found {kind_of(item)}")
+                self._faults.add(item.location, f"a state must be '- Label: {{source: ...}}', found {kind_of(item)}")
                 continue
             if len(item.entries) != 1:
                 self._faults.add(
-                    item.place,
+                    item.location,
                     f"one entry of states has the labels {', '.join(item.entries)}; each state needs its own '-', "
                     "and its options are indented below the label",
                 )
@@ -206,7 +207,7 @@ class TaskBuilder:
         return entries, labels
 
     def _child(
-        self, label: str, place: Place, body: Mapping, outer: ParamsScope, parent_type: str
+        self, label: str, location: SourceLocation, body: Mapping, outer: ParamsScope, parent_type: str
     ) -> tuple[ChildSpec | None, ChildLinks]:
         is_machine = "states" in body.entries or bool(self._headers.template_named(value_of(body, "source")))
         params = value_of(body, "params") if is_machine else body.entries.get("params")
@@ -220,19 +221,19 @@ class TaskBuilder:
             outcomes = None if spec is None else spec.outcomes
         else:
             body = self._state_builder.spelt(label, body)
-            spec, outcomes = self._state_builder.build(label, place, body, scope)
+            spec, outcomes = self._state_builder.build(label, location, body, scope)
         if spec is not None:
             userdata_checks.check_remapping(spec, body.entries.get("remapping"), self._faults)
         transitions: dict[str, Scalar] | None = {}
-        keys: dict[str, Place] = {}
+        keys: dict[str, SourceLocation] = {}
         node = body.entries.get("transitions")
         if node is not None:
             transitions = header_fields.name_map(node, f"state '{label}': transitions", self._faults)
             keys = node.keys if isinstance(node, Mapping) else {}
-        return spec, ChildLinks(label, outcomes, transitions, keys, place)
+        return spec, ChildLinks(label, outcomes, transitions, keys, location)
 
     def _provided_by(self) -> dict[str, str]:
-        """Return userdata key -> template that provides it."""
+        """Returns userdata key -> template that provides it."""
         found: dict[str, str] = {}
         for name in self._templates.names():
             template = self._templates.get(name)

@@ -19,7 +19,7 @@ class GraphError(Exception):
 
 
 def draw(task: TaskSpec) -> graphviz.Digraph:
-    """Return the drawing of a task.
+    """Returns the drawing of a task.
 
     A machine is a frame: solid for one state after the other, dashed for states that run at the same time. Its
     outcomes are the ovals in it, green for the first one and red for the last one.
@@ -32,10 +32,10 @@ def draw(task: TaskSpec) -> graphviz.Digraph:
 
 
 def write(task: TaskSpec, file: Path) -> None:
-    """Write the drawing of a task; the suffix of the file chooses the format.
+    """Writes the drawing of a task; the suffix of the file chooses the format.
 
     Raises:
-        GraphError: the suffix is none of ``FORMATS``, or Graphviz is not installed or fails.
+        GraphError: The suffix is none of ``FORMATS``, or Graphviz is not installed or fails.
     """
     kind = file.suffix.removeprefix(".").lower()
     if kind not in FORMATS:
@@ -78,7 +78,7 @@ def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: s
                 _machine(frame, child, inner, path)
             else:
                 frame.node(inner, _text(child.label), shape="box", style="rounded,filled", fillcolor="#eceff1",
-                           tooltip=f"{child.source.name}, {child.place}")
+                           tooltip=f"{child.source.name}, {child.location}")
         if parent is None:
             for child in machine.first_states():
                 _edge(frame, f"{path}|start", "", child, f"{path}/{child.label}")
@@ -112,12 +112,12 @@ def _concurrent_edges(graph: graphviz.Digraph, machine: MachineSpec, path: str) 
 
 
 def _leaving(child: ChildSpec, path: str, outcome: str) -> tuple[str, str]:
-    """Return the node an outcome of a child leaves from, and what its arrow says."""
+    """Returns the node an outcome of a child leaves from, and what its arrow says."""
     return (_outcome(path, outcome), "") if isinstance(child, MachineSpec) else (path, outcome)
 
 
 def _edge(graph: graphviz.Digraph, start: str, label: str, target: ChildSpec, path: str) -> None:
-    """Draw an arrow to a child; to a machine it ends at the frame."""
+    """Draws an arrow to a child; to a machine it ends at the frame."""
     first, frame = path, {"lhead": f"cluster_{path}"} if isinstance(target, MachineSpec) else {}
     while isinstance(target, MachineSpec):
         target = target.first_states()[0]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Union
 
-from modular_framework_core.files.faults import Place
+from modular_framework_core.files.faults import SourceLocation
 from modular_framework_core.files.located_yaml import Node
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.template_catalogue import TemplateSource
@@ -17,15 +17,15 @@ class StateSpec:
     """A state of a task.
 
     Attributes:
-        label: its name in its machine.
-        source: the file and class it is made of.
-        type: name of the class in the generated module.
-        options: keyword arguments of the class, as written in the task (outcomes and userdata keys included).
-        outcomes: what it may end with, first = positive, last = negative.
-        transitions: outcome -> label or outcome of the machine; empty inside a concurrent machine.
-        place: where it is defined.
-        remapping: userdata key of the state -> key of the machine it is in; keys not named are called the same.
-        nodes: the options as read, with the place of every value.
+        label: Its name in its machine.
+        source: The file and class it is made of.
+        type: Name of the class in the generated module.
+        options: Keyword arguments of the class, as written in the task (outcomes and userdata keys included).
+        outcomes: What it may end with, first = positive, last = negative.
+        transitions: Outcome -> label or outcome of the machine; empty inside a concurrent machine.
+        location: Where it is defined.
+        remapping: Userdata key of the state -> key of the machine it is in; keys not named are called the same.
+        nodes: The options as read, with the location of every value.
     """
 
     label: str
@@ -34,7 +34,7 @@ class StateSpec:
     options: dict[str, Any]
     outcomes: tuple[str, ...]
     transitions: dict[str, str]
-    place: Place
+    location: SourceLocation
     remapping: dict[str, str] = field(default_factory=dict)
     nodes: dict[str, Node] = field(default_factory=dict, repr=False)
 
@@ -44,21 +44,21 @@ class MachineSpec:
     """A state machine of a task: the root, or one nested in another.
 
     Attributes:
-        label: its name in the machine around it; for the root the name of the task.
-        template: the template it is written with.
-        type: name of its class in the generated module, unique there.
-        outcomes: what it may end with, first = positive, last = negative.
-        states: its children, in order.
-        transitions: outcome -> label or outcome of the machine around it; empty for the root and in a concurrence.
-        shares_userdata: whether it uses the userdata of the machine around it.
-        default_outcome: outcome of a concurrent machine when no entry of the outcome map is met; else None.
-        outcome_map: for a concurrent machine, outcome -> {label: outcome of that child}.
-        input_keys: userdata keys copied from the machine around it.
-        output_keys: userdata keys copied to the machine around it.
-        initial_state: label of the state it begins with; "" for the first one.
-        remapping: userdata key of the machine -> key of the machine around it; keys not named are called the same.
-        options: further header keys, for templates that use them.
-        place: where it is defined.
+        label: Its name in the machine around it; for the root the name of the task.
+        template: The template it is written with.
+        type: Name of its class in the generated module, unique there.
+        outcomes: What it may end with, first = positive, last = negative.
+        states: Its children, in order.
+        transitions: Outcome -> label or outcome of the machine around it; empty for the root and in a concurrence.
+        shares_userdata: Whether it uses the userdata of the machine around it.
+        default_outcome: Outcome of a concurrent machine when no entry of the outcome map is met; else None.
+        outcome_map: For a concurrent machine, outcome -> {label: outcome of that child}.
+        input_keys: Userdata keys copied from the machine around it.
+        output_keys: Userdata keys copied to the machine around it.
+        initial_state: Label of the state it begins with; "" for the first one.
+        remapping: Userdata key of the machine -> key of the machine around it; keys not named are called the same.
+        options: Further header keys, for templates that use them.
+        location: Where it is defined.
     """
 
     label: str
@@ -75,24 +75,24 @@ class MachineSpec:
     initial_state: str
     remapping: dict[str, str]
     options: dict[str, Any]
-    place: Place
+    location: SourceLocation
     is_machine: bool = field(default=True, init=False)
 
     def first_states(self) -> tuple[ChildSpec, ...]:
-        """Return the children it begins with: one, or all of a concurrent machine."""
+        """Returns the children it begins with: one, or all of a concurrent machine."""
         if self.template.concurrent:
             return self.states
         return tuple(child for child in self.states if child.label == self.initial_state) or self.states[:1]
 
     def machines(self) -> Iterator[MachineSpec]:
-        """Yield the machines nested in this one, innermost first, and this one last."""
+        """Yields the machines nested in this one, innermost first, and this one last."""
         for child in self.states:
             if isinstance(child, MachineSpec):
                 yield from child.machines()
         yield self
 
     def leaf_states(self) -> Iterator[StateSpec]:
-        """Yield the states of this machine and of all machines nested in it, in order."""
+        """Yields the states of this machine and of all machines nested in it, in order."""
         for child in self.states:
             if isinstance(child, MachineSpec):
                 yield from child.leaf_states()
@@ -108,10 +108,10 @@ class TaskSpec:
     """A whole task.
 
     Attributes:
-        name: name of the task and of the generated file, without ``.py``.
-        node_name: name of the ROS node that runs it on its own.
-        script: path of the YAML file it was read from.
-        root: the outermost machine.
+        name: Name of the task and of the generated file, without ``.py``.
+        node_name: Name of the ROS node that runs it on its own.
+        script: Path of the YAML file it was read from.
+        root: The outermost machine.
     """
 
     name: str

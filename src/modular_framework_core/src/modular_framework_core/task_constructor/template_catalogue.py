@@ -28,15 +28,15 @@ class TemplateSource:
     """A template file.
 
     Attributes:
-        name: file name without ``.template``: what ``source`` says in a task.
-        file: absolute path.
-        concurrent: whether it makes a ``smach.Concurrence``.
-        options: header keys of its own that it uses as ``options.<key>``.
-        takes_keys: whether its machines can have ``input_keys`` and ``output_keys``.
-        userdata: keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
+        name: File name without ``.template``: what ``source`` says in a task.
+        file: Absolute path.
+        concurrent: Whether it makes a ``smach.Concurrence``.
+        options: Header keys of its own that it uses as ``options.<key>``.
+        takes_keys: Whether its machines can have ``input_keys`` and ``output_keys``.
+        userdata: Keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
             None when it does not say.
-        doc: docstring of its class.
-        fault: why no machine can be written with it; "" for one that is in order.
+        doc: Docstring of its class.
+        fault: Why no machine can be written with it; "" for one that is in order.
     """
 
     name: str
@@ -53,10 +53,10 @@ class TemplateCatalogue:
     """The templates in one or several directories; the first directory that has a name wins."""
 
     def __init__(self, directories: Iterable[Path]) -> None:
-        """List and read the templates.
+        """Lists and reads the templates.
 
         Raises:
-            FileNotFoundError: a directory is not there.
+            FileNotFoundError: A directory is not there.
         """
         self.directories = tuple(directories)
         self._templates: dict[str, TemplateSource] = {}
@@ -69,11 +69,11 @@ class TemplateCatalogue:
                     self._templates[name] = _read_template(name, file.resolve())
 
     def names(self) -> list[str]:
-        """Return the names ``source`` may have, sorted."""
+        """Returns the names ``source`` may have, sorted."""
         return sorted(self._templates)
 
     def get(self, name: str) -> TemplateSource | None:
-        """Return a template, or None when there is none of this name."""
+        """Returns a template, or None when there is none of this name."""
         return self._templates.get(name)
 
 
@@ -89,12 +89,14 @@ def _read_template(name: str, file: Path) -> TemplateSource:
 
 
 def _original_names(text: str, file: Path) -> str:
-    """Say which names of the original framework a template reads, and what is written for them here."""
+    """Says which names of the original framework a template reads, and what is written for them here."""
     lines: dict[str, int] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         for name in _OLD_NAME.findall(line):
             lines.setdefault(name, number)
     if not lines:
         return ""
-    said = "; ".join(f"{file}:{number}: state_machine.{name} is now {_RENAMED[name]}" for name, number in lines.items())
-    return f"it is written for the original framework: {said}; 'Templates' in modular_framework_core's README shows one"
+    renamed = "; ".join(f"{file}:{number}: state_machine.{name} is now {_RENAMED[name]}"
+                        for name, number in lines.items())
+    return (f"it is written for the original framework: {renamed}; 'Templates' in modular_framework_core's README "
+            "shows one")

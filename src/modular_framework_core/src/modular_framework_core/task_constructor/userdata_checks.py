@@ -16,7 +16,7 @@ MISSPELT = 0.75
 
 
 def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> None:
-    """Check that a remapping gives names to keys that the state or machine has."""
+    """Checks that a remapping gives names to keys that the state or machine has."""
     if node is None:
         return
     what = f"state '{child.label}': remapping"
@@ -30,7 +30,7 @@ def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> N
 
 
 def _interface(child: ChildSpec) -> set[str] | None:
-    """Return the userdata keys that a state or machine exchanges; None when they are not known."""
+    """Returns the userdata keys that a state or machine exchanges; None when they are not known."""
     if isinstance(child, MachineSpec):
         return {*child.input_keys, *child.output_keys}
     found = [declared_keys(child, key) for key in ("input_keys", "output_keys", "io_keys")]
@@ -38,12 +38,12 @@ def _interface(child: ChildSpec) -> set[str] | None:
 
 
 def check_userdata(root: MachineSpec, provided_by: dict[str, str], faults: FaultList) -> None:
-    """Check that every userdata key a state needs is provided in its machine.
+    """Checks that every userdata key a state needs is provided in its machine.
 
     Args:
-        root: the outermost machine.
-        provided_by: key -> name of the template that provides it, over all templates known.
-        faults: where faults are noted.
+        root: The outermost machine.
+        provided_by: Key -> name of the template that provides it, over all templates known.
+        faults: Where faults are noted.
     """
     for machine in root.machines():
         if machine is root or not machine.shares_userdata:
@@ -76,7 +76,7 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
     for child, keys in needed:
         for key in dict.fromkeys(keys):
             if key not in available:
-                faults.add(child.place, _missing_key(machine, is_root, child, key, available, provided_by))
+                faults.add(child.location, _missing_key(machine, is_root, child, key, available, provided_by))
 
 
 def _missing_key(
@@ -95,7 +95,7 @@ def _missing_key(
 
 
 def _members(machine: MachineSpec) -> Iterable[StateSpec]:
-    """Yield the states that work on the userdata of this machine."""
+    """Yields the states that work on the userdata of this machine."""
     for child in machine.states:
         if isinstance(child, StateSpec):
             yield child
@@ -112,16 +112,16 @@ def _nested(machine: MachineSpec) -> Iterable[MachineSpec]:
 
 
 def _keys_around(state: StateSpec, key: str) -> tuple[str, ...] | None:
-    """Return the keys a state declares as the machine around it calls them; None when they are not known."""
+    """Returns the keys a state declares as the machine around it calls them; None when they are not known."""
     names = declared_keys(state, key)
     return None if names is None else tuple(state.remapping.get(name, name) for name in names)
 
 
 def declared_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
-    """Return the userdata keys a state declares, as written or by default; None when they are not known.
+    """Returns the userdata keys a state declares, as written or by default; None when they are not known.
 
     Args:
-        state: the state.
+        state: The state.
         key: input_keys, output_keys or io_keys.
     """
     given = None if key in state.source.own_keys else state.options.get(key)

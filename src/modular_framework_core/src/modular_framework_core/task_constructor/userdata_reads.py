@@ -15,8 +15,8 @@ class UserdataReads:
     """Keys that a class reads of what its methods call ``userdata``.
 
     Attributes:
-        anywhere: keys that are read somewhere, but for those that the class asks for by name (``"key" in userdata``).
-        always: keys that are read whenever ``execute`` runs from its start on: not below an ``if``, ``try``, loop or
+        anywhere: Keys that are read somewhere, but for those that the class asks for by name (``"key" in userdata``).
+        always: Keys that are read whenever ``execute`` runs from its start on: not below an ``if``, ``try``, loop or
             function, and in no class that asks first which keys there are.
     """
 
@@ -25,7 +25,7 @@ class UserdataReads:
 
 
 def reads_of(node: ast.ClassDef) -> UserdataReads:
-    """Return what a class reads of userdata."""
+    """Returns what a class reads of userdata."""
     anywhere = frozenset(_keys(node)) - frozenset(_asked_for(node))
     execute = next((item for item in node.body if isinstance(item, ast.FunctionDef) and item.name == "execute"), None)
     if execute is None or any(_asks(item) for item in ast.walk(node)):
@@ -51,13 +51,13 @@ def _keys(node: ast.AST) -> Iterator[str]:
 
 
 def _written(node: ast.AST) -> set[str]:
-    """Return the keys a function writes: what it reads of them may be its own."""
+    """Returns the keys a function writes: what it reads of them may be its own."""
     return {item.attr for item in ast.walk(node) if isinstance(item, ast.Attribute) and isinstance(item.ctx, ast.Store)
             and isinstance(item.value, ast.Name) and item.value.id == "userdata"}
 
 
 def _asked_for(node: ast.AST) -> Iterator[str]:
-    """Yield the keys of which a class asks by name whether they are there."""
+    """Yields the keys of which a class asks by name whether they are there."""
     for item in ast.walk(node):
         match item:
             case ast.Compare(left=ast.Constant(value=str(key))) if any(_asks(part) for part in ast.walk(item)):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Records what the states of a running task do: when each started and ended, with which outcome, and why.
 
-The recorder looks at any smach state, so a user's own states are recorded like the framework's.
+The recorder observes any smach state, so a user's own states are recorded like the framework's.
 """
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class StateRecord:
     """One execution of one state.
 
     Attributes:
-        path: labels from the root to the state, joined by "/".
-        started_s: when it started [s since the task started].
-        ended_s: when it ended [s since the task started]; None while it runs.
-        outcome: what it returned; None while it runs, or when it raised.
-        failed: whether it ended with its negative (last) outcome, gave a reason, or raised.
-        reason: why, in words of the state; "" when it gave none.
+        path: Labels from the root to the state, joined by "/".
+        started_s: When it started [s since the task started].
+        ended_s: When it ended [s since the task started]; None while it runs.
+        outcome: What it returned; None while it runs, or when it raised.
+        failed: Whether it ended with its negative (last) outcome, gave a reason, or raised.
+        reason: Why, in words of the state; "" when it gave none.
     """
 
     path: str
@@ -44,9 +44,9 @@ class RunningState:
     """A state that runs now.
 
     Attributes:
-        path: labels from the root to the state, joined by "/".
-        elapsed_s: for how long it has been running [s].
-        feedback: what it says it is doing; "" when it says nothing.
+        path: Labels from the root to the state, joined by "/".
+        elapsed_s: For how long it has been running [s].
+        feedback: What the state reports that it is doing; "" without a report.
     """
 
     path: str
@@ -59,11 +59,11 @@ class FailureSummary:
     """All executions of one state that failed.
 
     Attributes:
-        path: labels from the root to the state.
-        failures: how often it failed.
-        executions: how often it ran.
-        last_reason: why it failed the last time.
-        different_reasons: how many different reasons it gave.
+        path: Labels from the root to the state.
+        failures: How often it failed.
+        executions: How often it ran.
+        last_reason: Why it failed the last time.
+        different_reasons: How many different reasons it gave.
     """
 
     path: str
@@ -87,26 +87,26 @@ class TaskRecorder:
     """Keeps the records of one run of one task; safe to use from several threads."""
 
     def __init__(self, listener: Listener | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        """Start the task's clock.
+        """Starts the task's clock.
 
         Args:
-            listener: told about each start and end of a state that has no children.
-            clock: returns the time [s].
+            listener: Notified of each start and end of a state that has no children.
+            clock: Returns the time [s].
         """
         self._listener = listener
         self._clock = clock
         self._zero = clock()
         self._lock = threading.Lock()
-        self._tell_lock = threading.Lock()
+        self._notify_lock = threading.Lock()
         self._records: list[StateRecord] = []
         self._active: dict[int, tuple[str, smach.State]] = {}
 
     def elapsed_s(self) -> float:
-        """Return the time since the task started [s]."""
+        """Returns the time since the task started [s]."""
         return self._clock() - self._zero
 
     def attach(self, machine: smach.Container) -> None:
-        """Record every state in a machine and in the machines nested in it from now on."""
+        """Records every state in a machine and in the machines nested in it from now on."""
         for label, child in machine.get_children().items():
             self._attach_state(child, label)
 
@@ -140,7 +140,7 @@ class TaskRecorder:
             number = len(self._records)
             self._records.append(StateRecord(path, self.elapsed_s()))
             self._active[number] = path, state
-        self._tell(number)
+        self._notify(number)
         return number
 
     def _end(self, number: int, outcome: str | None, failed: bool, reason: str) -> None:
@@ -151,35 +151,35 @@ class TaskRecorder:
             self._records[number] = replace(
                 self._records[number], ended_s=self.elapsed_s(), outcome=outcome, failed=failed, reason=reason
             )
-        self._tell(number)
+        self._notify(number)
 
-    def _tell(self, number: int) -> None:
+    def _notify(self, number: int) -> None:
         if self._listener is None:
             return
-        with self._tell_lock:  # so that what is told last is what holds now
+        with self._notify_lock:  # so that the last notification is the current state
             with self._lock:
                 record, active = self._records[number], tuple(path for path, _ in self._active.values())
             self._listener(record, active)
 
     def records(self) -> tuple[StateRecord, ...]:
-        """Return all records, in the order the states started."""
+        """Returns all records, in the order the states started."""
         with self._lock:
             return tuple(self._records)
 
     def active(self) -> tuple[str, ...]:
-        """Return the paths of the states that run now."""
+        """Returns the paths of the states that run now."""
         with self._lock:
             return tuple(path for path, _ in self._active.values())
 
     def running(self) -> tuple[RunningState, ...]:
-        """Return what the states that run now say about themselves."""
+        """Returns what the states that run now say about themselves."""
         now = self.elapsed_s()
         with self._lock:
             return tuple(RunningState(path, now - self._records[number].started_s, str(getattr(state, "feedback", "")))
                          for number, (path, state) in self._active.items())
 
     def failures(self) -> tuple[FailureSummary, ...]:
-        """Return one summary for each state that failed, in the order they failed first."""
+        """Returns one summary for each state that failed, in the order they failed first."""
         records = self.records()
         paths = dict.fromkeys(record.path for record in records if record.failed)
         summaries = []
@@ -193,19 +193,19 @@ class TaskRecorder:
 def write_record(
     folder: Path, task: str, begun: float, outcome: str, succeeded: bool, error: str, records: tuple[StateRecord, ...]
 ) -> Path:
-    """Write the record of one run as JSON, for tools that compare runs.
+    """Writes the record of one run as JSON, for tools that compare runs.
 
     The file has ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``: for each
     execution of a state the fields of ``StateRecord``, times in seconds since the task started.
 
     Args:
-        folder: where to write; made when it is not there.
-        task: name of the task.
-        begun: when the task started [s since 1970].
-        outcome: outcome of the task.
-        succeeded: whether that is its success outcome.
-        error: what went wrong outside of the states' own reasons; "" when nothing did.
-        records: what the states did.
+        folder: Where to write; made when it is not there.
+        task: Name of the task.
+        begun: When the task started [s since 1970].
+        outcome: Outcome of the task.
+        succeeded: Whether that is its success outcome.
+        error: What went wrong outside of the states' own reasons; "" when nothing did.
+        records: What the states did.
 
     Returns:
         The path of the file: ``<task>_<date>_<time>_<process>.json``.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fills the userdata of a framework state machine: what the framework's states expect to find there.
+"""Fills the userdata of a framework state machine with what the framework's states expect.
 
 Keys: ``selected_grasp``, ``selected_joint_state``, ``selected_trajectory``, ``selected_pose``, ``selected_plan`` (None
 until a state selects something), ``arm_commander`` (ArmCommander), ``manipulator_controller_client``
@@ -40,10 +40,10 @@ class UserdataError(RuntimeError):
 
 
 def initialise_userdata(userdata: Any) -> None:
-    """Put the framework's keys into a userdata.
+    """Puts the framework's keys into a userdata.
 
     Raises:
-        UserdataParameterError: parameters are missing or wrong; names all of them and their files.
+        UserdataParameterError: Parameters are missing or wrong; names all of them and their files.
         UserdataError, CallError, CommanderError: move_group or a manager is missing or refused.
     """
     parameters = read_parameters(lambda name: rospy.get_param(f"/{name}", None))
@@ -60,14 +60,14 @@ def initialise_userdata(userdata: Any) -> None:
 
 
 def initialise_acm(manipulator_prefix: str) -> None:
-    """Hand move_group's allowed collision matrix to the ACM manager and note which links are the manipulator's.
+    """Sends move_group's allowed collision matrix to the ACM manager and sets which links are the manipulator's.
 
     Args:
-        manipulator_prefix: text in the name of every link of the manipulator; "" = there is no manipulator.
+        manipulator_prefix: Text in the name of every link of the manipulator; "" = there is no manipulator.
 
     Raises:
-        UserdataError: no link has that text in its name, or the ACM manager refused the matrix.
-        CallError: a service is missing or did not answer.
+        UserdataError: No link has that text in its name, or the ACM manager refused the matrix.
+        CallError: A service is missing or did not answer.
     """
     get_scene = rospy.ServiceProxy("/get_planning_scene", GetPlanningScene)
     set_acm = rospy.ServiceProxy("set_init_acm", SetInitACM)
@@ -91,7 +91,7 @@ def initialise_acm(manipulator_prefix: str) -> None:
 
 
 def make_arm_commander(parameters: UserdataParameters) -> ArmCommander:
-    """Return a connected commander for the planning group of the parameters, with their planner settings."""
+    """Returns a connected commander for the planning group of the parameters, with their planner settings."""
     commander = ArmCommander(name=parameters.arm_group_name, set_ground=False)
     commander.set_max_velocity_scaling_factor(parameters.robot_speed_factor)
     commander.set_planner_id(parameters.planner_name)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shows the state machine of a running task to viewers, without the task ever waiting for it or failing because of it.
 
-Publishers: ``<node>/smach/container_structure``, ``<node>/smach/container_status`` (smach_msgs). Viewers can look, but
+Publishers: ``<node>/smach/container_structure``, ``<node>/smach/container_status`` (smach_msgs). Viewers can watch, but
 not change the task: there is no subscriber.
 """
 from __future__ import annotations
@@ -18,17 +18,17 @@ START_DELAY_S = 0.3
 
 
 def shown(name: str, factory: Callable[[], smach.Container]) -> Callable[[], smach.Container]:
-    """Return a function that makes the same machine and has it shown.
+    """Returns a function that makes the same machine and has it shown.
 
     To be called before the run begins: the import puts rospy's shutdown check in smach, and the run puts its own there.
 
     Args:
-        name: name of the task: the root of the paths shown.
-        factory: makes the state machine.
+        name: Name of the task: the root of the paths shown.
+        factory: Makes the state machine.
     """
     try:
         import smach_ros  # noqa: F401 - connects smach to rospy, therefore not wherever this module is imported
-    except Exception as error:  # a task runs as well unseen
+    except Exception as error:  # a task runs without viewers too
         rospy.logwarn(f"the task is not shown to viewers: {error}")
         return factory
 
@@ -52,6 +52,6 @@ def _show(machine: smach.Container, name: str) -> None:
     try:
         path = "/" + name.replace("/", "_")
         IntrospectionServer(rospy.get_name(), machine, path, accept_commands=False).start()
-    except Exception as error:  # a task runs as well unseen
+    except Exception as error:  # a task runs without viewers too
         if not rospy.is_shutdown():
             rospy.logwarn(f"the task is not shown to viewers: {type(error).__name__}: {error}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node that runs a task: makes its state machine, runs it, tells what it does, and exits as the task ended.
+"""The node that runs a task: makes its state machine, runs it, publishes what it does, and exits with its result.
 
 Node ``run_task``. Arguments: optionally the path of a task script (``.yaml``) or of a state machine (``.py``).
 Parameters (used where there is no argument):
@@ -11,12 +11,12 @@ Parameters (used where there is no argument):
         framework's own are found after them.
     ``~config_directory``: folder whose files have the names of messages a task may use; empty: these are not checked.
     ``/robot_description_semantic``: has the postures and planning groups it may use.
-    ``/run_id``: written by roslaunch; tells when the launch began.
+    ``/run_id``: written by roslaunch; holds the time at which the launch began.
     ``~record_directory``: where the record of the run is written (default:
         ``$ROS_HOME/modular_framework/task_records``).
 Services: ``~stop`` (std_srvs/Trigger) stops the task as SIGINT does, and answers when the request has been passed on.
 Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched: at every start
-    and end of a state, and twice a second while states run), for viewers those of ``ros_task_introspection``.
+    and end of a state, and twice a second while states run), for viewers those of ``ros_introspection``.
 Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
 """
 from __future__ import annotations
@@ -65,7 +65,7 @@ class TaskNotRun(Exception):
 
 
 def launch_time() -> float:
-    """Return when the launch began [s since 1970]: the time in roslaunch's run id, else the start of this process."""
+    """Returns when the launch began [s since 1970]: the time in roslaunch's run id, else the start of this process."""
     try:
         run_id = uuid.UUID(str(rospy.get_param("/run_id")))
     except (KeyError, ValueError):
@@ -74,10 +74,10 @@ def launch_time() -> float:
 
 
 class TaskReporter:
-    """Tells other nodes and the log what the task does."""
+    """Reports to other nodes and the log what the task does."""
 
     def __init__(self, name: str) -> None:
-        """Advertise the topics."""
+        """Advertises the topics."""
         self._name = name
         self._lock = threading.Lock()
         self._first_seen = False
@@ -86,7 +86,7 @@ class TaskReporter:
         self._outcome = rospy.Publisher("task_outcome", String, queue_size=1, latch=True)
 
     def on_state(self, record: StateRecord, active: tuple[str, ...]) -> None:
-        """Publish the start or end of a state; log the first start."""
+        """Publishes the start or end of a state; logs the first start."""
         with self._lock:
             first, self._first_seen = not self._first_seen, True
         if first:
@@ -110,7 +110,7 @@ class TaskReporter:
             rospy.loginfo(f"state {record.path} ended with '{record.outcome}'")
 
     def on_running(self, states: tuple[RunningState, ...]) -> None:
-        """Publish for how long the states that run now have been running, and what they say they are doing."""
+        """Publishes for how long the states that run now have been running, and what they say they are doing."""
         if not states:
             return
         self._publish(
@@ -129,7 +129,7 @@ class TaskReporter:
         self._status.publish(String(json.dumps(status)))
 
     def on_end(self, result: TaskResult) -> None:
-        """Publish and print how the task ended."""
+        """Publishes and prints how the task ended."""
         self._outcome.publish(String(result.outcome))
         self._publish(
             {
@@ -151,11 +151,11 @@ class TaskReporter:
 
 
 def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:
-    """Run a task to its end, or until SIGINT, SIGTERM or the shutdown of ROS; return the exit code.
+    """Runs a task to its end, or until SIGINT, SIGTERM or the shutdown of ROS; returns the exit code.
 
     Args:
-        name: name of the task.
-        factory: makes its state machine; called in the task's thread.
+        name: Name of the task.
+        factory: Makes its state machine; called in the task's thread.
     """
     asked_by: list[str] = []
     previous = {
@@ -195,14 +195,14 @@ def _keep_record(name: str, begun: float, result: TaskResult, recorder: TaskReco
     rospy.loginfo(f"record of the run: {path}")
 
 
-def _wait(run: TaskRun, asked_by: list[str], tell: Callable[[], None]) -> None:
-    """Wait for the end of a run; pass a request to stop on to it, and give up a little later."""
+def _wait(run: TaskRun, asked_by: list[str], report_status: Callable[[], None]) -> None:
+    """Waits for the end of a run; passes a request to stop on to it, and gives up a little later."""
     give_up: float | None = None
     next_status = time.monotonic() + STATUS_PERIOD_S
     while not run.wait(0.02):
         if time.monotonic() > next_status:
             next_status = time.monotonic() + STATUS_PERIOD_S
-            tell()
+            report_status()
         if give_up is None and (asked_by or rospy.is_shutdown()):
             run.request_stop(asked_by[0] if asked_by else "the shutdown of ROS")
             give_up = time.monotonic() + STOP_GRACE_S
@@ -223,7 +223,7 @@ def _finish(exit_code: int) -> int:
 
 
 def run_as_node(node_name: str, task_name: str, factory: Callable[[], smach.Container]) -> int:
-    """Run one state machine as a ROS node: the main block of generated modules; return the exit code."""
+    """Runs one state machine as a ROS node: the main block of generated modules; returns the exit code."""
     _start_node(node_name)
     return _finish(run_machine(task_name, factory))
 
@@ -240,13 +240,13 @@ def main() -> int:
 
 
 def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
-    """Find out what is to be run, from the arguments or the parameters.
+    """Finds out what is to be run, from the arguments or the parameters.
 
     Returns:
         The name of the task, and the function that makes its state machine.
 
     Raises:
-        TaskNotRun: there is nothing to run, or it is faulty.
+        TaskNotRun: There is nothing to run, or it is faulty.
     """
     given = Path(arguments[0]) if arguments else None
     machine = str(rospy.get_param("~state_machine_to_load", "") or "").strip() if given is None else ""
@@ -291,7 +291,7 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
 
 
 def _known_names() -> KnownNames:
-    """Return the names that the configuration files of the launch and the robot have."""
+    """Returns the names that the configuration files of the launch and the robot have."""
     config = str(rospy.get_param("~config_directory", "") or "")
     names = names_of_config(Path(config)) if config else KnownNames()
     srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
@@ -299,6 +299,6 @@ def _known_names() -> KnownNames:
 
 
 def _directories(parameter: str) -> list[Path]:
-    """Return the directories of a parameter."""
+    """Returns the directories of a parameter."""
     value = rospy.get_param(f"~{parameter}", "")
     return [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the state machine of a task in a thread, stops it when asked, and says how it ended."""
+"""Runs the state machine of a task in a thread, stops it when asked, and reports how it ended."""
 from __future__ import annotations
 
 import threading
@@ -25,12 +25,12 @@ class TaskResult:
     """How a task ended.
 
     Attributes:
-        name: name of the task.
-        outcome: outcome of its machine; "preempted" when it was stopped, "error" when a state raised, "not run" when
+        name: Name of the task.
+        outcome: Outcome of its machine; "preempted" when it was stopped, "error" when a state raised, "not run" when
             its machine could not be made.
         exit_code: 0 for the success outcome, 1 for any other, 2 when the task could not be run.
-        failures: the states that failed, in order.
-        error: what went wrong outside of the states' own reasons; "" when nothing did.
+        failures: The states that failed, in order.
+        error: What went wrong outside of the states' own reasons; "" when nothing did.
     """
 
     name: str
@@ -45,16 +45,16 @@ class TaskResult:
         return self.exit_code == EXIT_SUCCEEDED
 
     def lines(self) -> list[str]:
-        """Return what a user is told: the reasons when it did not succeed, and the outcome in the last line."""
-        told: list[str] = []
+        """Returns the report for the user: the reasons when it did not succeed, and the outcome in the last line."""
+        lines: list[str] = []
         if not self.succeeded:
             if self.failures:
-                told.append(f"Task '{self.name}': states that failed, in order:")
-                told += [f"  {failure}" for failure in self.failures]
+                lines.append(f"Task '{self.name}': states that failed, in order:")
+                lines += [f"  {failure}" for failure in self.failures]
             if self.error:
-                told.append(f"Task '{self.name}': {self.error}")
+                lines.append(f"Task '{self.name}': {self.error}")
         verdict = "SUCCEEDED" if self.succeeded else "FAILED"
-        return [*told, f"Task '{self.name}' ended with outcome '{self.outcome}': {verdict}"]
+        return [*lines, f"Task '{self.name}' ended with outcome '{self.outcome}': {verdict}"]
 
 
 class TaskRun:
@@ -64,9 +64,9 @@ class TaskRun:
         """Prepare a run.
 
         Args:
-            name: name of the task.
-            factory: makes the state machine.
-            recorder: records its states.
+            name: Name of the task.
+            factory: Makes the state machine.
+            recorder: Records its states.
         """
         self._name = name
         self._factory = factory
@@ -79,15 +79,15 @@ class TaskRun:
         self._thread = threading.Thread(target=self._run, name=f"task-{name}", daemon=True)
 
     def start(self) -> None:
-        """Start the thread. From here on ``smach`` is told to shut down when the run is asked to stop."""
+        """Starts the thread. From here on ``smach`` shuts down when the run is asked to stop."""
         smach.set_shutdown_check(self._stop.is_set)
         self._thread.start()
 
     def request_stop(self, cause: str) -> None:
-        """Ask the running states to stop; no state is started after this. Further requests change nothing.
+        """Asks the running states to stop; no state is started after this. Further requests change nothing.
 
         Args:
-            cause: who asked, for the result: "SIGINT", say.
+            cause: Who asked, for the result: "SIGINT", say.
         """
         with self._lock:
             if self._stop.is_set():
@@ -99,12 +99,12 @@ class TaskRun:
             machine.request_preempt()
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait for the end of the run; return whether it has ended."""
+        """Waits for the end of the run; returns whether it has ended."""
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
     def result(self) -> TaskResult:
-        """Return how the run ended, or, if it has not, that it was given up while it did not stop."""
+        """Returns how the run ended, or, if it has not, that it was given up while it did not stop."""
         if self._result is not None:
             return self._result
         active = ", ".join(self._recorder.active()) or "the construction of the state machine"
@@ -149,7 +149,7 @@ class TaskRun:
 
 
 def _where_defined(error: Exception) -> str:
-    """Return the place in the task of the state whose constructor raised, and ": "; nothing where it is not known."""
+    """Returns the place in the task of the state whose constructor raised, and ": "; nothing where it is not known."""
     lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__)]
     places = [line.partition(PLACE_MARK)[2] for line in lines if PLACE_MARK in line]
     return f"{places[-1]}: " if places else ""

@@ -19,14 +19,14 @@ class UserdataParameters:
     """What the arm commander and the manipulator's client are made from.
 
     Attributes:
-        planner_name: planner to ask move_group for.
-        robot_speed_factor: share of the joint velocity limits, in (0, 1].
-        arm_group_name: planning group of the arm.
-        number_plan_attempt: plans made for each request; the shortest is kept.
-        planning_max_time: longest time for a plan [s].
-        manipulator_prefix: text in the name of every link of the manipulator; "" = no manipulator.
-        manipulator_action: name of the manipulator's Grasp action; "" without manipulator.
-        max_torque: what a torque intensity of 1 stands for; None without manipulator.
+        planner_name: Planner to ask move_group for.
+        robot_speed_factor: Share of the joint velocity limits, in (0, 1].
+        arm_group_name: Planning group of the arm.
+        number_plan_attempt: Plans made for each request; the shortest is kept.
+        planning_max_time: Longest time for a plan [s].
+        manipulator_prefix: Text in the name of every link of the manipulator; "" = no manipulator.
+        manipulator_action: Name of the manipulator's Grasp action; "" without manipulator.
+        max_torque: What a torque intensity of 1 stands for; None without manipulator.
     """
 
     planner_name: str
@@ -40,13 +40,13 @@ class UserdataParameters:
 
 
 def read_parameters(get: Callable[[str], Any]) -> UserdataParameters:
-    """Read and check all parameters.
+    """Reads and checks all parameters.
 
     Args:
-        get: returns the value of a global parameter, None when it is not set.
+        get: Returns the value of a global parameter, None when it is not set.
 
     Raises:
-        UserdataParameterError: lists every parameter that is missing or wrong, with its config file.
+        UserdataParameterError: Lists every parameter that is missing or wrong, with its config file.
     """
     faults: list[str] = []
 
@@ -78,5 +78,5 @@ def read_parameters(get: Callable[[str], Any]) -> UserdataParameters:
 
 
 def manipulator_links(link_names: list[str], prefix: str) -> list[int]:
-    """Return the indices of the links whose name contains a text; none for an empty text."""
+    """Returns the indices of the links whose name contains a text; none for an empty text."""
     return [index for index, name in enumerate(link_names) if prefix and prefix in name]

@@ -28,7 +28,7 @@ class AllowManipulatorCollisions(FrameworkState):
 
     Args:
         allow: True allows, False restores what the robot's description says.
-        collision_type: self-collision, object-collision, or nothing to apply the matrix as it stands.
+        collision_type: Self-collision, object-collision, or nothing to apply the matrix as it stands.
         objects: Names of the objects; none means all that are known: those that were added and, in simulation, every
             object that is free to move. ``userdata`` takes the object of ``selected_grasp``.
         links: Names of links of the robot, instead of those of the manipulator.

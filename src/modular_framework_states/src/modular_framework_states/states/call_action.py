@@ -79,8 +79,8 @@ class CallAction(FrameworkState):
 
     def _end(self, name: str, client: Any, status: int, expected: Mapping[str, Any], userdata: Any) -> str:
         """Returns the outcome of a goal that has ended."""
-        result, said = client.get_result(), client.get_goal_status_text() or "it gave no reason"
-        what = f"action '{name}' ended as {GoalStatus.to_string(status)}: {said}"
+        result, reason_given = client.get_result(), client.get_goal_status_text() or "it gave no reason"
+        what = f"action '{name}' ended as {GoalStatus.to_string(status)}: {reason_given}"
         aborted = status == GoalStatus.ABORTED and self._rules.outcome_field
         if result is None or (status != GoalStatus.SUCCEEDED and not aborted):
             return self.fail(what)
@@ -89,7 +89,7 @@ class CallAction(FrameworkState):
         wrong = difference(result, expected)
         if wrong:
             return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}, but {wrong}")
-        return end_with(self, self._rules, result, userdata, what, said, aborted=bool(aborted))
+        return end_with(self, self._rules, result, userdata, what, reason_given, aborted=bool(aborted))
 
     def _type_of(self, name: str) -> Any:
         found: list[str] = []

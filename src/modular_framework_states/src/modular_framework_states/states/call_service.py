@@ -53,7 +53,7 @@ class CallService(FrameworkState):
         self._rules.check("CallService", self.outcomes, self.get_registered_output_keys())
 
     def execute(self, userdata: Any) -> str:
-        """Calls the service and looks at the answer."""
+        """Calls the service and checks the answer."""
         name = rospy.resolve_name(self._name)
         try:
             if not wait_until(lambda: rosservice.get_service_type(name) is not None or self.preempt_requested(),
@@ -72,14 +72,14 @@ class CallService(FrameworkState):
             userdata[ANSWER] = answer
         for field in () if self._rules.outcome_field else ("success", "ok"):
             if getattr(answer, field, True) is False:
-                return self.fail(f"service '{name}' answered {field}: false: {_said(answer)}")
+                return self.fail(f"service '{name}' answered {field}: false: {_reason_in(answer)}")
         wrong = difference(answer, expected)
         if wrong:
             return self.fail(f"service '{name}' answered, but {wrong}")
-        return end_with(self, self._rules, answer, userdata, f"service '{name}'", _said(answer))
+        return end_with(self, self._rules, answer, userdata, f"service '{name}'", _reason_in(answer))
 
 
-def _said(answer: Any) -> str:
+def _reason_in(answer: Any) -> str:
     """Returns the reason an answer gives in its fields."""
     return next((str(getattr(answer, text)) for text in ("message", "status_message") if getattr(answer, text, "")),
                 "it gave no reason")

@@ -26,7 +26,7 @@ class CartesianMove(FrameworkState):
 
     Args:
         pose_name: Name of a pose in the pose manager; empty with an offset.
-        offset: x, y, z to move by [m], instead of a pose; the orientation stays.
+        offset: X, y, z to move by [m], instead of a pose; the orientation stays.
         offset_in_tip: True gives the offset in the frame of the tip link, False in the planning frame.
         max_step: Longest step along the line [m].
         min_fraction: Share of the line that must be free; anything less is not moved at all.

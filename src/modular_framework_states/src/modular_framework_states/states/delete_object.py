@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task take an object out of the simulation."""
+"""Lets a task remove an object from the simulation."""
 from __future__ import annotations
 
 from collections.abc import Sequence

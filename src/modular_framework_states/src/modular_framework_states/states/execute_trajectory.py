@@ -48,7 +48,7 @@ class ExecuteTrajectory(FrameworkState):
         self._name, self._step, self._goal_tolerance = trajectory_name, float(step), float(goal_tolerance)
 
     def execute(self, userdata: Any) -> str:
-        """Checks the way and runs the trajectory."""
+        """Checks the path and runs the trajectory."""
         commander = userdata.arm_commander
         what = f"trajectory '{self._name or 'selected'}'"
         try:
@@ -72,7 +72,7 @@ class ExecuteTrajectory(FrameworkState):
         return userdata.selected_trajectory
 
     def _first_contact(self, commander: Any, trajectory: JointTrajectory) -> str:
-        """Says where the first collision on the way is; nothing when the way is free."""
+        """Describes the first collision on the path; empty when the path is free."""
         proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
         wait_for_service(proxy, TIMEOUT_S)
         for number, positions in samples(trajectory, self._step):
@@ -108,7 +108,7 @@ def from_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> J
 
 
 def too_fast(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
-    """Says which straight piece asks a joint for more than its greatest velocity; nothing when none does.
+    """Describes the first segment that exceeds a joint's velocity limit; empty when none does.
 
     Args:
         trajectory: Points at increasing times.

@@ -15,7 +15,7 @@ class Grasp(FrameworkState):
     """Sends one stage of a grasp to the manipulator; positive only when the server says that stage was reached.
 
     Args:
-        grasp_type: pregrasp, grasp or postgrasp.
+        grasp_type: Pregrasp, grasp or postgrasp.
         grasp_name: Name of the grasp; empty takes the oldest anonymous one. Userdata ``selected_grasp`` is taken
             instead when it is an input key.
         timeout: Longest wait for the end of the motion [s].

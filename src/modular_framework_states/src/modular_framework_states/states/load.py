@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that brings back what a manager once held."""
+"""Lets a task load the messages of a manager from a file."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Load(FrameworkState):
         self._kind, self._path = kind, str(path)
 
     def execute(self, userdata: Any) -> str:
-        """Asks the manager."""
+        """Loads the file into the manager."""
         try:
             file_request("load", self._kind, self._path)
         except ManagerError as error:

@@ -29,7 +29,7 @@ class Plan(FrameworkState):
     fingers of the pregrasp posture.
 
     Args:
-        target_state_type: pose, joint_state, grasp, pregrasp or postgrasp.
+        target_state_type: Pose, joint_state, grasp, pregrasp or postgrasp.
         target_state_name: Name of the message; ``userdata`` takes ``selected_<type>``; empty the oldest anonymous one.
         plan_name: Name to store the plan under; empty stores it anonymously.
         starting_state_type: As the target's; empty starts from where the arm is.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task begin again with what the configuration says."""
+"""Lets a task reset the managers to the configuration."""
 from __future__ import annotations
 
 from collections.abc import Sequence

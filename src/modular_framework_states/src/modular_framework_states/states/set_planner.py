@@ -38,7 +38,7 @@ class SetPlanner(FrameworkState):
                           "set_max_velocity_scaling_factor": speed_factor}
 
     def execute(self, userdata: Any) -> str:
-        """Sets what was given, after a look whether there is such a planner."""
+        """Sets what was given, if there is such a planner."""
         try:
             commander = userdata.arm_commander.of_group(self._group)
             if self._planner_id:

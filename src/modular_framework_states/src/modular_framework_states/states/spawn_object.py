@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task bring an object into the simulation."""
+"""Lets a task add an object to the simulation."""
 from __future__ import annotations
 
 from collections.abc import Sequence

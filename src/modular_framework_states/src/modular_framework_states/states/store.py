@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that keeps what a manager holds."""
+"""Lets a task save the messages of a manager to a file."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Store(FrameworkState):
         self._kind, self._path = kind, str(path)
 
     def execute(self, userdata: Any) -> str:
-        """Asks the manager."""
+        """Saves the messages of the manager."""
         try:
             file_request("save", self._kind, self._path)
         except ManagerError as error:

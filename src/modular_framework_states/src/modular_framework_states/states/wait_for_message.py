@@ -18,7 +18,7 @@ FOUND = "message"
 
 
 class WaitForMessage(FrameworkState):
-    """Waits for a message that is published after the state begins (or was latched), and may look at its fields.
+    """Waits for a message that is published after the state begins (or was latched), and may check its fields.
 
     Args:
         topic_name: Topic.

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says when waiting has been long enough, by a clock that a loaded machine slows down together with the world."""
+"""A limit on waiting, by a clock that a loaded machine slows down together with the simulated world."""
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 
 @dataclass(slots=True)
-class Patience:
+class WaitLimit:
     """Counts the time of the ROS clock since it was first asked.
 
     Attributes:
@@ -15,7 +15,7 @@ class Patience:
 
     since_s: float | None = None
 
-    def is_used_up(self, now_s: float, limit_s: float) -> bool:
+    def is_exceeded(self, now_s: float, limit_s: float) -> bool:
         """Returns whether the wait has lasted longer than allowed.
 
         Args:
