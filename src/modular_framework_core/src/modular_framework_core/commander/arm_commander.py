@@ -5,10 +5,8 @@ Every call carries its own start state and target; nothing is remembered between
 """
 from __future__ import annotations
 
-import json
 import threading
 import uuid
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 
 import rospy
@@ -32,7 +30,6 @@ from moveit_msgs.srv import (
     QueryPlannerInterfacesRequest,
 )
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 from modular_framework_core.commander.moveit_requests import (
     StartState,
@@ -45,6 +42,8 @@ from modular_framework_core.commander.moveit_requests import (
 )
 from modular_framework_core.commander.results import ExecutionResult, IkResult, PlanResult
 from modular_framework_core.commander.robot_groups import Group, RobotModelError, read_group
+from modular_framework_core.commander.ros_joint_monitor import JointMonitor
+from modular_framework_core.commander.ros_planning_reports import PlanningReports
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import (
     CallError,
@@ -59,11 +58,7 @@ from modular_framework_ros.stop_requests import stop_requested
 
 EXECUTE_ACTION = "execute_trajectory"
 PLANNERS_SERVICE = "query_planner_interface"
-REPORT_TOPIC = "move_group/planning_report"
-REPORT_WAIT_S = 2.0  # for the reason of a move_group that reports reasons, on a busy machine
-REPORTER_WAIT_S = 0.3  # where nobody is known to report them
 CLOCK_WAIT_S = 0.3
-REPORTS_KEPT = 64
 SERVICE_TIMEOUT_S = 10.0
 IK_TIMEOUT_S = 1.0
 
@@ -76,7 +71,7 @@ class ArmCommander:
     """Client of move_group for one planning group; safe to use from several threads.
 
     Parameters read: ``robot_description``, ``robot_description_semantic``.
-    Subscribers: ``joint_states`` (sensor_msgs/JointState), ``move_group/planning_report`` (std_msgs/String, JSON).
+    Subscribers: those of :class:`JointMonitor` and :class:`PlanningReports`.
     Services called: ``plan_kinematic_path``, ``compute_ik``, ``check_state_validity``. Action: ``execute_trajectory``.
 
     Args:
@@ -99,9 +94,8 @@ class ArmCommander:
         self._execute_lock = threading.Lock()
         self._stop_event = threading.Event()
         self._group: Group | None = None
-        self._joints_lock = threading.Lock()
-        self._positions: dict[str, float] = {}
-        self._reports: OrderedDict[str, dict[str, object]] = OrderedDict()
+        self._joints = JointMonitor()
+        self._reports = PlanningReports()
         self._others: dict[str, ArmCommander] = {}
         self._others_lock = threading.Lock()
 
@@ -122,8 +116,8 @@ class ArmCommander:
             self._ik_service = rospy.ServiceProxy("compute_ik", GetPositionIK)
             self._validity_service = rospy.ServiceProxy("check_state_validity", GetStateValidity)
             self._execute_client = SteadyActionClient(EXECUTE_ACTION, ExecuteTrajectoryAction)
-            self._subscribers = [rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10),
-                                 rospy.Subscriber(REPORT_TOPIC, String, self._on_report, queue_size=10)]
+            self._joints.connect()
+            self._reports.connect()
             try:
                 group = self._read_group()
                 for proxy in (self._plan_service, self._ik_service):
@@ -227,14 +221,11 @@ class ArmCommander:
 
         Joints outside the group are left out on purpose: a seed that names them would pin fingers that follow others.
         """
-        names = self.group.joint_names
-        with self._joints_lock:
-            return {name: self._positions[name] for name in names}
+        return self._joints.positions(self.group.joint_names)
 
     def positions_of(self, joints: Iterable[str]) -> dict[str, float]:
         """Returns the latest positions of some joints of the robot [rad or m]; joints without one are left out."""
-        with self._joints_lock:
-            return {name: self._positions[name] for name in joints if name in self._positions}
+        return self._joints.positions(joints)
 
     def plan_to_pose_target(self, pose: PoseStamped, custom_start_state: StartState = None) -> PlanResult:
         """Plans to a pose of the group's tip link.
@@ -391,13 +382,8 @@ class ArmCommander:
         code = response.error_code.val
         if code == MoveItErrorCodes.SUCCESS and response.trajectory.joint_trajectory.points:
             return PlanResult(response.trajectory, True, code, "")
-        return _no_plan(code, self._reported_reason(name, code))
-
-    def _reported_reason(self, name: str, code: int) -> str:
-        is_reported = self._subscribers[1].get_num_connections() > 0
-        wait_until(lambda: name in self._reports, REPORT_WAIT_S if is_reported else REPORTER_WAIT_S)
-        reason = str(self._reports.get(name, {}).get("reason", ""))
-        return f"{error_name(code)}: {reason}" if reason else error_name(code)
+        reason = self._reports.reason_of(name)
+        return _no_plan(code, f"{error_name(code)}: {reason}" if reason else error_name(code))
 
     def _ik(self, pose: PoseStamped, seed: StartState, avoid_collisions: bool) -> IkResult:
         group = self.group
@@ -434,25 +420,8 @@ class ArmCommander:
                                                "brought to a pose; choose a group that is, or a target of joints")
 
     def _missing_joints(self, group: Group) -> tuple[str, ...]:
-        with self._joints_lock:
-            return tuple(name for name in group.joint_names if name not in self._positions)
-
-    def _on_joint_states(self, message: JointState) -> None:
-        with self._joints_lock:
-            self._positions.update(zip(message.name, message.position, strict=False))
-
-    def _on_report(self, message: String) -> None:
-        try:
-            report = json.loads(message.data)
-            name = str(report.get("request_name", ""))
-        except (ValueError, AttributeError) as error:
-            rospy.logwarn_throttle(10.0, f"Topic '{rospy.resolve_name(REPORT_TOPIC)}': unreadable report ({error!r})")
-            return
-        if not name:
-            return
-        self._reports[name] = report
-        while len(self._reports) > REPORTS_KEPT:
-            self._reports.popitem(last=False)
+        received = self._joints.positions(group.joint_names)
+        return tuple(name for name in group.joint_names if name not in received)
 
 
 def _no_plan(code: int, reason: str) -> PlanResult:

@@ -3,8 +3,6 @@
 device's own driver."""
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -21,66 +19,14 @@ from control_msgs.msg import (
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_core.grasping.grasp_server import GraspCommandError, Outcome, refuse_no_effort
 from modular_framework_ros.action_client import SteadyActionClient
-from modular_framework_ros.calls import wait_for_action, wait_for_result, wait_until
+from modular_framework_ros.calls import wait_for_action, wait_for_result
 
-REST_SPEED = 0.02  # [rad/s or m/s]
-REST_TIMEOUT_S = 1.0
 STALL_ERROR_CODES = (FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
                      FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED)
 """How a trajectory ends whose joints are blocked; any other end is no stall."""
-
-
-class JointMonitor:
-    """Remembers the latest joint positions and speeds.
-
-    Subscribers: ``joint_states`` (sensor_msgs/JointState).
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._positions: dict[str, float] = {}
-        self._velocities: dict[str, float] = {}
-        self._heard: dict[str, float] = {}
-        self._subscriber: rospy.Subscriber | None = None
-
-    def connect(self) -> None:
-        """Subscribes to the joint states."""
-        self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=1)
-
-    def positions(self, names: Mapping[str, float] | list[str]) -> dict[str, float]:
-        """Returns the positions of the joints that have been received."""
-        with self._lock:
-            return {name: self._positions[name] for name in names if name in self._positions}
-
-    def wait_for_rest(self, motion: Motion) -> bool:
-        """Waits until a new state of every joint was received and all are slow; False when that takes too long.
-
-        A controller ends a goal some milliseconds before the joints' last positions arrive, and a finger may still
-        move within the goal's tolerance. A joint without a velocity counts as resting.
-        """
-        begun = time.monotonic()
-        wait_until(lambda: motion.stop_requested() or self._at_rest_since(motion.targets, begun), REST_TIMEOUT_S)
-        return self._at_rest_since(motion.targets, begun)
-
-    def _at_rest_since(self, names: Mapping[str, float], begun: float) -> bool:
-        with self._lock:
-            return all(self._heard.get(name, 0.0) > begun and abs(self._velocities.get(name, 0.0)) < REST_SPEED
-                       for name in names)
-
-    def message(self, names: Mapping[str, float]) -> JointState:
-        """Makes a joint state message of some joints."""
-        positions = self.positions(names)
-        state = JointState(name=list(positions), position=list(positions.values()))
-        state.header.stamp = rospy.Time.now()
-        return state
-
-    def _on_joint_states(self, message: JointState) -> None:
-        with self._lock:
-            self._positions.update(zip(message.name, message.position, strict=False))
-            self._velocities.update(zip(message.name, message.velocity, strict=False))
-            self._heard.update(dict.fromkeys(message.name, time.monotonic()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +88,8 @@ class GripperDriver:
         if result is None or not (result.stalled or result.reached_goal):
             raise GraspCommandError(f"controller action '{self._action}' gave up: "
                                     f"{self._client.get_goal_status_text() or 'no reason given'}")
-        positions = monitor.positions(motion.targets) if monitor.wait_for_rest(motion) else {
-            name: result.position}
+        rests = monitor.wait_for_rest(motion.targets, motion.stop_requested)
+        positions = monitor.positions(motion.targets) if rests else {name: result.position}
         return Outcome(positions, bool(result.stalled), f"the controller stopped at {result.position:.4f}")
 
 
@@ -180,7 +126,7 @@ class TrajectoryDriver:
         if status != GoalStatus.SUCCEEDED and not stalled:
             did = "rejected the posture" if status == GoalStatus.REJECTED else "gave up"
             raise GraspCommandError(f"controller action '{self._action}' {did}: {text or 'no reason given'}")
-        rests = monitor.wait_for_rest(motion)
+        rests = monitor.wait_for_rest(motion.targets, motion.stop_requested)
         return Outcome(monitor.positions(motion.targets), stalled and rests, text)
 
 

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The latest positions and velocities of the robot's joints."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable
+
+import rospy
+from sensor_msgs.msg import JointState
+
+from modular_framework_ros.calls import wait_until
+
+REST_SPEED = 0.02  # [rad/s or m/s]
+REST_TIMEOUT_S = 1.0
+
+
+class JointMonitor:
+    """Keeps the latest joint positions and velocities; safe to use from several threads.
+
+    Subscribers: ``joint_states`` (sensor_msgs/JointState).
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._positions: dict[str, float] = {}
+        self._velocities: dict[str, float] = {}
+        self._received: dict[str, float] = {}
+        self._subscriber: rospy.Subscriber | None = None
+
+    def connect(self) -> None:
+        """Subscribes to the joint states."""
+        self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10)
+
+    def positions(self, names: Iterable[str]) -> dict[str, float]:
+        """Returns the positions of joints [rad or m]; joints that have not been received are left out."""
+        with self._lock:
+            return {name: self._positions[name] for name in names if name in self._positions}
+
+    def wait_for_rest(self, names: Iterable[str], stop_requested: Callable[[], bool]) -> bool:
+        """Waits until a new state of every joint was received and all are slow; False when that takes too long.
+
+        A controller ends a goal some milliseconds before the joints' last positions arrive, and a finger may still
+        move within the goal's tolerance. A joint without a velocity counts as resting.
+
+        Args:
+            names: Joints.
+            stop_requested: Evaluated during the wait; True ends it.
+        """
+        joints, begun_s = tuple(names), time.monotonic()
+        wait_until(lambda: stop_requested() or self._at_rest_since(joints, begun_s), REST_TIMEOUT_S)
+        return self._at_rest_since(joints, begun_s)
+
+    def message(self, names: Iterable[str]) -> JointState:
+        """Makes a joint state message of some joints."""
+        positions = self.positions(names)
+        state = JointState(name=list(positions), position=list(positions.values()))
+        state.header.stamp = rospy.Time.now()
+        return state
+
+    def _at_rest_since(self, names: Iterable[str], begun_s: float) -> bool:
+        with self._lock:
+            return all(self._received.get(name, 0.0) > begun_s and abs(self._velocities.get(name, 0.0)) < REST_SPEED
+                       for name in names)
+
+    def _on_joint_states(self, message: JointState) -> None:
+        with self._lock:
+            self._positions.update(zip(message.name, message.position, strict=False))
+            self._velocities.update(zip(message.name, message.velocity, strict=False))
+            self._received.update(dict.fromkeys(message.name, time.monotonic()))
