@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import BodyState
 
 LIFT_ROBOT = """<robot name="lifter">
   <link name="world"/>
@@ -43,3 +45,9 @@ def solid(name: str, geometry: specs.Geometry, pose: Pose, mass: float = 0.2, st
     moment = mass * 0.05**2 / 6
     inertial = specs.Inertial(Pose(), mass, (moment, 0, 0, moment, 0, moment))
     return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (collision,), ()),), (), "test")
+
+
+def exact_state(world: PhysicsWorld) -> tuple[int, dict[str, BodyState]]:
+    """Returns time, poses and velocities of everything; equal states are equal bit for bit."""
+    links = [(name, link) for name in world.names() for link in world.body(name).link_names()]
+    return world.time_ns, {f"{name}::{link}": world.entity_state(f"{name}::{link}") for name, link in links}

@@ -18,7 +18,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
-from modular_framework_simulation.models.sdf_reader import read_model_file
+from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -48,7 +48,8 @@ class PickTrial:
         assert self.hardware.init(MappingNodeHandle(), MappingNodeHandle())
         self.handles = {each.name: each for each in self.hardware.get(PositionJointInterface).handles}
         folder = Path(packages.get_path("modular_framework_description")) / "models"
-        spec = read_model_file(folder / model / "model.sdf", Resources((folder,), packages.get_path))
+        file = folder / model / "model.sdf"
+        spec = read_model_text(file.read_text(), str(file), Resources((folder,), packages.get_path))
         x, y, yaw = pose_xy_yaw
         at = Pose.from_xyz_rpy((x, y, TABLE_HEIGHT + height / 2 + 0.0005), (0.0, 0.0, yaw))
         self.thing = self.world.spawn(dataclasses.replace(spec, name="thing", pose=at))

@@ -67,11 +67,6 @@ def read_world(path: Path, resources: Resources) -> specs.World:
     )
 
 
-def read_model_file(path: Path, resources: Resources) -> specs.Model:
-    """Reads a model.sdf file."""
-    return _model_of_document(read_xml(path), resources, 0)
-
-
 def read_model_text(text: str, source: str, resources: Resources) -> specs.Model:
     """Reads a model from text, for instance from a spawn request.
 

@@ -6,8 +6,6 @@ All calls come from one thread, the one that owns the loop.
 
 from __future__ import annotations
 
-import hashlib
-import struct
 from dataclasses import dataclass
 
 from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
@@ -233,15 +231,6 @@ class PhysicsWorld:
     def reset_time(self) -> None:
         """Starts simulated time at 0 again."""
         self._steps = 0
-
-    def fingerprint(self) -> str:
-        """Returns a hash of the state of everything; equal hashes mean equal worlds, bit for bit."""
-        digest = hashlib.sha256(struct.pack("<q", self._steps))
-        for name in sorted(self._bodies):
-            values = self._bodies[name].fingerprint()
-            digest.update(name.encode())
-            digest.update(struct.pack(f"<{len(values)}d", *values))
-        return digest.hexdigest()
 
     def close(self) -> None:
         """Closes the physics engine; may be called twice."""

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.poses import Pose, Vector3, rotate_vector
@@ -144,17 +143,6 @@ class SimulatedBody:
     def reset_joints(self, positions: dict[str, float]) -> None:
         """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
         self.set_joints({name: positions.get(name, 0.0) for name in self.joint_indices})
-
-    def fingerprint(self) -> list[float]:
-        """Returns every number of the body's state, for comparing whole worlds."""
-        api, client = self._engine.api, self._engine.client
-        position, quaternion = api.getBasePositionAndOrientation(self.number, physicsClientId=client)
-        linear, angular = api.getBaseVelocity(self.number, physicsClientId=client)
-        values = [*position, *quaternion, *linear, *angular]
-        if self.joint_indices:
-            records: Any = api.getJointStates(self.number, list(self.joint_indices.values()), physicsClientId=client)
-            values += [value for record in records for value in record[:2]]
-        return values
 
     def _centre_state(self) -> tuple[Pose, Twist]:
         """Returns pose and velocity of the root link's centre of mass, in the world frame."""
