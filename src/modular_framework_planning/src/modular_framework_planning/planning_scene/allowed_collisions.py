@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from modular_framework_planning.robot_model.srdf import SemanticDescription
+from modular_framework_urdf.srdf_reader import SemanticDescription
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
-from modular_framework_planning.robot_model.srdf import EndEffector
+from modular_framework_urdf.srdf_reader import EndEffector
 
 
 def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[JointGroup, EndEffector]:

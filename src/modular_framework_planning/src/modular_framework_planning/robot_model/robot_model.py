@@ -19,13 +19,14 @@ from modular_framework_planning.robot_model.joint_limits import (
     JointLimits,
     tighten,
 )
-from modular_framework_planning.robot_model.srdf import GroupSpec, SemanticDescription, parse_srdf
+from modular_framework_planning.robot_model.srdf import parse_srdf
 from modular_framework_planning.robot_model.urdf_document import (
     CONTINUOUS_BOUND,
     MeshResolver,
     load_urdf,
     package_resolver,
 )
+from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription
 
 NO_VELOCITY_LIMIT = 1.0e6
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +12,17 @@ import pinocchio as pin
 from modular_framework_planning.errors import GeometryError, ModelError
 from modular_framework_planning.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Transform
+from modular_framework_urdf import robot as urdf
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 from modular_framework_urdf.mimics import Mimic, resolved
-from modular_framework_urdf.xml_text import Element
+from modular_framework_urdf.robot import MOVABLE_KINDS, Link, PlacedShapes, Robot
+from modular_framework_urdf.urdf_reader import read_urdf
 
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
 PlacedShape = tuple[Shape, Transform]  # shape, pose in the link
 CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
-MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,140 +72,94 @@ def package_resolver(uri: str) -> str:
     return str(path)
 
 
-def _number(element: Element, attribute: str, default: float, where: str) -> float:
-    text = element.get(attribute)
-    if text is None:
-        return default
-    try:
-        return float(text)
-    except ValueError as error:
-        raise ModelError(f"{where}: attribute '{attribute}' is '{text}'; a number is needed") from error
-
-
-@dataclass(frozen=True, slots=True)
-class _Joints:
-    """What the joints of a URDF say; `notes`: what was ignored, and why."""
-
-    parents: dict[str, str] = field(default_factory=dict)
-    children: dict[str, str] = field(default_factory=dict)
-    kinds: dict[str, str] = field(default_factory=dict)
-    mimics: dict[str, Mimic] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-
-
-def _read_joints(root: Element) -> _Joints:
-    """Reads the joints and makes them ready for Pinocchio; raises ModelError."""
-    result = _Joints()
-    for joint in root.findall("joint"):
-        name, kind = joint.get("name", ""), joint.get("type", "")
-        parent, child = joint.find("parent"), joint.find("child")
-        if kind not in (*MOVABLE_KINDS, "fixed") or parent is None or child is None:
-            raise ModelError(f"URDF joint '{name}': type '{kind}' with parent and child; allowed types are "
+def _check_kinds(robot: Robot) -> None:
+    for joint in robot.joints:
+        if joint.kind not in (*MOVABLE_KINDS, "fixed") or not joint.parent or not joint.child:
+            raise ModelError(f"URDF joint '{joint.name}': type '{joint.kind}' with parent and child; allowed types are "
                              f"{', '.join(MOVABLE_KINDS)} and fixed, and both links must be named")
-        result.parents[name], result.children[name] = parent.get("link", ""), child.get("link", "")
-        result.kinds[name] = kind
-        _prepare_joint(joint, name, result)
+
+
+def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
+    """Returns what each mimic joint follows in the end, and notes on those that are ignored; raises ModelError."""
+    direct = {joint.name: joint.mimic for joint in robot.movable_joints() if joint.mimic is not None}
     try:
-        mimics = resolved(result.mimics, [name for name, kind in result.kinds.items() if kind != "fixed"])
+        mimics = resolved(direct, [joint.name for joint in robot.movable_joints()])
     except ValueError as error:
         raise ModelError(str(error)) from error
-    return replace(result, mimics=mimics)
+    return mimics, tuple(
+        f"URDF joint '{joint.name}': <mimic> is ignored, because the joint is fixed; remove it, or make the joint one "
+        "that moves" for joint in robot.joints if joint.kind == "fixed" and joint.mimic is not None)
 
 
-def _prepare_joint(joint: Element, name: str, result: _Joints) -> None:
-    if joint.get("type") == "continuous":
-        joint.set("type", "revolute")
-        limit = joint.find("limit")
-        if limit is None:
-            limit = xml_text.add_child(joint, "limit", effort="0", velocity="0")
-        limit.set("lower", str(-CONTINUOUS_BOUND))
-        limit.set("upper", str(CONTINUOUS_BOUND))
-    mimic = joint.find("mimic")
-    if mimic is None:
-        return
-    joint.remove(mimic)
-    if joint.get("type") == "fixed":
-        result.notes.append(f"URDF joint '{name}': <mimic> is ignored, because the joint is fixed; remove it, or make "
-                            "the joint one that moves")
-        return
-    where = f"URDF joint '{name}' mimic"
-    result.mimics[name] = Mimic(mimic.get("joint", ""), _number(mimic, "multiplier", 1.0, where),
-                                _number(mimic, "offset", 0.0, where))
-
-
-def _numbers(text: str | None, default: tuple[float, float, float], where: str) -> tuple[float, float, float]:
-    if text is None:
-        return default
-    try:
-        first, second, third = (float(item) for item in text.split())
-    except ValueError as error:
-        raise ModelError(f"{where}: '{text}'; three numbers are needed") from error
-    return first, second, third
-
-
-def _geometries(link: Element, role: str) -> Iterator[tuple[Element, Transform, str]]:
-    """Geometry elements of a link's visuals or collisions, their poses in the link and where that is."""
-    where = f"URDF link '{link.get('name')}' {role}"
-    for element in link.findall(role):
-        origin = element.find("origin")
-        xyz = _numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0), where)
-        rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0), where)
-        pose = pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.array(xyz))
-        for geometry in element.findall("geometry/*"):
-            yield geometry, pose, where
-
-
-def _visual_meshes(link: Element) -> Iterator[VisualMesh]:
-    for geometry, pose, where in _geometries(link, "visual"):
-        if geometry.tag == "mesh":
-            yield geometry.get("filename", ""), pose, _numbers(geometry.get("scale"), (1.0, 1.0, 1.0), where)
-
-
-def _visual_shapes(link: Element) -> Iterator[PlacedShape]:
-    for geometry, pose, where in _geometries(link, "visual"):
-        shape = None if geometry.tag == "capsule" else _primitive(geometry, where)  # no marker shows a capsule
-        if shape is not None:
-            yield shape, pose
-
-
-def _primitive(geometry: Element, where: str) -> Shape | None:
-    match geometry.tag:
-        case "box":
-            return Box(*_numbers(geometry.get("size"), (1.0, 1.0, 1.0), where))
-        case "sphere":
-            return Sphere(_number(geometry, "radius", 1.0, where))
-        case "cylinder" | "capsule":
-            radius, length = _number(geometry, "radius", 1.0, where), _number(geometry, "length", 1.0, where)
-            return (Cylinder if geometry.tag == "cylinder" else Capsule)(radius=radius, height=length)
-    return None
-
-
-def _collisions(link: Element, resolve: MeshResolver) -> Iterator[PlacedShape]:
-    """Shapes of a link; raises ModelError for a mesh that is not there or cannot be read, or an unknown shape."""
-    for geometry, pose, where in _geometries(link, "collision"):
-        if geometry.tag == "mesh":
-            scale = _numbers(geometry.get("scale"), (1.0, 1.0, 1.0), where)
-            try:
-                mesh = read_mesh(resolve(geometry.get("filename", "")), scale)
-            except MeshError as error:
-                raise ModelError(f"{where}: {error}") from error
-            yield Mesh(mesh.vertices, mesh.triangles), pose
-            continue
-        try:
-            shape = _primitive(geometry, where)
-        except GeometryError as error:
-            raise ModelError(f"{where}: {error.reason}") from error
-        if shape is None:
-            raise ModelError(f"{where}: <{geometry.tag}>; allowed are box, capsule, cylinder, sphere and mesh")
-        yield shape, pose
-
-
-def _without_geometry(root: Element) -> str:
-    """Returns the document as Pinocchio gets it: kinematics and inertias."""
+def _xml_for_pinocchio(text: str) -> str:
+    """Returns the document as Pinocchio gets it: kinematics and inertias, continuous joints bounded, no mimics."""
+    root = xml_text.parse(text, "URDF")
     for link in root.findall("link"):
         for element in (*link.findall("collision"), *link.findall("visual")):
             link.remove(element)
+    for joint in root.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                limit = xml_text.add_child(joint, "limit", effort="0", velocity="0")
+            limit.set("lower", str(-CONTINUOUS_BOUND))
+            limit.set("upper", str(CONTINUOUS_BOUND))
     return xml_text.to_text(root)
+
+
+def _placed(items: tuple[PlacedShapes, ...]) -> Iterator[tuple[urdf.Shape, Transform]]:
+    """The shapes of a link's visuals or collisions, and their poses in the link."""
+    for item in items:
+        pose = pin.SE3(pin.rpy.rpyToMatrix(*item.origin.rpy), np.array(item.origin.xyz))
+        for shape in item.shapes:
+            yield shape, pose
+
+
+def _visual_meshes(link: Link) -> Iterator[VisualMesh]:
+    for shape, pose in _placed(link.visuals):
+        if isinstance(shape, urdf.MeshFile):
+            yield shape.uri, pose, shape.scale
+
+
+def _visual_shapes(link: Link) -> Iterator[PlacedShape]:
+    for shape, pose in _placed(link.visuals):
+        primitive = None if isinstance(shape, urdf.Capsule) else _primitive(shape)  # no marker shows a capsule
+        if primitive is not None:
+            yield primitive, pose
+
+
+def _primitive(shape: urdf.Shape) -> Shape | None:
+    match shape:
+        case urdf.Box(size):
+            return Box(*size)
+        case urdf.Sphere(radius):
+            return Sphere(radius)
+        case urdf.Cylinder(radius, length):
+            return Cylinder(radius=radius, height=length)
+        case urdf.Capsule(radius, length):
+            return Capsule(radius=radius, height=length)
+    return None
+
+
+def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
+    """Shapes of a link; raises ModelError for a mesh that is not there or cannot be read, or an unknown shape."""
+    where = f"URDF link '{link.name}' collision"
+    for shape, pose in _placed(link.collisions):
+        if isinstance(shape, urdf.UnknownShape):
+            raise ModelError(f"{where}: <{shape.tag}>; allowed are box, capsule, cylinder, sphere and mesh")
+        try:
+            if isinstance(shape, urdf.MeshFile):
+                mesh = read_mesh(resolve(shape.uri), shape.scale)
+                yield Mesh(mesh.vertices, mesh.triangles), pose
+            elif (primitive := _primitive(shape)) is not None:
+                yield primitive, pose
+        except MeshError as error:
+            raise ModelError(f"{where}: {error}") from error
+        except GeometryError as error:
+            raise ModelError(f"{where}: {error.reason}") from error
 
 
 def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocument:
@@ -218,16 +173,18 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
         ModelError: not XML, a DOCTYPE, no root link, an unsupported joint type, a mesh that cannot be read.
     """
     try:
-        root = xml_text.parse(text, "URDF")
+        robot = read_urdf(text, "URDF")
     except xml_text.XmlError as error:
         raise ModelError(f"{error} (is robot_description loaded, and its xacro expanded?)") from error
-    joints = _read_joints(root)
-    links = tuple(link.get("name", "") for link in root.findall("link"))
-    roots = [link for link in links if link not in joints.children.values()]
+    _check_kinds(robot)
+    mimics, notes = _mimics(robot)
+    roots = robot.root_links()
     if len(roots) != 1:
         raise ModelError(f"URDF: {len(roots)} links without a parent joint ({', '.join(roots)}); exactly one is needed")
-    meshes = {link.get("name", ""): tuple(_visual_meshes(link)) for link in root.findall("link")}
-    shapes = {link.get("name", ""): tuple(_visual_shapes(link)) for link in root.findall("link")}
-    collisions = {link.get("name", ""): tuple(_collisions(link, resolve)) for link in root.findall("link")}
-    return UrdfDocument(_without_geometry(root), root.get("name", ""), roots[0], links, joints.parents,
-                        joints.children, joints.kinds, joints.mimics, meshes, shapes, collisions, tuple(joints.notes))
+    return UrdfDocument(
+        _xml_for_pinocchio(text), robot.name, roots[0], tuple(link.name for link in robot.links),
+        {joint.name: joint.parent for joint in robot.joints}, {joint.name: joint.child for joint in robot.joints},
+        {joint.name: joint.kind for joint in robot.joints}, mimics,
+        {link.name: tuple(_visual_meshes(link)) for link in robot.links},
+        {link.name: tuple(_visual_shapes(link)) for link in robot.links},
+        {link.name: tuple(_collisions(link, resolve)) for link in robot.links}, notes)
