@@ -67,9 +67,11 @@ def parse(text: str | bytes, where: str) -> Element:
         XmlError: it is not well-formed XML, or has a DOCTYPE.
     """
     refuse_doctype(text, where)
-    encoding = "utf-8" if isinstance(text, str) else None  # a declared one does not hold for decoded text
-    parser = etree.XMLParser(encoding=encoding, remove_comments=True, remove_pis=True, resolve_entities=False,
-                             huge_tree=True)
+    is_text = isinstance(text, str)
+    parser = etree.XMLParser(
+        encoding="utf-8" if is_text else None,  # a declared one does not hold for decoded text
+        remove_comments=True, remove_pis=True, resolve_entities=False,
+        huge_tree=not is_text)  # mesh files are larger than libxml2 allows by default
     try:
         root = etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
     except (etree.XMLSyntaxError, UnicodeEncodeError) as error:

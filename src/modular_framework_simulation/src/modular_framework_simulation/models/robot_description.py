@@ -19,9 +19,9 @@ from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.robot import Joint, Limit, Robot
+from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 from modular_framework_urdf.xml_text import Element
-
-MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,22 +85,22 @@ def read_robot(
         DescriptionError: The text is no URDF, or refers to something that is not there.
     """
     try:
-        root = xml_text.parse(text, "robot_description")
+        root, robot = xml_text.parse(text, "robot_description"), read_urdf(text)
+    except AttributeFault as error:
+        where = f"{error.where}: {error.owner}, <{error.tag} {error.key}=...>"
+        raise DescriptionError(where, f"got '{error.text}'", f"expected {error.expected}") from error
     except xml_text.XmlError as error:
         raise DescriptionError(error.where, error.found, error.allowed) from error
-    links = tuple(link.get("name", "") for link in root.findall("link"))
+    links = tuple(link.name for link in robot.links)
     if root.tag != "robot" or not links:
         raise DescriptionError("robot_description", f"<{root.tag}> with {len(links)} links", "expected a URDF <robot>")
-    transmissions = _transmissions(root)
-    joints = tuple(
-        _joint(joint, transmissions) for joint in root.findall("joint") if joint.get("type") in MOVABLE_TYPES
-    )
-    joints = _with_leaders(joints)
+    interfaces = _interfaces(robot)
+    _require_ends(robot)
+    joints = _with_leaders(tuple(_joint(joint, interfaces.get(joint.name, ())) for joint in robot.movable_joints()))
     _rewrite_meshes(root, find_package, convex_parts, with_visuals)
     _give_frames_no_weight(root)
-    engine_urdf = xml_text.to_text(root)
-    parents = {_link_of(joint, "child"): _link_of(joint, "parent") for joint in root.findall("joint")}
-    return RobotDescription(root.get("name", "robot"), joints, links, parents, engine_urdf)
+    parents = {joint.child: joint.parent for joint in robot.joints}
+    return RobotDescription(root.get("name", "robot"), joints, links, parents, xml_text.to_text(root))
 
 
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
@@ -114,62 +114,41 @@ def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
     return tuple(replace(joint, mimic=mimics.get(joint.name)) for joint in joints)
 
 
-def _transmissions(root: Element) -> dict[str, tuple[str, ...]]:
+def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """Returns the hardware interfaces that the transmissions name, by joint."""
     interfaces: dict[str, tuple[str, ...]] = {}
-    for transmission in root.findall("transmission"):
-        for joint in transmission.findall("joint"):
-            name = joint.get("name", "")
-            texts = [(each.text or "").strip() for each in joint.findall("hardwareInterface")]
-            if not texts:
-                where = f"robot_description: <transmission name='{transmission.get('name')}'>, joint '{name}'"
+    for transmission in robot.transmissions:
+        for joint in transmission.joints:
+            if not joint.interfaces:
+                where = (f"robot_description:{joint.line}: <transmission name='{transmission.name}'>, "
+                         f"joint '{joint.name}'")
                 raise DescriptionError(where, "has no <hardwareInterface>", "name the position, velocity or effort one")
-            interfaces[name] = interfaces.get(name, ()) + tuple(texts)
+            interfaces[joint.name] = interfaces.get(joint.name, ()) + tuple(each.text for each in joint.interfaces)
     return interfaces
 
 
-def _joint(joint: Element, transmissions: dict[str, tuple[str, ...]]) -> RobotJoint:
-    name = joint.get("name", "")
-    limit, mimic_element = joint.find("limit"), joint.find("mimic")
+def _require_ends(robot: Robot) -> None:
+    for joint in robot.joints:
+        for role, link in (("parent", joint.parent), ("child", joint.child)):
+            if not link:
+                where = f"robot_description:{joint.line}: joint '{joint.name}'"
+                raise DescriptionError(where, f"has no <{role} link=...>", "a joint connects two links")
 
-    def limit_value(key: str, default: float) -> float:
-        return _number(name, limit, key, default) if limit is not None else default
 
-    continuous = joint.get("type") == "continuous"
-    mimic = None
-    if mimic_element is not None:
-        mimic = Mimic(
-            mimic_element.get("joint", ""),
-            _number(name, mimic_element, "multiplier", 1.0),
-            _number(name, mimic_element, "offset", 0.0),
-        )
+def _joint(joint: Joint, interfaces: tuple[str, ...]) -> RobotJoint:
+    continuous = joint.kind == "continuous"
+    limit = joint.limit or Limit(0.0, 0.0, None, None)
     return RobotJoint(
-        name=name,
-        parent_link=_link_of(joint, "parent"),
-        child_link=_link_of(joint, "child"),
-        lower=float("-inf") if continuous else limit_value("lower", 0.0),
-        upper=float("inf") if continuous else limit_value("upper", 0.0),
-        effort=limit_value("effort", 1e3),
-        velocity=limit_value("velocity", 1e3),
-        interfaces=transmissions.get(name, ()),
-        mimic=mimic,
+        name=joint.name,
+        parent_link=joint.parent,
+        child_link=joint.child,
+        lower=float("-inf") if continuous else limit.lower,
+        upper=float("inf") if continuous else limit.upper,
+        effort=1e3 if limit.effort is None else limit.effort,
+        velocity=1e3 if limit.velocity is None else limit.velocity,
+        interfaces=interfaces,
+        mimic=joint.mimic,
     )
-
-
-def _link_of(joint: Element, role: str) -> str:
-    element = joint.find(role)
-    if element is None or not element.get("link"):
-        where = f"robot_description: joint '{joint.get('name')}'"
-        raise DescriptionError(where, f"has no <{role} link=...>", "a joint connects two links")
-    return element.get("link", "")
-
-
-def _number(joint: str, element: Element, key: str, default: float) -> float:
-    text = element.get(key)
-    try:
-        return default if text is None else float(text)
-    except ValueError as error:
-        where = f"robot_description: joint '{joint}', <{element.tag} {key}=...>"
-        raise DescriptionError(where, f"got '{text}'", "expected a number") from error
 
 
 def _rewrite_meshes(
