@@ -2,7 +2,6 @@
 """Shows a state of the robot as markers: the visual shapes of its links where compute_fk says they are."""
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 import rospy
@@ -12,6 +11,7 @@ from moveit_msgs.srv import GetPositionFK, GetPositionFKRequest
 from scipy.spatial.transform import Rotation
 from visualization_msgs.msg import Marker, MarkerArray
 
+from modular_framework_urdf.robot import Box, Cylinder, MeshFile, PlacedShapes, Sphere
 from moveit_commander.conversions import list_to_pose
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.object_region import transform_point
@@ -23,8 +23,7 @@ GREY = 0.5
 
 def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links: Sequence[str]) -> MarkerArray:
     """Returns markers of links in a state, in the planning frame. Raises ServerError or MoveItCommanderException."""
-    visuals = {link.get("name", ""): link.findall("visual") for link in model.urdf_root.findall("link")}
-    shown = [link for link in links if visuals.get(link)]
+    shown = [link for link in links if model.visuals.get(link)]
     if not shown:
         return MarkerArray()
     request = GetPositionFKRequest(fk_link_names=shown, robot_state=state)
@@ -36,45 +35,34 @@ def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links:
     poses = dict(zip(answer.fk_link_names, answer.pose_stamped, strict=True))
     array = MarkerArray()
     for link in shown:
-        for number, visual in enumerate(visuals[link]):
+        for number, visual in enumerate(model.visuals[link]):
             marker = _marker(visual)
             if marker is not None:
                 marker.header.frame_id, marker.header.stamp = model.planning_frame, rospy.Time.now()
                 marker.ns, marker.id = link, number
-                marker.pose = _compose(poses[link].pose, _origin(visual))
+                marker.pose = _compose(poses[link].pose, list_to_pose([*visual.origin.xyz, *visual.origin.rpy]))
                 array.markers.append(marker)
     return array
 
 
-def _marker(visual: ET.Element) -> Marker | None:
+def _marker(visual: PlacedShapes) -> Marker | None:
     """Returns the shape of a <visual>; None if it has none that markers can show."""
     marker = Marker(action=Marker.ADD)
     marker.color.r = marker.color.g = marker.color.b = GREY
     marker.color.a = 1.0
-    for shape in visual.iterfind("geometry/*"):
-        sizes = [float(item) for item in shape.get("size", shape.get("scale", "1 1 1")).split()]
-        match shape.tag:
-            case "mesh":
-                marker.type, marker.mesh_resource = Marker.MESH_RESOURCE, shape.get("filename", "")
-                marker.mesh_use_embedded_materials = True
-            case "box":
-                marker.type = Marker.CUBE
-            case "cylinder" | "sphere":
-                width = 2.0 * float(shape.get("radius", "0"))
-                marker.type = Marker.SPHERE if shape.tag == "sphere" else Marker.CYLINDER
-                sizes = [width, width, float(shape.get("length", width))]
-            case _:
-                return None
-        marker.scale = Vector3(*sizes)
-        return marker
-    return None
-
-
-def _origin(visual: ET.Element) -> Pose:
-    origin = visual.find("origin")
-    attributes = {} if origin is None else origin.attrib
-    numbers = f"{attributes.get('xyz', '0 0 0')} {attributes.get('rpy', '0 0 0')}".split()
-    return list_to_pose([float(number) for number in numbers])
+    match visual.shapes[0] if visual.shapes else None:
+        case MeshFile(uri, scale):
+            marker.type, marker.mesh_resource, marker.scale = Marker.MESH_RESOURCE, uri, Vector3(*scale)
+            marker.mesh_use_embedded_materials = True
+        case Box(size):
+            marker.type, marker.scale = Marker.CUBE, Vector3(*size)
+        case Cylinder(radius, length):
+            marker.type, marker.scale = Marker.CYLINDER, Vector3(2.0 * radius, 2.0 * radius, length)
+        case Sphere(radius):
+            marker.type, marker.scale = Marker.SPHERE, Vector3(2.0 * radius, 2.0 * radius, 2.0 * radius)
+        case _:
+            return None
+    return marker
 
 
 def _compose(outer: Pose, inner: Pose) -> Pose:

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 import random
-import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from modular_framework_urdf import xml_text
+from modular_framework_urdf import robot as urdf_robot
+from modular_framework_urdf import srdf_reader
 from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.robot import MOVABLE_KINDS, Vector
+from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription, read_srdf
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
 from moveit_commander.exception import RobotModelError
 
 ASSUMED_ROOT_JOINT = "ASSUMED_FIXED_ROOT_JOINT"
-MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
-Vector = tuple[float, float, float]
-NO_SHIFT: Vector = (0.0, 0.0, 0.0)
+NO_MIMIC = Mimic("", 1.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,15 +115,17 @@ class RobotModel:
         Raises:
             RobotModelError: one of them cannot be read, or they contradict each other.
         """
-        self.urdf_root = _parse(urdf, "URDF")
-        semantics = _parse(srdf, "SRDF")
-        self.name = self.urdf_root.get("name", "")
-        found = _with_leaders([_joint(element, limits or {}) for element in self.urdf_root.findall("joint")])
+        try:
+            description, semantics = read_urdf(urdf, "URDF"), read_srdf(srdf)
+        except XmlError as error:
+            raise RobotModelError(f"{error} (is it loaded and expanded?)") from error
+        self.name = description.name
+        self.visuals = {link.name: link.visuals for link in description.links}
+        found = _with_leaders([_joint(joint, limits or {}) for joint in description.joints])
         self.mimics = {joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in found
                        if joint.leader}
         tree = {joint.child: joint for joint in found}
-        links = [link.get("name", "") for link in self.urdf_root.findall("link")]
-        roots = [link for link in links if link not in tree]
+        roots = description.root_links()
         if len(roots) != 1:
             raise RobotModelError(f"URDF '{self.name}': {len(roots)} links have no parent joint; exactly one may")
         self.root_link = roots[0]
@@ -131,10 +135,10 @@ class RobotModel:
         self.joints = {joint.name: joint for joint in ordered}
         self.links = tuple(joint.child for joint in ordered)
         self._parent_joint = {joint.child: joint for joint in ordered}
-        self.passive = frozenset(item.get("name", "") for item in semantics.findall("passive_joint"))
+        self.passive = semantics.passive_joints
         self._semantics = semantics
-        self.groups = {element.get("name", ""): self._group(element) for element in semantics.findall("group")}
-        self.end_effectors = tuple(self._end_effector(item) for item in semantics.findall("end_effector"))
+        self.groups = {spec.name: self._group(spec) for spec in semantics.groups.values()}
+        self.end_effectors = tuple(map(self._end_effector, semantics.end_effectors))
 
     def group(self, name: str) -> Group:
         """Returns a group; raises RobotModelError with the names there are."""
@@ -175,46 +179,39 @@ class RobotModel:
         completed = self.complete(drawn)
         return {joint.name: completed[joint.name] for joint in group.variables if joint.name in completed}
 
-    def _group(self, element: ET.Element) -> Group:
-        name = element.get("name", "")
-        wanted = self._members(element, frozenset())
+    def _group(self, spec: GroupSpec) -> Group:
+        name = spec.name
+        wanted = self._members(spec, frozenset())
         joints = tuple(joint for joint in self.joints.values() if joint.name in wanted)
         links = tuple(joint.child for joint in joints)
         is_chain = bool(joints) and any(joint.active for joint in joints) and all(
             self._follows(sooner, later) for sooner, later in zip(joints[:-1], joints[1:], strict=True))
-        states = {item.get("name", ""): {value.get("name", ""): float(value.get("value", "0").split()[0])
-                                         for value in item.findall("joint")}
-                  for item in self._semantics.findall("group_state") if item.get("group") == name}
-        known = self._semantics.findall("end_effector")
-        effectors = [item for item in known if name in (item.get("group"), item.get("parent_group"))]
-        effectors += [item for item in known if item.get("parent_link") in links]
-        effector = effectors[0].get("name", "") if effectors else ""
-        return Group(name, joints, links, is_chain, effector, states)
+        known = self._semantics.end_effectors
+        effectors = [item for item in known if name in (item.group, item.parent_group)]
+        effectors += [item for item in known if item.parent_link in links]
+        effector = effectors[0].name if effectors else ""
+        return Group(name, joints, links, is_chain, effector, self._semantics.group_states.get(name, {}))
 
-    def _end_effector(self, element: ET.Element) -> EndEffector:
-        """Returns an end effector; its parent group is the named one or, as in MoveIt, the smallest."""
-        name, link = element.get("group", ""), element.get("parent_link", "")
-        possible = [group for group in self.groups.values() if link in group.links and group.name != name]
-        named = [group for group in possible if group.name == element.get("parent_group")]
+    def _end_effector(self, spec: srdf_reader.EndEffector) -> EndEffector:
+        """An end effector; its parent group is the named one or, as in MoveIt, the one with the fewest joints."""
+        link = spec.parent_link
+        possible = [group for group in self.groups.values() if link in group.links and group.name != spec.group]
+        named = [group for group in possible if group.name == spec.parent_group]
         chosen = min(named or possible, key=lambda group: len(group.joints), default=None)
-        return EndEffector(name, chosen.name if chosen else "", link)
+        return EndEffector(spec.group, chosen.name if chosen else "", link)
 
-    def _members(self, element: ET.Element, above: frozenset[str]) -> set[str]:
+    def _members(self, spec: GroupSpec, above: frozenset[str]) -> set[str]:
         """Names of a group's joints, those of its subgroups included."""
-        name = element.get("name", "")
-        if name in above:
-            raise RobotModelError(f"SRDF: group '{name}' contains itself; take one <group> element out")
-        members = {item.get("name", "") for item in element.findall("joint")}
-        for item in element.findall("link"):
-            members.add(self._joint_above(item.get("name", "")).name)
-        for item in element.findall("chain"):
-            base, tip = item.get("base_link", ""), item.get("tip_link", "")
+        if spec.name in above:
+            raise RobotModelError(f"SRDF: group '{spec.name}' contains itself; take one <group> element out")
+        members = set(spec.joints) | {self._joint_above(link).name for link in spec.links}
+        for base, tip in spec.chains:
             members.update(joint.name for joint in self.chain(base, tip))
-        for item in element.findall("group"):
-            inner = [other for other in self._semantics.findall("group") if other.get("name") == item.get("name")]
-            if not inner:
-                raise RobotModelError(f"SRDF: group '{name}' names the group '{item.get('name')}', which is not there")
-            members |= self._members(inner[0], above | {name})
+        for name in spec.subgroups:
+            inner = self._semantics.groups.get(name)
+            if inner is None:
+                raise RobotModelError(f"SRDF: group '{spec.name}' names the group '{name}', which is not there")
+            members |= self._members(inner, above | {spec.name})
         return members
 
     def _follows(self, sooner: Joint, later: Joint) -> bool:
@@ -230,13 +227,6 @@ class RobotModel:
         return self._parent_joint[link]
 
 
-def _parse(text: str, kind: str) -> ET.Element:
-    try:
-        return xml_text.parse(text, kind)
-    except xml_text.XmlError as error:
-        raise RobotModelError(f"{error} (is it loaded and expanded?)") from error
-
-
 def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
     """Lets every mimic joint follow the joint that drives its chain of mimic joints; a fixed joint follows none."""
     moving = [joint for joint in joints if joint.movable]
@@ -245,15 +235,14 @@ def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
                            if joint.leader}, [joint.name for joint in moving])
     except ValueError as error:
         raise RobotModelError(str(error)) from error
-    none = Mimic("", 1.0, 0.0)
     return [replace(joint, leader=mimic.leader, multiplier=mimic.multiplier, offset=mimic.offset)
-            for joint in joints for mimic in (mimics.get(joint.name, none),)]
+            for joint in joints for mimic in (mimics.get(joint.name, NO_MIMIC),)]
 
 
-def _root_joint(semantics: ET.Element, root_link: str) -> Joint:
-    for item in semantics.findall("virtual_joint"):
-        if item.get("child_link") == root_link:
-            return Joint(item.get("name", ""), "fixed", item.get("parent_frame", ""), root_link)
+def _root_joint(semantics: SemanticDescription, root_link: str) -> Joint:
+    for item in semantics.virtual_joints:
+        if item.child_link == root_link:
+            return Joint(item.name, "fixed", item.parent_frame, root_link)
     return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
 
 
@@ -270,44 +259,31 @@ def _depth_first(joints: Iterable[Joint], root_link: str) -> list[Joint]:
     return ordered
 
 
-def _numbers(text: str | None, default: Vector) -> Vector:
-    if text is None:
-        return default
-    first, second, third = (float(item) for item in text.split())
-    return first, second, third
-
-
-def _joint(element: ET.Element, limits: Mapping[str, Any]) -> Joint:
-    name, kind = element.get("name", ""), element.get("type", "")
+def _joint(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
     try:
-        return _read_joint(element, name, kind, limits.get(name) or {})
+        return _limited(joint, limits.get(joint.name) or {})
     except (ValueError, TypeError, AttributeError) as error:
-        raise RobotModelError(f"URDF joint '{name}' or its entry in joint_limits.yaml: {error}; numbers and the "
+        raise RobotModelError(f"URDF joint '{joint.name}' or its entry in joint_limits.yaml: {error}; numbers and the "
                               "elements parent and child are needed") from error
 
 
-def _read_joint(element: ET.Element, name: str, kind: str, entry: Mapping[str, Any]) -> Joint:
-    def inner(tag: str) -> Mapping[str, str]:
-        found = element.find(tag)
-        return {} if found is None else found.attrib
-
-    limit, soft, origin, mimic = inner("limit"), inner("safety_controller"), inner("origin"), inner("mimic")
-    lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
-    if "soft_lower_limit" in soft or "soft_upper_limit" in soft:
-        lower = max(lower, float(soft.get("soft_lower_limit", lower)))
-        upper = min(upper, float(soft.get("soft_upper_limit", upper)))
-    if kind == "continuous":
+def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
+    """The joint within the limits of the description, or those that its entry in joint_limits.yaml puts in place."""
+    lower, upper, velocity = (0.0, 0.0, 1.0) if joint.limit is None else (
+        joint.limit.lower, joint.limit.upper, joint.limit.velocity or 1.0)
+    if joint.safety is not None:
+        lower = lower if joint.safety.soft_lower_limit is None else max(lower, joint.safety.soft_lower_limit)
+        upper = upper if joint.safety.soft_upper_limit is None else min(upper, joint.safety.soft_upper_limit)
+    if joint.kind == "continuous":
         lower, upper = -math.pi, math.pi
     if entry.get("has_position_limits", False):
         lower, upper = float(entry.get("min_position", lower)), float(entry.get("max_position", upper))
-    velocity = float(limit.get("velocity", 0.0)) or 1.0
     if entry.get("has_velocity_limits", False):
         velocity = float(entry.get("max_velocity", velocity))
     acceleration = float(entry.get("max_acceleration", 1.0)) if entry.get("has_acceleration_limits", False) else 1.0
-    return Joint(name, kind, inner("parent").get("link", ""), inner("child").get("link", ""), lower, upper, velocity,
-                 acceleration, _numbers(origin.get("xyz"), NO_SHIFT), _numbers(origin.get("rpy"), NO_SHIFT),
-                 _numbers(inner("axis").get("xyz"), (1.0, 0.0, 0.0)), mimic.get("joint", ""),
-                 float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0)))
+    mimic = joint.mimic or NO_MIMIC
+    return Joint(joint.name, joint.kind, joint.parent, joint.child, lower, upper, velocity, acceleration,
+                 joint.origin.xyz, joint.origin.rpy, joint.axis, mimic.leader, mimic.multiplier, mimic.offset)
 
 
 def group_values(group: Group, values: Sequence[float]) -> dict[str, float]:
