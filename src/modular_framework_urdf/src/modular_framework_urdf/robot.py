@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +40,7 @@ class Origin:
 class Box:
     """Its edges along x, y and z [m]."""
 
+    tag: ClassVar[str] = "box"
     size: Vector
 
 
@@ -46,6 +48,7 @@ class Box:
 class Sphere:
     """Its radius [m]."""
 
+    tag: ClassVar[str] = "sphere"
     radius: float
 
 
@@ -53,6 +56,7 @@ class Sphere:
 class Cylinder:
     """Radius, and length along z [m]."""
 
+    tag: ClassVar[str] = "cylinder"
     radius: float
     length: float
 
@@ -61,6 +65,7 @@ class Cylinder:
 class Capsule:
     """Radius, and length of the cylinder between its ends, along z [m]."""
 
+    tag: ClassVar[str] = "capsule"
     radius: float
     length: float
 
@@ -69,6 +74,7 @@ class Capsule:
 class MeshFile:
     """URI of a mesh file, and by what it is scaled along x, y and z."""
 
+    tag: ClassVar[str] = "mesh"
     uri: str
     scale: Vector
 

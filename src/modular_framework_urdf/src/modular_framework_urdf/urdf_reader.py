@@ -84,13 +84,17 @@ class _Attributes:
         value = self.optional(key)
         return default if value is None else value
 
-    def vector(self, key: str, default: Vector, *, finite: bool = True) -> Vector:
-        text = self.text(key)
-        if not (text or "").strip():
-            return default
-        x, y, z = self._numbers(key, text or "", 3, "three numbers")
-        if finite and not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-            raise self._fault(key, text or "", "three numbers")
+    def needed(self, key: str) -> float:
+        return self._numbers(key, self.text(key) or "", 1, "a number")[0]
+
+    def vector(self, key: str, default: Vector) -> Vector:
+        return self.needed_vector(key) if (self.text(key) or "").strip() else default
+
+    def needed_vector(self, key: str) -> Vector:
+        text = self.text(key) or ""
+        x, y, z = self._numbers(key, text, 3, "three numbers")
+        if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+            raise self._fault(key, text, "three numbers")
         return x, y, z
 
     def _numbers(self, key: str, text: str, count: int, expected: str) -> list[float]:
@@ -124,17 +128,16 @@ def _origin(element: Element, owner: str, where: str) -> Origin:
 
 
 def _shape(element: Element, owner: str, where: str) -> Shape:
-    """A size that is not given is 1 m."""
     attributes = _Attributes(element, owner, where)
     match element.tag:
         case "box":
-            return Box(attributes.vector("size", (1.0, 1.0, 1.0), finite=False))
+            return Box(attributes.needed_vector("size"))
         case "sphere":
-            return Sphere(attributes.number("radius", 1.0))
+            return Sphere(attributes.needed("radius"))
         case "cylinder":
-            return Cylinder(attributes.number("radius", 1.0), attributes.number("length", 1.0))
+            return Cylinder(attributes.needed("radius"), attributes.needed("length"))
         case "capsule":
-            return Capsule(attributes.number("radius", 1.0), attributes.number("length", 1.0))
+            return Capsule(attributes.needed("radius"), attributes.needed("length"))
         case "mesh":
             return MeshFile(element.get("filename", ""), attributes.vector("scale", (1.0, 1.0, 1.0)))
         case tag:

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import logging
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
-from modular_framework_control.hardware_interface.urdf_xml import line_of, parse_description
+from modular_framework_control.hardware_interface.urdf_xml import parse_description
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, read_bool, read_number
+from modular_framework_urdf.robot import Joint, SafetyController
 
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
@@ -66,7 +66,7 @@ def limits_from_urdf(robot_description: str) -> dict[str, JointLimits]:
     Raises:
         ParameterError: the text is not XML, or a limit is not a number.
     """
-    return {name: _limits_of(name, joint) for name, joint in _movable_joints(robot_description).items()}
+    return {joint.name: _limits_of(joint) for joint in parse_description(robot_description).movable_joints()}
 
 
 def soft_limits_from_urdf(robot_description: str) -> dict[str, SoftJointLimits]:
@@ -75,47 +75,29 @@ def soft_limits_from_urdf(robot_description: str) -> dict[str, SoftJointLimits]:
     Raises:
         ParameterError: the text is not XML, or a value is not a number.
     """
-    found: dict[str, SoftJointLimits] = {}
-    for name, joint in _movable_joints(robot_description).items():
-        element = joint.find("safety_controller")
-        if element is not None:
-            values = [_number(name, element, key, "0") for key in SOFT_LIMIT_KEYS]
-            if joint.get("type") == "continuous" or values[0] >= values[1]:
-                values[:2] = -INFINITY, INFINITY
-            found[name] = SoftJointLimits(*values)
-    return found
+    return {joint.name: _soft_limits_of(joint.safety, joint.kind == "continuous")
+            for joint in parse_description(robot_description).movable_joints() if joint.safety is not None}
 
 
-def _movable_joints(robot_description: str) -> dict[str, ElementTree.Element]:
-    root = parse_description(robot_description)
-    return {joint.get("name", ""): joint for joint in root.findall("joint")
-            if joint.get("type") in ("revolute", "prismatic", "continuous")}
+def _soft_limits_of(safety: SafetyController, continuous: bool) -> SoftJointLimits:
+    lower, upper = safety.soft_lower_limit or 0.0, safety.soft_upper_limit or 0.0
+    if continuous or lower >= upper:
+        lower, upper = -INFINITY, INFINITY
+    return SoftJointLimits(lower, upper, safety.k_position or 0.0, safety.k_velocity or 0.0)
 
 
-def _limits_of(name: str, joint: ElementTree.Element) -> JointLimits:
-    continuous = joint.get("type") == "continuous"
-    limit = joint.find("limit")
+def _limits_of(joint: Joint) -> JointLimits:
+    continuous = joint.kind == "continuous"
+    limit = joint.limit
     if limit is None:
         return JointLimits(continuous=continuous)
     return JointLimits(
-        min_position=-INFINITY if continuous else _number(name, limit, "lower", "0"),
-        max_position=INFINITY if continuous else _number(name, limit, "upper", "0"),
-        max_velocity=abs(_number(name, limit, "velocity", "inf")),
-        max_effort=abs(_number(name, limit, "effort", "inf")),
+        min_position=-INFINITY if continuous else limit.lower,
+        max_position=INFINITY if continuous else limit.upper,
+        max_velocity=INFINITY if limit.velocity is None else abs(limit.velocity),
+        max_effort=INFINITY if limit.effort is None else abs(limit.effort),
         continuous=continuous,
     )
-
-
-def _number(joint: str, element: ElementTree.Element, key: str, default: str) -> float:
-    text = element.get(key, default)
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if math.isnan(value):
-        raise ParameterError(f"robot_description:{line_of(element)}: <{element.tag}> of joint '{joint}': {key} is "
-                             f"'{text}'; expected a number; correct the description")
-    return value
 
 
 def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) -> JointLimits:

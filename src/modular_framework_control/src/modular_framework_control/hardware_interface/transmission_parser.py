@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +20,9 @@ from modular_framework_control.hardware_interface.transmissions import (
     Transmission,
     TransmissionError,
 )
-from modular_framework_control.hardware_interface.urdf_xml import line_of, parse_description
+from modular_framework_control.hardware_interface.urdf_xml import parse_description
+from modular_framework_urdf import robot as urdf
+from modular_framework_urdf.robot import LocatedText, TransmissionPart
 
 Interfaces = tuple[type[HardwareInterface[Any]], ...]
 SIMPLE, DIFFERENTIAL, FOUR_BAR = (f"transmission_interface/{name}" for name in (
@@ -60,8 +61,8 @@ class TransmissionInfo:
 class _FaultError(Exception):
     """One fault of one transmission."""
 
-    def __init__(self, element: ElementTree.Element, text: str) -> None:
-        super().__init__(f"{WHERE}:{line_of(element)}: {text}")
+    def __init__(self, line: int, text: str) -> None:
+        super().__init__(f"{WHERE}:{line}: {text}")
 
 
 def read_transmissions(description: str) -> list[TransmissionInfo]:
@@ -73,9 +74,9 @@ def read_transmissions(description: str) -> list[TransmissionInfo]:
     """
     infos: list[TransmissionInfo] = []
     faults: list[str] = []
-    for element in parse_description(description, WHERE).findall("transmission"):
+    for transmission in parse_description(description, WHERE).transmissions:
         try:
-            info = _Reader(element).read()
+            info = _Reader(transmission).read()
         except _FaultError as fault:
             faults.append(str(fault))
             continue
@@ -92,89 +93,88 @@ def read_transmissions(description: str) -> list[TransmissionInfo]:
 
 
 class _Reader:
-    """Reads one <transmission>."""
+    """Checks one <transmission>."""
 
-    def __init__(self, element: ElementTree.Element) -> None:
-        self._element = element
-        self._name = element.get("name", "")
-        self._label = f"transmission '{self._name}'"
+    def __init__(self, transmission: urdf.Transmission) -> None:
+        self._transmission, self._line = transmission, transmission.line
+        self._label = f"transmission '{transmission.name}'"
 
     def read(self) -> TransmissionInfo:
-        if not self._name:
-            raise _FaultError(self._element, "<transmission> has no name; give it an attribute name")
-        kind = (self._element.findtext("type") or "").strip()
+        name, kind = self._transmission.name, self._transmission.kind
+        if not name:
+            raise _FaultError(self._line, "<transmission> has no name; give it an attribute name")
         if kind not in (SIMPLE, DIFFERENTIAL, FOUR_BAR):
             found = f"<type> is '{kind}'" if kind else "it has no <type>"
-            raise _FaultError(self._element, f"{self._label}: {found}; allowed: {SIMPLE}, {DIFFERENTIAL}, {FOUR_BAR}")
-        joints, actuators = self._parts("joint", kind), self._parts("actuator", kind)
-        return TransmissionInfo(self._name, line_of(self._element), self._formulas(kind, actuators, joints),
-                                tuple(part.get("name", "") for part in actuators),
-                                tuple(part.get("name", "") for part in joints), self._interfaces(joints))
+            raise _FaultError(self._line, f"{self._label}: {found}; allowed: {SIMPLE}, {DIFFERENTIAL}, {FOUR_BAR}")
+        joints = self._in_order("joint", self._transmission.joints)
+        actuators = self._in_order("actuator", self._transmission.actuators)
+        return TransmissionInfo(name, self._line, self._formulas(actuators, joints),
+                                tuple(part.name for part in actuators), tuple(part.name for part in joints),
+                                self._interfaces(joints))
 
-    def _formulas(self, kind: str, actuators: list[ElementTree.Element],
-                  joints: list[ElementTree.Element]) -> Transmission:
-        reductions = [self._number(actuator, "mechanicalReduction", None) for actuator in actuators]
-        offsets = [self._number(joint, "offset", 0.0) for joint in joints]
-        if kind == SIMPLE:
+    def _formulas(self, actuators: list[TransmissionPart], joints: list[TransmissionPart]) -> Transmission:
+        reductions = [self._reduction(actuator, None) for actuator in actuators]
+        offsets = [self._number(joint, "offset", joint.offset, 0.0) for joint in joints]
+        if self._transmission.kind == SIMPLE:
             return SimpleTransmission(reductions[0], offsets[0])
-        ratios = [self._number(joint, "mechanicalReduction", 1.0) for joint in joints]
-        pair = DifferentialTransmission if kind == DIFFERENTIAL else FourBarLinkageTransmission
+        ratios = [self._reduction(joint, 1.0) for joint in joints]
+        pair = DifferentialTransmission if self._transmission.kind == DIFFERENTIAL else FourBarLinkageTransmission
         return pair((reductions[0], reductions[1]), (ratios[0], ratios[1]), (offsets[0], offsets[1]))
 
-    def _parts(self, tag: str, kind: str) -> list[ElementTree.Element]:
+    def _in_order(self, tag: str, parts: tuple[TransmissionPart, ...]) -> list[TransmissionPart]:
         """The joints or actuators, in the order of their roles where there are two."""
-        parts = self._element.findall(tag)
+        kind = self._transmission.kind
         count = 1 if kind == SIMPLE else 2
         if len(parts) != count:
-            raise _FaultError(self._element, f"{self._label}: it has {len(parts)} <{tag}>; {kind} has {count}")
+            raise _FaultError(self._line, f"{self._label}: it has {len(parts)} <{tag}>; {kind} has {count}")
         for part in parts:
-            if not part.get("name"):
-                raise _FaultError(part, f"{self._label}: <{tag}> has no name; give it an attribute name")
+            if not part.name:
+                raise _FaultError(part.line, f"{self._label}: <{tag}> has no name; give it an attribute name")
         if count == 1:
-            return parts
-        roles = {(part.findtext("role") or "").strip(): part for part in parts}
+            return list(parts)
+        roles = {part.role: part for part in parts}
         wanted = [f"{tag}1", f"{tag}2"]
         if sorted(roles) != wanted:
-            found = ", ".join(f"'{(part.findtext('role') or '').strip()}'" for part in parts)
-            raise _FaultError(parts[0], f"{self._label}: the roles of its <{tag}> are {found}; expected "
+            found = ", ".join(f"'{part.role}'" for part in parts)
+            raise _FaultError(parts[0].line, f"{self._label}: the roles of its <{tag}> are {found}; expected "
                               f"<role>{wanted[0]}</role> in one and <role>{wanted[1]}</role> in the other")
         return [roles[role] for role in wanted]
 
-    def _number(self, part: ElementTree.Element, tag: str, default: float | None) -> float:
+    def _reduction(self, part: TransmissionPart, default: float | None) -> float:
+        return self._number(part, "mechanicalReduction", part.reduction, default)
+
+    def _number(self, part: TransmissionPart, tag: str, given: LocatedText | None, default: float | None) -> float:
         """A number inside a joint or actuator; a reduction is not 0."""
-        element = part.find(tag)
-        label = f"{self._label}: <{tag}> of {part.tag} '{part.get('name')}'"
-        if element is None:
+        label = f"{self._label}: <{tag}> of {part.tag} '{part.name}'"
+        if given is None:
             if default is None:
-                raise _FaultError(part, f"{label} is missing; give a number other than 0")
+                raise _FaultError(part.line, f"{label} is missing; give a number other than 0")
             return default
         try:
-            value = float(element.text or "")
+            value = float(given.text)
         except ValueError:
             value = math.nan
         nonzero = tag == "mechanicalReduction"
         if not math.isfinite(value) or (nonzero and value == 0.0):
-            raise _FaultError(element, f"{label} is '{element.text or ''}'; expected a number"
+            raise _FaultError(given.line, f"{label} is '{given.text}'; expected a number"
                               + (" other than 0" if nonzero else ""))
         return value
 
-    def _interfaces(self, joints: list[ElementTree.Element]) -> Interfaces:
+    def _interfaces(self, joints: list[TransmissionPart]) -> Interfaces:
         found = [self._interfaces_of(joint) for joint in joints]
         if any(set(other) != set(found[0]) for other in found):
-            raise _FaultError(self._element, f"{self._label}: its joints have different hardware interfaces; give all "
+            raise _FaultError(self._line, f"{self._label}: its joints have different hardware interfaces; give all "
                               "of them the same")
         return found[0]
 
-    def _interfaces_of(self, joint: ElementTree.Element) -> Interfaces:
-        elements = joint.findall("hardwareInterface")
-        label = f"{self._label}: <hardwareInterface> of joint '{joint.get('name')}'"
-        if not elements:
-            raise _FaultError(joint, f"{label} is missing; give one of: {', '.join(INTERFACES)}")
+    def _interfaces_of(self, joint: TransmissionPart) -> Interfaces:
+        label = f"{self._label}: <hardwareInterface> of joint '{joint.name}'"
+        if not joint.interfaces:
+            raise _FaultError(joint.line, f"{label} is missing; give one of: {', '.join(INTERFACES)}")
         names = {}
-        for element in elements:
-            text = (element.text or "").strip()
-            name = text if "/" in text else f"hardware_interface/{text}"
+        for given in joint.interfaces:
+            name = given.text if "/" in given.text else f"hardware_interface/{given.text}"
             if name not in INTERFACES:
-                raise _FaultError(element, f"{label} is '{text}'; allowed: {', '.join(INTERFACES)}")
+                raise _FaultError(given.line, f"{label} is '{given.text}'; allowed: {', '.join(INTERFACES)}")
             names[name] = INTERFACES[name]
         return tuple(names.values())
