@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
+from modular_framework_urdf.robot import Box, Cylinder, MeshFile, PlacedShapes, Sphere, UnknownShape
 
 Array = npt.NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def convex_hull(points: Array) -> ConvexBody:
     return ConvexBody(points[hull.vertices], np.unique(np.round(hull.equations, 12), axis=0))
 
 
-def collision_body(collision: ElementTree.Element) -> ConvexBody:
+def collision_body(collision: PlacedShapes) -> ConvexBody:
     """Makes the convex body of a URDF collision element, in the frame of the shape.
 
     Round shapes become prisms of 24 sides around them. A mesh becomes its convex hull.
@@ -65,19 +65,20 @@ def collision_body(collision: ElementTree.Element) -> ConvexBody:
     Raises:
         ShapeError: The element has no shape that is known, or its mesh cannot be read.
     """
-    shape = next(iter(collision.find("geometry") or ()), None)
-    match shape.tag if shape is not None else "":
-        case "box":
-            return convex_hull(_corners_of_box(_numbers(shape, "size", "0 0 0")))
-        case "cylinder":
-            return convex_hull(_around_cylinder(*_numbers(shape, "radius", "0"), *_numbers(shape, "length", "0")))
-        case "sphere":
-            radius, = _numbers(shape, "radius", "0")
+    match collision.shapes[0] if collision.shapes else UnknownShape("missing"):
+        case Box(size):
+            return convex_hull(_corners_of_box(_positive("size", size)))
+        case Cylinder(radius, length):
+            _positive("radius", (radius,))
+            _positive("length", (length,))
+            return convex_hull(_around_cylinder(radius, length))
+        case Sphere(radius):
+            _positive("radius", (radius,))
             return convex_hull(_around_sphere(radius))
-        case "mesh":
-            return convex_hull(_mesh_vertices(shape))
+        case MeshFile() as mesh:
+            return convex_hull(_mesh_vertices(mesh))
         case other:
-            raise ShapeError(f"is {other or 'missing'!r}; allowed are box, cylinder, sphere and mesh")
+            raise ShapeError(f"is {other.tag!r}; allowed are box, cylinder, sphere and mesh")
 
 
 def column_fronts(planes: Array, columns: Array, margin: float) -> Array:
@@ -100,18 +101,14 @@ def column_fronts(planes: Array, columns: Array, margin: float) -> Array:
     return np.where(beside | (low > high), -np.inf, high)
 
 
-def _numbers(shape: ElementTree.Element, name: str, default: str) -> list[float]:
-    text = shape.get(name, default)
-    try:
-        values = [float(value) for value in text.split()]
-    except ValueError:
-        values = []
-    if not values or not all(0.0 < value < math.inf for value in values):
+def _positive(name: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    if not all(0.0 < value < math.inf for value in values):
+        text = " ".join(f"{value:g}" for value in values)
         raise ShapeError(f"has the {name} '{text}', allowed are numbers of more than 0")
     return values
 
 
-def _corners_of_box(size: list[float]) -> Array:
+def _corners_of_box(size: tuple[float, ...]) -> Array:
     return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
 
 
@@ -129,13 +126,8 @@ def _around_sphere(radius: float) -> Array:
     return outside * np.column_stack([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
 
 
-def _mesh_vertices(shape: ElementTree.Element) -> Array:
-    uri, text = shape.get("filename", ""), shape.get("scale", "1 1 1")
+def _mesh_vertices(mesh: MeshFile) -> Array:
     try:
-        x, y, z = (float(value) for value in text.split())
-    except ValueError as error:
-        raise ShapeError(f"is the mesh '{uri}' with the scale '{text}', allowed are three numbers") from error
-    try:
-        return read_mesh(mesh_path(uri, rospkg.RosPack().get_path), (x, y, z)).vertices
+        return read_mesh(mesh_path(mesh.uri, rospkg.RosPack().get_path), mesh.scale).vertices
     except MeshError as error:
-        raise ShapeError(f"is the mesh '{uri}', which cannot be used: {error}") from error
+        raise ShapeError(f"is the mesh '{mesh.uri}', which cannot be used: {error}") from error

@@ -2,15 +2,16 @@
 """Computes from the robot description how wide a two-finger gripper opens, and where its parts are then."""
 from __future__ import annotations
 
-import math
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
-from modular_framework_urdf import xml_text
+from modular_framework_urdf.robot import Joint
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
 from top_down_grasps.convex_bodies import (
     ConvexBody,
     ShapeError,
@@ -136,12 +137,11 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
         GripperGeometryError: A link or joint is missing, or there are no two fingers with collision shapes.
     """
     model = _Model(urdf)
-    element = model.joints.get(joint)
-    limit = element.find("limit") if element is not None else None
+    limit = model.joints[joint].limit if joint in model.joints else None
     if limit is None or grasp_link not in model.links:
         raise GripperGeometryError(f"the robot description lacks the joint '{joint}' with limits, or the link "
                                    f"'{grasp_link}'; name the gripper's actuated joint and the grasp frame")
-    positions = np.linspace(float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0)), SAMPLES)
+    positions = np.linspace(limit.lower, limit.upper, SAMPLES)
     parts = list(_parts(model, grasp_link, joint, positions))
     fingers = model.finger_links(joint)
     measured = [_measure(parts, fingers, grasp_link, sample) for sample in range(SAMPLES)]
@@ -199,13 +199,13 @@ class _Model:
 
     def __init__(self, urdf: str) -> None:
         try:
-            root = xml_text.parse(urdf, "robot_description")
-        except xml_text.XmlError as error:
+            robot = read_urdf(urdf)
+        except XmlError as error:
             raise GripperGeometryError(str(error)) from error
-        self.links = {link.get("name", ""): link for link in root.findall("link")}
-        self.joints = {joint.get("name", ""): joint for joint in root.findall("joint")
-                       if joint.find("child") is not None}
-        self.parent_joint = {_link(joint, "child"): name for name, joint in self.joints.items()}
+        self.links = {link.name: link for link in robot.links}
+        self.joints = {joint.name: joint for joint in robot.joints if joint.child}
+        self.parent_joint = {joint.child: name for name, joint in self.joints.items()}
+        self._origins = {name: joint.origin.matrix() for name, joint in self.joints.items()}
 
     def moving_links(self, joint: str) -> list[str]:
         """Links that move with a joint or with a joint that mimics it."""
@@ -213,25 +213,24 @@ class _Model:
         for link in self.links:
             name = self.parent_joint.get(link)
             while name is not None:
-                mimic = self.joints[name].find("mimic")
-                if name == joint or (mimic is not None and mimic.get("joint") == joint):
+                mimic = self.joints[name].mimic
+                if name == joint or (mimic is not None and mimic.leader == joint):
                     moving.append(link)
                     break
-                name = self.parent_joint.get(_link(self.joints[name], "parent"))
+                name = self.parent_joint.get(self.joints[name].parent)
         return moving
 
     def finger_links(self, joint: str) -> list[str]:
         """Moving links that carry no other moving link."""
         moving = self.moving_links(joint)
-        parents = {_link(self.joints[self.parent_joint[link]], "parent") for link in moving}
+        parents = {self.joints[self.parent_joint[link]].parent for link in moving}
         return [link for link in moving if link not in parents]
 
     def hand_links(self, joint: str) -> list[str]:
         """Moving links, the link they hang on, and every link that is fixed to that."""
-        links = {_link(self.joints[joint], "parent"), *self.moving_links(joint)}
+        links = {self.joints[joint].parent, *self.moving_links(joint)}
         while True:
-            ends = [{_link(other, "parent"), _link(other, "child")} for other in self.joints.values()
-                    if other.get("type") == "fixed"]
+            ends = [{other.parent, other.child} for other in self.joints.values() if other.kind == "fixed"]
             more = set().union(*(pair for pair in ends if pair & links)) - links
             if not more:
                 return [link for link in self.links if link in links]
@@ -239,9 +238,9 @@ class _Model:
 
     def bodies_of(self, link: str) -> Iterator[ConvexBody]:
         """Collision shapes of a link in its own frame."""
-        for collision in self.links[link].findall("collision"):
+        for collision in self.links[link].collisions:
             try:
-                yield collision_body(collision).moved(_origin(collision.find("origin")))
+                yield collision_body(collision).moved(collision.origin.matrix())
             except ShapeError as error:
                 raise GripperGeometryError(f"the collision shape of link '{link}' {error}") from error
 
@@ -251,44 +250,25 @@ class _Model:
         name = self.parent_joint.get(link)
         while name is not None:
             joint = self.joints[name]
-            transform = _origin(joint.find("origin")) @ self._motion(joint, state) @ transform
-            name = self.parent_joint.get(_link(joint, "parent"))
-        return transform
-
-    def _motion(self, joint: ElementTree.Element, state: dict[str, float]) -> Array:
-        kind, mimic = joint.get("type"), joint.find("mimic")
-        value = state.get(joint.get("name", ""), 0.0)
-        if mimic is not None:
-            value = float(mimic.get("multiplier", 1.0)) * state.get(mimic.get("joint", ""), 0.0) + float(
-                mimic.get("offset", 0.0))
-        element = joint.find("axis")
-        axis = np.array([float(v) for v in (element.get("xyz", "1 0 0") if element is not None else "1 0 0").split()])
-        transform = np.eye(4)
-        if kind == "prismatic":
-            transform[:3, 3] = axis * value
-        elif kind in ("revolute", "continuous"):
-            transform[:3, :3] = rotation_about(axis, value)
+            transform = self._origins[name] @ _motion(joint, state) @ transform
+            name = self.parent_joint.get(joint.parent)
         return transform
 
 
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Returns the rotation matrix about an axis by an angle [rad] (Rodrigues' formula)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
-
-
-def _origin(element: ElementTree.Element | None) -> Array:
+def _motion(joint: Joint, state: dict[str, float]) -> Array:
+    """What a joint adds to its origin (4, 4)."""
+    value = state.get(joint.name, 0.0)
+    if joint.mimic is not None:
+        value = joint.mimic.multiplier * state.get(joint.mimic.leader, 0.0) + joint.mimic.offset
+    axis = np.array(joint.axis)
     transform = np.eye(4)
-    if element is not None:
-        roll, pitch, yaw = (float(value) for value in element.get("rpy", "0 0 0").split())
-        transform[:3, :3] = (rotation_about(np.array([0.0, 0.0, 1.0]), yaw) @
-                             rotation_about(np.array([0.0, 1.0, 0.0]), pitch) @
-                             rotation_about(np.array([1.0, 0.0, 0.0]), roll))
-        transform[:3, 3] = [float(value) for value in element.get("xyz", "0 0 0").split()]
+    if joint.kind == "prismatic":
+        transform[:3, 3] = axis * value
+    elif joint.kind in ("revolute", "continuous"):
+        transform[:3, :3] = rotation_about(axis, value)
     return transform
 
 
-def _link(joint: ElementTree.Element, role: str) -> str:
-    element = joint.find(role)
-    return element.get("link", "") if element is not None else ""
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Returns the rotation matrix about an axis by an angle [rad]."""
+    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()

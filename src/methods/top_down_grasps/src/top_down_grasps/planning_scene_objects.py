@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from top_down_grasps import surface_points
 from top_down_grasps.surface_points import Surface
@@ -65,14 +66,8 @@ def is_named(object_id: str, wanted: str) -> bool:
 
 def rotation_matrix(quaternion: Any) -> npt.NDArray[np.float64]:
     """Returns the rotation matrix of a quaternion message; an unset one (all zero) is no rotation."""
-    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
-    norm = x * x + y * y + z * z + w * w
-    if norm < 1e-12:
-        return np.eye(3)
-    s = 2.0 / norm
-    return np.array([[1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-                     [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-                     [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)]])
+    values = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
+    return np.eye(3) if values @ values < 1e-12 else Rotation.from_quat(values).as_matrix()
 
 
 def _translation(position: Any) -> npt.NDArray[np.float64]:
