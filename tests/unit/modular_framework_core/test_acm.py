@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_core.managers.acm import AcmError, AcmManager, CollisionMatrix, object_id
+from modular_framework_core.managers.acm import AcmManager, object_id
+from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix
 
 NAMES = ("base", "arm", "palm", "finger_1", "finger_2")
 ADJACENT = {("base", "arm"), ("arm", "palm"), ("palm", "finger_1"), ("palm", "finger_2")}

@@ -11,77 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from modular_framework_core.files.faults import nearest
+from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix, MutableMatrix
 
 LINK_SEPARATOR = "__"
 DEFAULT_LINK = "link"
-
-
-class AcmError(ValueError):
-    """A request cannot be served; the text says why and what to do."""
-
-
-@dataclass(frozen=True, slots=True)
-class CollisionMatrix:
-    """A symmetric table of pairs that may touch.
-
-    Attributes:
-        names: Links and objects, one for each row and column.
-        rows: ``rows[i][j]`` is True when ``names[i]`` may touch ``names[j]``.
-        default_names: Links and objects with a rule for every pair that is not in the table.
-        default_values: The rules of ``default_names``.
-    """
-
-    names: tuple[str, ...]
-    rows: tuple[tuple[bool, ...], ...]
-    default_names: tuple[str, ...] = ()
-    default_values: tuple[bool, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Checks that the table is square and the defaults are paired."""
-        size = len(self.names)
-        widths = {len(row) for row in self.rows}
-        if len(self.rows) != size or (size and widths != {size}):
-            raise AcmError(f"The collision matrix names {size} entries but has {len(self.rows)} rows of widths "
-                           f"{sorted(widths)}; it must be square.")
-        if len(set(self.names)) != size:
-            raise AcmError("The collision matrix names an entry twice; every name must be unique.")
-        if len(self.default_names) != len(self.default_values):
-            raise AcmError(f"The collision matrix has {len(self.default_names)} default names but "
-                           f"{len(self.default_values)} default values.")
-
-    def allowed(self, first: str, second: str) -> bool | None:
-        """Returns whether a pair may touch, None when one of the two is not in the table."""
-        if first not in self.names or second not in self.names:
-            return None
-        return self.rows[self.names.index(first)][self.names.index(second)]
-
-
-@dataclass(slots=True)
-class _Table:
-    """Working copy of a matrix: rows are mutable."""
-
-    names: list[str]
-    rows: list[list[bool]]
-
-    @classmethod
-    def of(cls, matrix: CollisionMatrix) -> _Table:
-        return cls(list(matrix.names), [list(row) for row in matrix.rows])
-
-    def add(self, name: str) -> None:
-        for row in self.rows:
-            row.append(False)
-        self.names.append(name)
-        self.rows.append([False] * (len(self.names) - 1) + [True])
-
-    def delete(self, name: str) -> None:
-        index = self.names.index(name)
-        del self.names[index], self.rows[index]
-        for row in self.rows:
-            del row[index]
-
-    def set(self, first: str, second: str, value: bool) -> None:
-        i, j = self.names.index(first), self.names.index(second)
-        self.rows[i][j] = self.rows[j][i] = value
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +38,7 @@ class AcmManager:
     """
 
     _initial: CollisionMatrix | None = None
-    _table: _Table | None = None
+    _table: MutableMatrix | None = None
     _objects: list[str] = field(default_factory=list)
     _manipulator_links: tuple[str, ...] = ()
     _lock: threading.RLock = field(default_factory=threading.RLock)
@@ -274,7 +207,7 @@ class AcmManager:
                                f"{nearest(link, initial.names)}")
         return tuple(dict.fromkeys(links)) or self._manipulator_links
 
-    def _require_initial(self) -> tuple[CollisionMatrix, _Table]:
+    def _require_initial(self) -> tuple[CollisionMatrix, MutableMatrix]:
         if self._initial is None or self._table is None:
             raise AcmError("There is no reference collision matrix yet; call set_init_acm first.")
         return self._initial, self._table
@@ -282,7 +215,7 @@ class AcmManager:
     def _restore(self) -> None:
         if self._initial is None:
             return
-        self._table = _Table.of(self._initial)
+        self._table = MutableMatrix.of(self._initial)
         for name in self._objects:
             if name not in self._table.names:
                 self._table.add(name)
@@ -310,7 +243,7 @@ def object_id(entry_name: str) -> str:
     return entry_name if LINK_SEPARATOR in entry_name else f"{entry_name}{LINK_SEPARATOR}{DEFAULT_LINK}"
 
 
-def _match(wanted: Sequence[str], table: _Table, links: Sequence[str]) -> tuple[list[str], list[str]]:
+def _match(wanted: Sequence[str], table: MutableMatrix, links: Sequence[str]) -> tuple[list[str], list[str]]:
     """Finds the entries of objects, and the names that have none."""
     candidates = [name for name in table.names if name not in links]
     found: list[str] = []

@@ -15,7 +15,7 @@ def unusable_position(message: Any, where: str = "") -> str:
     """Says which position of a message is not finite, and what it is; nothing when all are.
 
     Args:
-        message: Any message; looked at are joint positions, points and orientations at any depth.
+        message: Any message; its joint positions, points and orientations are checked at any depth.
         where: Its own field, for the text.
     """
     is_place = message._type in _COORDINATES

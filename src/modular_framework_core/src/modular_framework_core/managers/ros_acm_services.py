@@ -8,7 +8,8 @@ import rospy
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
-from modular_framework_core.managers.acm import AcmAnswer, AcmError, AcmManager, CollisionMatrix
+from modular_framework_core.managers.acm import AcmAnswer, AcmManager
+from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix
 from modular_framework_core.managers.ros_simulated_objects import new_movable_objects
 from modular_framework_core.srv import (
     GetModifiedACM,
