@@ -9,7 +9,7 @@ import pinocchio as pin
 import trimesh
 from independent_checker import IndependentChecker, Part, Solid, box, cone, cylinder, mesh, sphere
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.planning_scene.planning_scene import (
     AttachedObject,
@@ -87,7 +87,7 @@ def random_state(model: RobotModel, rng: np.random.Generator) -> np.ndarray:
     return model.with_mimics(rng.uniform(np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)))
 
 
-def verdict(ours: CollisionChecker, second: IndependentChecker, positions: np.ndarray) -> Verdicts:
+def verdict(ours: ExactCollisionChecker, second: IndependentChecker, positions: np.ndarray) -> Verdicts:
     """What both checkers say of one state."""
     values = dict(zip(ours.model.joint_names, positions.tolist(), strict=True))
     free, touching = ours.is_free(positions), bool(second.collisions(values))
@@ -99,5 +99,5 @@ def verdict(ours: CollisionChecker, second: IndependentChecker, positions: np.nd
 def compare_verdicts(model: RobotModel, second: IndependentChecker, rng: np.random.Generator, states: int,
                      held: int) -> Verdicts:
     """Compares random states in a random world; `held` is the kind of the held object."""
-    ours = CollisionChecker(world_with(model, second, rng, held))
+    ours = ExactCollisionChecker(world_with(model, second, rng, held))
     return sum((verdict(ours, second, random_state(model, rng)) for _ in range(states)), Verdicts())

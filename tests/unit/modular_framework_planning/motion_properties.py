@@ -11,7 +11,7 @@ import pinocchio as pin
 from independent_checker import IndependentChecker
 from independent_checker import box as solid_box
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constraint_kinds import JointConstraint
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -84,7 +84,7 @@ def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, 
     return scene, world
 
 
-def _free_state(model: RobotModel, checker: CollisionChecker, rng: np.random.Generator,
+def _free_state(model: RobotModel, checker: ExactCollisionChecker, rng: np.random.Generator,
                 near: np.ndarray | None = None) -> np.ndarray:
     """A free state: anywhere, or with each joint at most LINE_TURNS from another state."""
     indices = model.group(GROUP).indices
@@ -105,7 +105,7 @@ def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Pr
     indices = model.group(GROUP).indices
     for number in range(count):
         scene, world = _world(model, rng)
-        checker = CollisionChecker(scene, indices)
+        checker = ExactCollisionChecker(scene, indices)
         start = _free_state(model, checker, rng)
         end = _free_state(model, checker, rng, start if kind == "lin" else None)
         constraints = None

@@ -7,8 +7,8 @@ import pytest
 from collision_worlds import Verdicts, compare_verdicts, world_with
 from independent_checker import IndependentChecker
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
 
@@ -34,7 +34,7 @@ def test_states_on_a_path_called_free_touch_nothing(model: RobotModel, second: I
     scene = world_with(model, second, rng, 0)
     group = model.group("arm_and_manipulator")
     rest = model.default_positions()
-    motion = MotionChecker(CollisionChecker(scene, group.indices), group.indices, rest)
+    motion = MotionChecker(ExactCollisionChecker(scene, group.indices), group.indices, rest)
     checked = 0
     for _ in range(150):
         start = rng.uniform(-np.pi, np.pi, len(group.joints))

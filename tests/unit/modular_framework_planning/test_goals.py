@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constraint_kinds import (
     FrameOnRobot,
     JointConstraint,
@@ -22,6 +21,7 @@ from modular_framework_planning.geometry.regions import BoxSolid
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.goals import GoalResolver
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import (
     ConstraintGoal,
     JointGoal,
@@ -50,7 +50,7 @@ def scene(model: RobotModel) -> PlanningScene:
 def resolve(model: RobotModel, scene: PlanningScene) -> Resolve:
     def run(*goals: object, world: PlanningScene = scene, path: KinematicConstraints | None = None) -> np.ndarray:
         group = model.group(GROUP)
-        checker = CollisionChecker(world, group.indices)
+        checker = ExactCollisionChecker(world, group.indices)
         motion = MotionChecker(checker, group.indices, world.positions)
         found = GoalResolver(PlanningRequest(world, GROUP, goals), group, KinematicsPool(model), checker, motion,
                              np.random.default_rng(1), path).resolve()

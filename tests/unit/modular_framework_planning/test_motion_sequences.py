@@ -8,14 +8,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
 from modular_framework_planning.planners.pilz.sequence import ItemSpec, PlannedItem, SequenceJoiner, checked_radii
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import (
     AuxiliaryPoint,
     PipelineSettings,
@@ -154,7 +154,7 @@ def world_with_cube(robot: Robot, items: list[PlannedItem], joined: Trajectory) 
             pose = pin.SE3(np.eye(3), corner + np.array([-aside, 0.0, -below]))
             world = robot.scene.with_object(CollisionObject("cube", pose, ((Box(0.01, 0.01, 0.01),
                                                                             pin.SE3.Identity()),)))
-            motion = MotionChecker(CollisionChecker(world, indices), indices, world.positions)
+            motion = MotionChecker(ExactCollisionChecker(world, indices), indices, world.positions)
             if all(motion.colliding_state(item.answer.trajectory.curve(0.02), 0.02) is None for item in items) and (
                     motion.colliding_state(joined.curve(0.02), 0.02) is not None):
                 return world

@@ -14,9 +14,9 @@ import trimesh
 from collision_worlds import shape_of, world_with
 from independent_checker import IndependentChecker
 
-from modular_framework_planning.collision_detection import collision_checker
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection import exact_collision_checker
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
@@ -43,7 +43,7 @@ class Neighbourhood:
     def __init__(self, scene: PlanningScene, group: str) -> None:
         self.scene, self.indices = scene, scene.model.group(group).indices
         self._rest = scene.model.default_positions()
-        self.ours = CollisionChecker(scene, self.indices)
+        self.ours = ExactCollisionChecker(scene, self.indices)
 
     def whole(self, values: np.ndarray) -> np.ndarray:
         """Positions of the whole robot."""
@@ -139,10 +139,10 @@ def assert_many_graze(counts: list[int]) -> None:
     assert counts.count(0) > len(counts) / 10 and sum(0 < count <= 5 for count in counts) > len(counts) / 3, counts
 
 
-@pytest.mark.parametrize("undecided_rows", [collision_checker.UNDECIDED_ROWS, 1])
+@pytest.mark.parametrize("undecided_rows", [exact_collision_checker.UNDECIDED_ROWS, 1])
 def test_no_touching_sample_of_an_arms_path_is_passed_over_and_no_free_path_is_refused(
         robot: object, monkeypatch: pytest.MonkeyPatch, undecided_rows: int) -> None:
-    monkeypatch.setattr(collision_checker, "UNDECIDED_ROWS", undecided_rows)
+    monkeypatch.setattr(exact_collision_checker, "UNDECIDED_ROWS", undecided_rows)
     rng = np.random.default_rng(31 + undecided_rows)
     assert_many_graze([world.touching_samples(world.grazing_path(rng)) for world in arm_worlds(robot, rng)
                        for _ in range(ARM_PATHS)])
@@ -166,8 +166,8 @@ def test_a_path_that_stays_close_to_contact_asks_the_exact_check_about_undecided
         return touches(exact, positions, pairs)
 
     def questions(rows: int) -> list[int]:
-        monkeypatch.setattr(collision_checker, "UNDECIDED_ROWS", rows)
-        checker = CollisionChecker(bars.scene, bars.indices)
+        monkeypatch.setattr(exact_collision_checker, "UNDECIDED_ROWS", rows)
+        checker = ExactCollisionChecker(bars.scene, bars.indices)
         asked.clear()
         assert all(checker.path_is_free(path, FINE_STEP) for path in paths)
         return list(asked)

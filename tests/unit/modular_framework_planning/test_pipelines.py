@@ -12,14 +12,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot, OrientationConstraint
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.ompl.planner_settings import PLANNERS, parameter_faults
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
@@ -229,7 +229,7 @@ def test_path_constraints_hold_along_the_whole_motion(model: RobotModel, pipelin
                                                       tolerance: float) -> None:
     constraints = level(model, tolerance)
     answer = pipeline.plan(wall_request(model, path_constraints=constraints))
-    motion = MotionChecker(CollisionChecker(wall_scene(model)), model.group(GROUP).indices, answer.start)
+    motion = MotionChecker(ExactCollisionChecker(wall_scene(model)), model.group(GROUP).indices, answer.start)
     curve = answer.trajectory.curve(0.004)
     assert arrives(answer) and len(curve) > 100
     assert all(constraints.satisfied(motion.full_positions(values)) for values in curve)
@@ -255,7 +255,7 @@ def test_requests_reach_another_process_whole(model: RobotModel) -> None:
     assert back.scene.model is model and back.goals == request.goals
     assert np.array_equal(back.scene.positions, request.scene.positions)
     assert back.path_constraints.satisfied(request.scene.positions)
-    assert not CollisionChecker(back.scene).contacts(back.scene.positions)
+    assert not ExactCollisionChecker(back.scene).contacts(back.scene.positions)
 
 
 def same(first: Trajectory, second: Trajectory) -> bool:

@@ -12,11 +12,11 @@ from independent_checker import IndependentChecker
 from independent_checker import box as solid_box
 from pose_difference import pose_difference
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -78,7 +78,7 @@ def named(model: RobotModel, positions: np.ndarray) -> dict[str, float]:
 
 
 def free_positions(model: RobotModel, scene: PlanningScene, rng: np.random.Generator) -> np.ndarray:
-    test = CollisionChecker(scene, model.group(GROUP).indices)
+    test = ExactCollisionChecker(scene, model.group(GROUP).indices)
     while True:
         positions = random_positions(model, rng)
         if test.is_free(positions):
@@ -95,7 +95,7 @@ def test_verdicts_equal_those_of_an_independent_checker(model: RobotModel, check
     for _ in range(4):
         scene, world = random_world(model, rng)
         checker.set_world(world)
-        ours = CollisionChecker(scene)
+        ours = ExactCollisionChecker(scene)
         for _ in range(150):
             positions = random_positions(model, rng)
             assert ours.is_free(positions) == (not checker.collisions(named(model, positions)))
@@ -210,7 +210,7 @@ def test_time_that_runs_out_is_told(model: RobotModel, pipeline: PlanningPipelin
     blocked = False
     while not blocked:
         start, goal = free_positions(model, scene, rng), free_positions(model, scene, rng)
-        motion = MotionChecker(CollisionChecker(scene, indices), indices, start)
+        motion = MotionChecker(ExactCollisionChecker(scene, indices), indices, start)
         blocked = not motion.edge_is_free(start[indices], goal[indices], 0.05)
     request = PlanningRequest(scene.with_positions(start), GROUP, (goal_at(model, goal),), allowed_time_s=1e-4)
     error = failure(pipeline, request)

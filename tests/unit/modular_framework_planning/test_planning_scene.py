@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 from pose_difference import pose_difference
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.errors import GeometryError, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.shapes import Box, Cylinder, Mesh, Plane, Sphere
 from modular_framework_planning.geometry.spatial import make_transform
@@ -78,8 +78,8 @@ def test_touch_links_may_touch_and_others_may_not(model: RobotModel) -> None:
     body = box("held", at(0, 0, 0.06), 0.03)
     with_touch = scene.with_attached(AttachedObject(body, PALM, gripper))
     without = scene.with_attached(AttachedObject(box("held", at(0, 0, 0.06), 0.3), PALM, frozenset()))
-    assert not CollisionChecker(with_touch).contacts(with_touch.positions)
-    touching = CollisionChecker(without).contacts(without.positions)
+    assert not ExactCollisionChecker(with_touch).contacts(with_touch.positions)
+    touching = ExactCollisionChecker(without).contacts(without.positions)
     assert touching, "a body around the fingers touches them"
 
 
@@ -87,11 +87,11 @@ def test_a_state_that_touches_an_object_says_which_link_touches_what_and_how_dee
     scene = upright(model)
     wrist = model.link_transforms(scene.positions)["wrist_3_link"].translation
     scene = scene.with_object(box("wall", at(wrist[0], wrist[1], wrist[2] + 0.02)))
-    contacts = CollisionChecker(scene).contacts(scene.positions)
+    contacts = ExactCollisionChecker(scene).contacts(scene.positions)
     assert any("wrist_3_link" in item.describe() and "'wall'" in item.describe() for item in contacts)
     assert all(item.depth > 0 for item in contacts)
     allowed = scene.with_acm(AllowedCollisionMatrix(scene.acm.entries, {"wall": True}, scene.acm.names))
-    assert CollisionChecker(allowed).is_free(scene.positions)
+    assert ExactCollisionChecker(allowed).is_free(scene.positions)
 
 
 @pytest.mark.parametrize("shape", [
@@ -104,7 +104,7 @@ def test_every_kind_of_shape_is_hit_and_missed(model: RobotModel, shape: object)
     tip = model.link_transforms(scene.positions)["wrist_2_link"].translation
     for offset, free in ((0.0, False), (1.0, True)):
         placed = scene.with_object(CollisionObject("thing", at(*tip + [0, 0, offset]), ((shape, at(0, 0, 0)),)))
-        assert CollisionChecker(placed).is_free(scene.positions) is free
+        assert ExactCollisionChecker(placed).is_free(scene.positions) is free
 
 
 def test_defaults_hold_only_where_no_entry_speaks_and_both_must_allow() -> None:
@@ -130,7 +130,7 @@ def touching(defaults: str) -> set[frozenset[str]]:
     scene = empty_scene(RobotModel(COARSE_ARM, srdf)).with_object(box("crate", at(0.2, 0, 0.38)))
     held = CollisionObject("held", pin.SE3.Identity(), ((Box(0.1, 0.1, 0.1), at(0.2, 0.0, 0.0)),))
     scene = scene.with_attached(AttachedObject(held, "upper", frozenset()))
-    contacts = CollisionChecker(scene).contacts(scene.positions)
+    contacts = ExactCollisionChecker(scene).contacts(scene.positions)
     return {frozenset((item.first.name, item.second.name)) for item in contacts}
 
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import empty_map
@@ -56,7 +56,7 @@ def ceiling(scene: PlanningScene, gap: float = GAP) -> CollisionObject:
 
 
 def is_free(scene: PlanningScene) -> bool:
-    checker = CollisionChecker(scene)
+    checker = ExactCollisionChecker(scene)
     free = bool(checker.is_free(scene.positions))
     assert free == (not checker.contacts(scene.positions, include_fixed=False)), "both questions have one answer"
     return free
@@ -96,7 +96,7 @@ def test_voxels_are_obstacles_that_an_entry_for_the_octomap_allows(scene: Planni
     seen = empty_map(0.05).with_point_cloud(np.zeros(3) + 3.0, points, NOTHING, NOTHING)
     blocked = scene.with_octomap(Octree(seen))
     assert not is_free(blocked)
-    names = {name for item in CollisionChecker(blocked).contacts(blocked.positions)
+    names = {name for item in ExactCollisionChecker(blocked).contacts(blocked.positions)
              for name in (item.first.name, item.second.name)}
     assert "<octomap>" in names
     acm = blocked.acm
@@ -123,4 +123,4 @@ def test_a_thing_wholly_inside_a_link_that_is_a_box_collides(thing: Shape) -> No
         pose = pin.SE3(np.eye(3), np.array([place, 0.0, 0.0]))
         placed = scene.with_object(CollisionObject("thing", pose, ((thing, pin.SE3.Identity()),)))
         assert is_free(placed) is free
-        assert bool(CollisionChecker(placed).contacts(scene.positions)) == (not free)
+        assert bool(ExactCollisionChecker(placed).contacts(scene.positions)) == (not free)

@@ -12,8 +12,7 @@ import pytest
 import trimesh
 from independent_checker import IndependentChecker, box
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot, OrientationConstraint
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -23,6 +22,7 @@ from modular_framework_planning.planners.ompl.constrained_search import Constrai
 from modular_framework_planning.planners.ompl.planner import OmplPlanner, connection
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
 from modular_framework_planning.planning_interface.goals import GoalResolver
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.path_repair import EdgeError, repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
@@ -177,7 +177,7 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
     PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(asked)
     problem = planner.asked[0]
     way = OmplPlanner.repaired(problem, np.array([START, GOAL, START]))
-    checker = CollisionChecker(asked.scene, problem.group.indices)
+    checker = ExactCollisionChecker(asked.scene, problem.group.indices)
     assert checker.path_is_free(problem.motion.full_path(way), problem.settings.finest_step)
     assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
     with pytest.raises(EdgeError, match="edge 1 of 2"):
@@ -239,7 +239,7 @@ def test_the_allowed_time_covers_building_the_world_and_what_was_built_is_kept(
 def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel, pool: KinematicsPool) -> None:
     asked = request(model)
     indices = model.group(GROUP).indices
-    checker = CollisionChecker(asked.scene, indices)
+    checker = ExactCollisionChecker(asked.scene, indices)
     motion = MotionChecker(checker, indices, asked.scene.positions)
     free, hit = request(model, START).goals, JointGoal(dict(zip(model.group(GROUP).joints, (
         1.57, 0.6, 0.0, 0.0, 0.0, 0.0), strict=True)))
@@ -251,7 +251,7 @@ def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel,
     assert len(found(*free, hit, hit)) == 1
     block = CollisionObject("block", pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), (
         (Box(3.0, 3.0, 3.0), pin.SE3.Identity()),))
-    checker = CollisionChecker(asked.scene.with_object(block), indices)
+    checker = ExactCollisionChecker(asked.scene.with_object(block), indices)
     motion = MotionChecker(checker, indices, asked.scene.positions)
     with pytest.raises(PlanningError, match="1 of 3 alternatives were looked at.*'block'") as caught:
         found(hit, hit, *free)

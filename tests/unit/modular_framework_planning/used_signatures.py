@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numba.core.dispatcher import Dispatcher
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
@@ -67,7 +67,7 @@ def use(model: RobotModel) -> None:
     for planner in (OmplPlanner(), StompPlanner.configure(model, settings)):
         pipeline = PlanningPipeline(model, kinematics, settings, planner, make_adapters())
         pipeline.plan(PlanningRequest(scene, GROUP, (PoseGoal(group.tip_link, goal),), allowed_time_s=60.0))
-    CollisionChecker(scene).contacts(positions)
+    ExactCollisionChecker(scene).contacts(positions)
 
 
 def main() -> None:

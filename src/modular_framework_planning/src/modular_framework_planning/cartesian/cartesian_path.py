@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 
 LONGEST_STEP_M = 0.01  # a longer max_step is followed in steps of this length
 RADIANS_PER_METRE = 3.5  # a step of 0.01 m may turn by 0.035 rad, as in MoveIt

@@ -11,6 +11,7 @@ from modular_framework_planning.move_group.monitors.scene_monitor import SceneMo
 from modular_framework_planning.move_group.node_settings import MotionSettings
 from modular_framework_planning.move_group.pipeline_parameters import PipelineSet
 from modular_framework_planning.move_group.planning_report import Reporter
+from modular_framework_planning.planning_interface.collision_checker import CollisionCheckerFactory
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -28,6 +29,7 @@ class MoveGroupContext:
     markers: MarkerPublisher
     reporter: Reporter
     settings: MotionSettings
+    new_checker: CollisionCheckerFactory
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
         """Plans with the pipeline the request names, or the default one.

@@ -166,7 +166,7 @@ class Manipulation:
                                   cancelled=self._cancelled.is_set,
                                   path_constraints=None if constraints.is_empty else constraints)
         return ManoeuvrePlanner(arm, self._context.plan, request, settings.start_state_contact_tolerance,
-                                self._context.settings.pick_place)
+                                self._context.settings.pick_place, self._context.new_checker)
 
     # ---------------------------------------------------------------- execution
     def _message(self, stage: Stage) -> RobotTrajectory:

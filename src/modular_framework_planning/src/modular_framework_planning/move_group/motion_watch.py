@@ -41,7 +41,7 @@ class WatchedMotion:
         self._watch: PathWatch | None = None
         if motion.points:
             rows = np.array([point.positions for point in motion.points], dtype=float)
-            self._watch = PathWatch(self._joints, rows, change(planned_in))
+            self._watch = PathWatch(self._joints, rows, change(planned_in), context.new_checker)
             self._seen_version = planned_in.geometry_version
         self._stop, self._ended = threading.Event(), threading.Event()
         self._blocked = ""

@@ -7,7 +7,6 @@ import time
 
 import rospy
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.move_group.capabilities.cartesian_path_service import CartesianPathService
@@ -42,9 +41,14 @@ from modular_framework_planning.move_group.padding_parameters import load_paddin
 from modular_framework_planning.move_group.pipeline_parameters import load_pipelines
 from modular_framework_planning.move_group.planning_report import Reporter
 from modular_framework_planning.move_group.reconfiguration import given_settings, reconfigurations
-from modular_framework_planning.move_group.robot_parameters import load_kinematics_settings, load_robot_model
+from modular_framework_planning.move_group.robot_parameters import (
+    collision_detector_name,
+    load_kinematics_settings,
+    load_robot_model,
+)
 from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
+from modular_framework_planning.planning_interface.collision_detectors import collision_detector
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.process_setup.many_threads import prepare
 from modular_framework_ros.service_backlog import widen_backlog
@@ -75,12 +79,14 @@ def build_context() -> MoveGroupContext:
     kinematics = KinematicsPool(model, load_kinematics_settings())
     monitor = SceneMonitor(model, load_padding(model), given_settings("planning_scene_monitor", SceneMonitorSettings()))
     execution = load_execution(monitor)
-    pipelines = load_pipelines(model, kinematics)
+    detector = collision_detector_name()
+    new_checker = collision_detector(detector)
+    pipelines = load_pipelines(model, kinematics, detector)
     pipelines.sampling_settings = given_settings("ompl", pipelines.sampling_settings)
     settings = MotionSettings(given_settings("plan_execution", PlanExecutionSettings()),
                               given_settings("pick_place", PickPlaceSettings()))
     return MoveGroupContext(model, monitor, kinematics, pipelines, execution, MarkerPublisher(model.planning_frame),
-                            Reporter(publish_requests="--debug" in rospy.myargv()), settings)
+                            Reporter(publish_requests="--debug" in rospy.myargv()), settings, new_checker)
 
 
 def advertise(context: MoveGroupContext) -> None:
@@ -113,7 +119,7 @@ def main() -> int:
         rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
     compile_all()
     scene = context.monitor.snapshot()
-    checker = CollisionChecker(scene)
+    checker = context.new_checker(scene)
     checker.is_free(scene.positions)  # builds what both checks need of the links
     checker.distance(scene.positions)
     advertise(context)

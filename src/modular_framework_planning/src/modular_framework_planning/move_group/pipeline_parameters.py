@@ -118,8 +118,13 @@ def pipeline_settings(parameters: Mapping[str, Any]) -> PipelineSettings:
     return PipelineSettings(**values, parameters=parameters, robot_planning=planning)
 
 
-def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet:
+def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_detector: str) -> PipelineSet:
     """Builds every pipeline; one that cannot be built is left out, with its reason in the log.
+
+    Args:
+        model: the robot.
+        kinematics: inverse kinematics of its groups.
+        collision_detector: name of the collision checker of all of them.
 
     Raises:
         ModelError: the default pipeline is not among the parameters, or cannot be built.
@@ -130,7 +135,7 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool) -> PipelineSet
     specs: list[PipelineSpec] = []
     for name, item in parameters.items():
         try:
-            spec = _spec(name, item)
+            spec = _spec(name, item, collision_detector)
             loaded[name] = _build(spec, model, kinematics)
             specs.append(spec)
         except PlanningError as error:
@@ -155,11 +160,11 @@ def _start(seeded: SeededPlanning) -> None:
         rospy.logerr("%s", error.reason)
 
 
-def _spec(name: str, parameters: Mapping[str, Any]) -> PipelineSpec:
+def _spec(name: str, parameters: Mapping[str, Any], collision_detector: str) -> PipelineSpec:
     given = parameters.get("request_adapters")
     adapters = DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given)
     return PipelineSpec(name, str(parameters.get("planning_plugin") or DEFAULT_PLANNER), adapters,
-                        pipeline_settings(parameters))
+                        pipeline_settings(parameters), collision_detector)
 
 
 def _build(spec: PipelineSpec, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:

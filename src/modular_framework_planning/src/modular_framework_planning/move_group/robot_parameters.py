@@ -11,6 +11,7 @@ from modular_framework_planning.kinematics.kinematics_settings import Kinematics
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 DESCRIPTION = "robot_description"
+COLLISION_DETECTOR = "collision_detector"
 
 
 def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
@@ -38,3 +39,9 @@ def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
 def load_kinematics_settings() -> dict[str, KinematicsSettings]:
     """Returns the settings of groups in robot_description_kinematics (kinematics.yaml); raises PlanningError."""
     return settings_from(rospy.get_param(f"{DESCRIPTION}_kinematics", {}) or {})
+
+
+def collision_detector_name() -> str:
+    """Returns `collision_detector` of the node or of a namespace above it, as in MoveIt; empty where there is none."""
+    found = rospy.search_param(COLLISION_DETECTOR)
+    return str(rospy.get_param(found)) if found else ""

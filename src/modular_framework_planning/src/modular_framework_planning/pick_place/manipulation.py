@@ -19,8 +19,6 @@ from modular_framework_planning.cartesian.cartesian_path import (
     collision_objection,
     straight_line,
 )
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.contacts import ATTACHED, WORLD, describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -28,6 +26,9 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.solution_choice import first_free
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
+from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup
@@ -128,7 +129,8 @@ class ManoeuvrePlanner:
     """Plans manoeuvres one after the other within one deadline. Not for use from two threads at a time."""
 
     def __init__(self, arm: Arm, plan: Callable[[PlanningRequest], PlanningAnswer], request: PlanningRequest,
-                 contact_tolerance_m: float, settings: PickPlaceSettings | None = None) -> None:
+                 contact_tolerance_m: float, settings: PickPlaceSettings | None = None,
+                 new_checker: CollisionCheckerFactory = DEFAULT_CHECKER) -> None:
         """Takes what all manoeuvres share.
 
         Args:
@@ -137,9 +139,11 @@ class ManoeuvrePlanner:
             request: a template of that plan: scene, planner, time allowed, path constraints.
             contact_tolerance_m: depth at which a held object may already touch something.
             settings: how finely lines are solved and how many postures are tried.
+            new_checker: makes the collision checkers.
         """
         self._arm, self._plan, self._template = arm, plan, request
         self._tolerance_m, self._settings = contact_tolerance_m, settings or PickPlaceSettings()
+        self._new_checker = new_checker
         self._deadline_s = time.monotonic() + request.allowed_time_s
         self._constraints: KinematicConstraints | None = request.path_constraints
 
@@ -175,11 +179,11 @@ class ManoeuvrePlanner:
     def _checkers(self, scene: PlanningScene) -> tuple[CollisionChecker, MotionChecker]:
         """Builds the checkers of a scene; shallow contacts that a held object has there may stay."""
         indices = self._arm.group.indices
-        checker = CollisionChecker(scene, indices)
+        checker = self._new_checker(scene, indices)
         shallow = [item for item in checker.contacts(scene.positions, include_fixed=False)
                    if {item.first.kind, item.second.kind} == {ATTACHED, WORLD} and item.depth <= self._tolerance_m]
         if shallow:
-            checker = CollisionChecker(scene, indices, shallow)
+            checker = self._new_checker(scene, indices, shallow)
         return checker, MotionChecker(checker, indices, scene.positions)
 
     def _objection(self, scene: PlanningScene) -> Objection:

@@ -10,14 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
 from modular_framework_planning.kinematics.solution_choice import first_free
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import (
     ConstraintGoal,
     JointGoal,

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.contacts import ATTACHED, WORLD, describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
+from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.path_repair import EdgeError
 from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
@@ -44,7 +45,8 @@ class PlanningPipeline:
     """Plans for one robot; threads may share it, each plan has its own collision world."""
 
     def __init__(self, model: RobotModel, kinematics: KinematicsPool, settings: PipelineSettings,
-                 planner: Planner, adapters: Sequence[RequestAdapter] = (), name: str = "ompl") -> None:
+                 planner: Planner, adapters: Sequence[RequestAdapter] = (), name: str = "ompl",
+                 new_checker: CollisionCheckerFactory = DEFAULT_CHECKER) -> None:
         """Stores the parts; PipelineSpec builds them from their names.
 
         Args:
@@ -54,11 +56,13 @@ class PlanningPipeline:
             planner: finds the path.
             adapters: outermost first.
             name: what `pipeline_id` calls it.
+            new_checker: makes the collision checkers.
         """
         self._model = model
         self._kinematics = kinematics
         self._planner = planner
         self._adapters = tuple(adapters)
+        self._new_checker = new_checker
         self.name = name
         self.settings = settings
         self.configurations = PlannerConfigurations(settings.planner_configs)
@@ -181,7 +185,7 @@ class PlanningPipeline:
         Raises:
             PlanningError: bodies touch that the group cannot separate.
         """
-        checker = CollisionChecker(scene, group.indices)
+        checker = self._new_checker(scene, group.indices)
         checker.build(check_interrupt)
         fixed = checker.fixed_contacts(start)
         if fixed:
@@ -192,7 +196,7 @@ class PlanningPipeline:
         shallow = [item for item in checker.contacts(start, include_fixed=False)
                    if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
                    and item.depth <= self.settings.start_state_contact_tolerance]
-        return CollisionChecker(scene, group.indices, shallow) if shallow else checker
+        return self._new_checker(scene, group.indices, shallow) if shallow else checker
 
     def _problem(self, request: PlanningRequest, begun: float) -> PlanningProblem:
         """Reads the request; everything that can be refused without planning is refused here."""

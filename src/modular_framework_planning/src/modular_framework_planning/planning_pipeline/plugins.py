@@ -2,13 +2,12 @@
 """Finds planners and request adapters by the names config packages give them: MoveIt's, or `module/Class`."""
 from __future__ import annotations
 
-import importlib
 import re
-from typing import Any
 
-from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.errors import ModelError
 from modular_framework_planning.planning_interface.planner_interface import Planner
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
+from modular_framework_planning.planning_interface.plugin_classes import plugin_class
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -45,7 +44,7 @@ def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> 
     """
     name = plugin.replace("::", "/")
     known = f"known are {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
-    kind = _class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", known)
+    kind = plugin_class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", known)
     planner = kind.configure(model, settings) if hasattr(kind, "configure") else kind()
     if not callable(getattr(planner, "plan", None)):
         raise ModelError(f"planning_plugin '{plugin}': class {kind.__name__} has no method plan; {known}")
@@ -69,7 +68,7 @@ def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
         if short in NOT_NEEDED:
             continue
         path = f"{PACKAGE}.planning_pipeline.adapters.{_snake_case(short)}/{short}" if short in ADAPTERS else name
-        adapter = _class(path, f"request_adapters: '{name}'", known)()
+        adapter = plugin_class(path, f"request_adapters: '{name}'", known)()
         if not callable(getattr(adapter, "adapt_and_plan", None)):
             raise ModelError(f"request_adapters: '{name}' has no method adapt_and_plan; {known}")
         result.append(adapter)
@@ -78,18 +77,3 @@ def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
 
 def _snake_case(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-
-
-def _class(path: str, where: str, known: str) -> Any:
-    """Imports `module/Class`; raises ModelError with the reason and what is known."""
-    module, _, name = path.partition("/")
-    if not re.fullmatch(r"[A-Za-z_][\w.]*", module) or not name.isidentifier():
-        raise ModelError(f"{where} is not known; {known}")
-    try:
-        return getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise ModelError(f"{where} is not known ({error}); {known}") from error
-    except PlanningError:
-        raise
-    except Exception as error:  # noqa: BLE001 - a user's module may fail in any way; the cause must be reported
-        raise ModelError(f"{where}: its module fails with {type(error).__name__}: {error}; mend the module") from error

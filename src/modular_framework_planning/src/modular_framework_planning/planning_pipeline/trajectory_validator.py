@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.path_repair import describe_state
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
 

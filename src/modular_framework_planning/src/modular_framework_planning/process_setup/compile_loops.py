@@ -12,14 +12,13 @@ import time
 import numpy as np
 from pinocchio import SE3 as Transform
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
 from modular_framework_planning.kinematics import compiled_kinematics
 from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
 from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, self_filter_of
-from modular_framework_planning.planners.stomp import costs
 from modular_framework_planning.planning_scene.planning_scene import (
     AttachedObject,
     CollisionObject,
@@ -80,11 +79,11 @@ def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
 
 
 def _check_motions(scene: PlanningScene) -> None:
-    checker = CollisionChecker(scene)
+    checker = ExactCollisionChecker(scene)
     checker.is_free(scene.positions)
     checker.path_is_free(np.array([scene.positions, scene.positions + 0.1]), MOTION_STEP)
     checker.contacts(scene.positions)
-    costs.warm_up(checker.world)
+    checker.collision_costs(np.array([scene.positions]))
 
 
 def main() -> None:

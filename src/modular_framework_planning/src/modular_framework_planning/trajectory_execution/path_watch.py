@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
+from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
 CHECK_STEP = 0.01  # [rad or m, any joint]
@@ -17,17 +18,19 @@ CHECK_STEP = 0.01  # [rad or m, any joint]
 class PathWatch:
     """Follows the robot along one motion. Not for use from two threads at a time."""
 
-    def __init__(self, joint_names: Sequence[str], rows: Array, planned_in: PlanningScene) -> None:
+    def __init__(self, joint_names: Sequence[str], rows: Array, planned_in: PlanningScene,
+                 new_checker: CollisionCheckerFactory = DEFAULT_CHECKER) -> None:
         """Takes a motion.
 
         Args:
             joint_names: joints of the motion; all of them are joints of the robot.
             rows: positions along the path, in order, shape (n, joints) [rad or m].
             planned_in: the scene in which the motion was found to be acceptable.
+            new_checker: makes the collision checkers.
         """
         self._indices = np.array([planned_in.model.index[name] for name in joint_names], dtype=np.int64)
         self._rows = np.asarray(rows, dtype=float)
-        self._planned_in = planned_in
+        self._planned_in, self._new_checker = planned_in, new_checker
         self._reached = 0
 
     def advance(self, positions: Array) -> None:
@@ -53,7 +56,7 @@ class PathWatch:
         return ""
 
     def _checkers(self, scene: PlanningScene) -> tuple[CollisionChecker, MotionChecker]:
-        checker = CollisionChecker(scene, self._indices)
+        checker = self._new_checker(scene, self._indices)
         return checker, MotionChecker(checker, self._indices, scene.positions)
 
 

@@ -17,8 +17,6 @@ from modular_framework_planning.cartesian.cartesian_path import (
     no_objection,
     straight_line,
 )
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
@@ -27,6 +25,8 @@ from modular_framework_planning.messages.conversions import scene_with_state, st
 from modular_framework_planning.messages.poses import transform_from_pose
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.line_timing import time_line
@@ -103,7 +103,8 @@ class CartesianPathService:
         checker = None
         if request.avoid_collisions:
             checker = self._context.pipeline("").checker(scene, group, scene.positions)
-        motion = MotionChecker(checker or CollisionChecker(scene, group.indices), group.indices, scene.positions)
+        any_checker = checker or self._context.new_checker(scene, group.indices)
+        motion = MotionChecker(any_checker, group.indices, scene.positions)
         return _Lines(scene, group, solver, link, carried, _waypoints(scene, name, request), motion, checker)
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:

@@ -15,7 +15,6 @@ from moveit_msgs.srv import (
     GetPositionIKResponse,
 )
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array, Transform
@@ -112,7 +111,7 @@ class KinematicsService:
         kept = self._constrained(scene, request, found, link)
         if not request.avoid_collisions:
             return kept[0]
-        checker = CollisionChecker(scene, group.indices)
+        checker = self._context.new_checker(scene, group.indices)
         free = first_free(kept, checker.is_free, MAX_COMPARED)
         if free:
             return clearest(free, scene.positions, checker.distance)

@@ -9,7 +9,6 @@ import rospy
 from moveit_msgs.msg import ContactInformation
 from moveit_msgs.srv import GetStateValidity, GetStateValidityResponse
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.constraint_conversions import evaluated_one_by_one, result_messages
@@ -50,7 +49,7 @@ class StateValidationService:
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
         group = model.group(request.group_name) if request.group_name else None
         moving = [int(number) for number in (group.indices if group else range(len(model.joint_names)))]
-        contacts = CollisionChecker(scene, moving).contacts(scene.positions, include_fixed=group is None)
+        contacts = self._context.new_checker(scene, moving).contacts(scene.positions, include_fixed=group is None)
         problems = model.bound_violations(scene.positions, moving, 1e-6)
         results, refused = evaluated_one_by_one(scene, request.constraints, "constraints",
                                                 group.tip_link if group else "")

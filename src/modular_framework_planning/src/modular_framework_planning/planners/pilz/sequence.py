@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
-from modular_framework_planning.collision_detection.motion_check import MotionChecker
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.blending import appended, blend
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup

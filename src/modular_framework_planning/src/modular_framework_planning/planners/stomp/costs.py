@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World
+from modular_framework_planning.contacts import TOUCH_COST_M
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.planners.stomp.compiled_costs import cover_of, depths
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCostEstimator
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 
-WIDEST_SPHERE = 0.07  # [m]; of those that stand for the bodies
 DEPTH_WEIGHT = 10.0  # with 1, grazing an obstacle for a few states costs less than the accelerations of a detour
 
 
@@ -18,13 +17,11 @@ class StateCosts:
 
     def __init__(self, problem: PlanningProblem) -> None:
         self._problem = problem
-        self._world = problem.checker.world
-        self._cover = cover_of(self._world, WIDEST_SPHERE)
 
     def __call__(self, values: Array) -> Array:
         """Returns costs of joint vectors (n, joints), shape (n,)."""
         states = self._problem.motion.full_path(values)
-        costs = DEPTH_WEIGHT * np.asarray(depths(self._world, self._cover, states))
+        costs = DEPTH_WEIGHT * collision_costs(self._problem.checker, states)
         if self._problem.constraints is not None:
             costs += [self._violation(row) for row in values]
         return costs
@@ -36,6 +33,9 @@ class StateCosts:
         return float(sum(1.0 + item.distance for item in results if not item.satisfied))
 
 
-def warm_up(world: World) -> None:
-    """Compiles the loops of this module, or loads them; any world will do."""
-    depths(world, cover_of(world, WIDEST_SPHERE), np.zeros((1, len(world.tree.parents))))
+def collision_costs(checker: CollisionChecker, states: Array) -> Array:
+    """Returns the costs of collisions of states (n, joints), shape (n,)."""
+    if isinstance(checker, CollisionCostEstimator):
+        return checker.collision_costs(states)
+    return np.array([sum(item.depth + TOUCH_COST_M for item in checker.contacts(state, include_fixed=False))
+                     for state in states], dtype=float)

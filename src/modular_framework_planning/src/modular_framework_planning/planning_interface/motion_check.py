@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.collision_checker import CollisionChecker
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 
 
 class MotionChecker:

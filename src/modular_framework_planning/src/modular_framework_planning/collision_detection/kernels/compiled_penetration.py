@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, pair_bound, place_bodies
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, SURFACE, solid_distance
+from modular_framework_planning.contacts import TOUCH_COST_M
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
-TOUCH = 0.03  # [m]; added where bodies touch, however little
+WIDEST_SPHERE = 0.07  # [m]; of those that cover the bodies
 NEAR = 1.0e-5  # [m]; bodies less apart count as touching
 
 
@@ -31,8 +32,8 @@ class Cover(NamedTuple):
     starts: NDArray[np.int64]
 
 
-def cover_of(world: World, widest: float) -> Cover:
-    """Covers every body by the largest spheres of its tree that are at most `widest` in radius [m]."""
+def cover_of(world: World) -> Cover:
+    """Covers every body by the largest spheres of its tree that are at most WIDEST_SPHERE in radius."""
     rows: list[Array] = []
     starts = [0]
     for body, root in enumerate(world.roots.tolist()):
@@ -41,7 +42,7 @@ def cover_of(world: World, widest: float) -> Cover:
         while open_nodes:
             node = open_nodes.pop()
             left, right = surface.links[node].tolist()
-            if left < 0 or surface.spheres[node, 3] <= widest:
+            if left < 0 or surface.spheres[node, 3] <= WIDEST_SPHERE:
                 rows.append(surface.spheres[node])
             else:
                 open_nodes += [left, right]
@@ -83,7 +84,7 @@ def _pair_depth(world, cover, placed, poses, middle, first, second, reach):  # t
 
 
 @njit(cache=True, nogil=True)
-def depths(world, cover, states):  # type: ignore[no-untyped-def]
+def penetrations(world, cover, states):  # type: ignore[no-untyped-def]
     """Returns how deep some states are in collision, summed over the pairs [m]; 0 where no pair touches.
 
     Args:
@@ -108,6 +109,6 @@ def depths(world, cover, states):  # type: ignore[no-untyped-def]
                     for i in range(cover.starts[body], cover.starts[body + 1]):
                         _place(poses[body], cover.spheres[i], placed[i])
             first, second = world.pairs[pair, 0], world.pairs[pair, 1]
-            result[number] += TOUCH + _pair_depth(world, cover, placed, poses, middles[second], first, second,
+            result[number] += TOUCH_COST_M + _pair_depth(world, cover, placed, poses, middles[second], first, second,
                                                   world.margins[pair])
     return result

@@ -20,14 +20,15 @@ from modular_framework_planning.collision_detection.collision_bodies import (
 )
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
+from modular_framework_planning.collision_detection.kernels.compiled_collision import surrounded_pair_at
 from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     UNDECIDED_ROWS,
     check_polyline,
     sample_at,
 )
-from modular_framework_planning.contacts import Body, Contact
+from modular_framework_planning.collision_detection.kernels.compiled_penetration import Cover, cover_of, penetrations
+from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -36,7 +37,7 @@ DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may seem throug
 EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can decide
 
 
-class CollisionChecker:
+class ExactCollisionChecker:
     """Checks states and paths of the robot in one snapshot of the scene.
 
     Not for use from two threads at a time: it holds the working memory of the check. Pairs whose relative pose the
@@ -51,7 +52,6 @@ class CollisionChecker:
             moving: joints that will move, as indices in a position vector; all by default.
             tolerated: contacts of held bodies that may stay but not deepen.
         """
-        self.scene = scene
         self.model: RobotModel = scene.model
         self._parts: list[PlacedGeometry] = placed_geometries(scene)
         self._pairs: list[WatchedPair] = watched_pairs(scene, self._parts, moving)
@@ -82,16 +82,6 @@ class CollisionChecker:
         """
         pairs = [self._pairs[number] for number in self._moving]
         self._compiled = compile_world(self.model, self._parts, pairs, check_interrupt)
-
-    @property
-    def world(self) -> World:
-        """The bounding geometries of all bodies as arrays, and the pairs the moving joints can bring together."""
-        return self._compiled.world
-
-    @property
-    def bodies(self) -> list[Body]:
-        """The body of each collision geometry: links, held objects, the world."""
-        return [part.body for part in self._parts]
 
     def is_free(self, positions: Array) -> bool:
         """Whether no pair that can move touches at these positions (of the whole robot)."""
@@ -178,3 +168,15 @@ class CollisionChecker:
     def distance(self, positions: Array) -> float:
         """Returns the smallest distance [m] between bodies that may not touch; 0 or less when they do."""
         return self._exact.distance(positions, range(len(self._pairs)))
+
+    @cached_property
+    def _cover(self) -> Cover:
+        return cover_of(self._compiled.world)
+
+    def collision_costs(self, states: Array) -> Array:
+        """Returns the sum of depth and TOUCH_COST_M over the pairs that touch [m], from spheres around the bodies.
+
+        Args:
+            states: positions of the whole robot, shape (n, joints); costs have shape (n,).
+        """
+        return np.asarray(penetrations(self._compiled.world, self._cover, states))
