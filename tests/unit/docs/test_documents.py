@@ -18,6 +18,8 @@ ROOT = Path(__file__).parents[3]
 STATES = ROOT / "src/modular_framework_states/src/modular_framework_states/states"
 TEMPLATES = ROOT / "src/modular_framework_core/templates"
 LINK = re.compile(r"(?<!!)\[[^\]]*\]\(([^)\s]+)\)")
+MODULE = re.compile(r"(?:^\s*from|python3 -m) (modular_framework_\w+\.[\w.]*\w)", re.MULTILINE)
+ENDS = (".py", "/__init__.py")
 PATH = re.compile(r"`((?:src|docs|tests|benchmarks)/[\w./*-]+)`")
 
 
@@ -53,6 +55,14 @@ def test_links_lead_to_pages_and_headings_that_exist(document: Path) -> None:
 def test_files_that_a_page_names_exist(document: Path) -> None:
     missing = [path for path in PATH.findall(document.read_text()) if not list(ROOT.glob(path))]
     assert not missing
+
+
+def test_modules_that_pages_import_or_run_exist() -> None:
+    files = {str(file) for file in (ROOT / "src").rglob("*.py")}
+    named = {(page.name, name) for page in documents() for name in MODULE.findall(page.read_text())}
+    assert len(named) > 5
+    assert not [item for item in named if not any(
+        file.endswith(f"/{item[1].replace('.', '/')}{end}") for file in files for end in ENDS)]
 
 
 def test_the_table_of_packages_is_complete() -> None:
