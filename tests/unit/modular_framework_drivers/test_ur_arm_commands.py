@@ -10,7 +10,7 @@ import pytest
 
 from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
 from modular_framework_drivers.ur import rtde_link, ur_arm_robot_hw
-from modular_framework_drivers.ur.arm_messages import READY, TAKEN, ArmState
+from modular_framework_drivers.ur.arm_messages import ACCEPTED, READY, ArmState
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
 from modular_framework_drivers.ur.rtde_process import command_line
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
@@ -130,7 +130,7 @@ class FakeProcess:
             yield READY
         elif self._taken:
             self._taken = False
-            yield TAKEN
+            yield ACCEPTED
 
     def send(self, message: bytes) -> bool:
         self._taken = True

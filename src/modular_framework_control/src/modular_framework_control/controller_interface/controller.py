@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every controller is: a class made without arguments that is initialised, started, updated and stopped.
+"""Base class of controllers: made without arguments, then initialised, started, updated and stopped.
 
 `init` runs on a thread that may wait; `waiting`, `starting`, `update`, `stopping`, `aborting` and `failed` run in the
 control loop and must not block. What is started there inherits the priority of the loop, so start threads and processes
@@ -27,10 +27,10 @@ class Controller:
 
     Attributes:
         interface_class: the hardware interface this controller works on.
-        robot_hw: the hardware, set before `init`, for who needs another interface besides; what is asked of any of its
-            interfaces in `init` is claimed for this controller.
-        pids: set by `init` of those that have gains, by the namespace, below the controller's name, in which the gains
-            are found and can be adjusted while the controller runs.
+        robot_hw: the hardware, set before `init`, for controllers that need a second interface; the handles that `init`
+            gets from any of its interfaces are claimed for this controller.
+        pids: set by `init` of controllers with gains; the keys are the namespaces of the gains below the controller's
+            name, in which they can be changed while the controller runs.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]]
@@ -38,30 +38,30 @@ class Controller:
     pids: Mapping[str, Pid] = MappingProxyType({})
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
-        """Get the joint handles and read the parameters.
+        """Gets the joint handles and reads the parameters.
 
         Args:
-            hw: the interface of class `interface_class`; the joints asked of it are claimed for this controller.
+            hw: the interface of class `interface_class`; the joints of the handles that are taken are claimed.
             root_nh: namespace of the robot.
             controller_nh: namespace of this controller's own parameters, topics and actions.
 
         Returns:
-            Whether the controller can be used. Raising an exception that says why not is preferred over False.
+            Whether the controller can be used. An exception with the reason is better than False.
         """
         del hw, root_nh, controller_nh
         return True
 
     def waiting(self, time_s: float) -> None:
-        """Called in every cycle in which the hardware is not ready yet for this controller, which is to start."""
+        """Called in every cycle in which the hardware is not yet ready to start this controller."""
 
     def aborting(self, time_s: float) -> None:
-        """Called once in place of `starting` when the hardware refused the switch or took longer than allowed."""
+        """Called once instead of `starting` if the hardware refused the switch or took too long."""
 
     def starting(self, time_s: float) -> None:
         """Called once before the first update after a start."""
 
     def update(self, time_s: float, period_s: float) -> None:
-        """One control cycle.
+        """Runs one control cycle.
 
         Args:
             time_s: time of this cycle [s].
@@ -72,22 +72,23 @@ class Controller:
         """Called once after the last update before a stop."""
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
-        """Called once when hardware whose joints it commands cannot follow: end goals, hold, refuse new ones.
+        """Called once when the hardware of its joints cannot follow: end goals, hold, refuse new ones.
 
-        `update` goes on being called. A controller that is started meanwhile is told before its first update.
+        `update` is still called in every cycle. For a controller that starts during a fault this is called before its
+        first update.
 
         Args:
             time_s: time of this cycle [s].
-            reason: for whoever waits for a result.
+            reason: for the results of the goals.
         """
 
     def on_hardware_recovered(self, time_s: float) -> None:
-        """Called once when the hardware can follow again; it may stand elsewhere: hold it where it is measured."""
+        """Called once when the hardware can follow again; the joints may have moved, so hold the measured positions."""
 
     def failed(self, time_s: float, reason: str) -> None:
-        """Called in place of `stopping` when this controller raised; `reason` is for whoever waits for a result."""
+        """Called instead of `stopping` if this controller raised; `reason` is for the results of its goals."""
         del reason
         self.stopping(time_s)
 
     def close(self) -> None:
-        """Called once, after the controller was unloaded, on a thread that may wait: close what `init` opened."""
+        """Called once after the controller was unloaded, on a thread that may wait; closes what `init` opened."""

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loads, starts, updates, stops and unloads controllers on one `RobotHW`, with the rules of ros_control.
 
-Two sides meet here. Threads that may wait (services) load, unload and ask for switches; the control loop calls
-`update`, which never waits for them: the list of controllers is replaced as a whole, and a switch is handed over in
-one slot.
+Threads that may wait (services) load and unload controllers and request switches. The control loop calls `update`,
+which never waits for them: the list of controllers is replaced as a whole, a switch is handed over in one attribute.
 """
 from __future__ import annotations
 
@@ -169,7 +168,7 @@ class ControllerManager:
             info = ControllerInfo(name, controller_type, self._init_controller(name, controller, controller_nh))
             try:
                 detach = self._attach(name, controller)
-            except Exception as error:  # somebody else's code may raise anything
+            except Exception as error:  # user code may raise anything
                 _close(name, controller, lambda: None)
                 raise ControllerError(f"cannot load controller '{name}': opening its topics and actions raised "
                                       f"{type(error).__name__}: {error}") from error

@@ -35,7 +35,7 @@ class UpdateStatistics:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Sets all statistics to their initial values."""
         self._count = 0
         self._mean_s = self._squares = self._max_s = 0.0
         self._updated_at_s = self._last_overrun_s = 0.0

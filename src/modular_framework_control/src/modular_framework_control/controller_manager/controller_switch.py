@@ -38,7 +38,7 @@ class Strictness(IntEnum):
 
     @classmethod
     def of(cls, number: int) -> Strictness:
-        """The strictness a request asks for by its number; 0, as ros_control has it, means BEST_EFFORT.
+        """Returns the strictness with the number of a request; 0 means BEST_EFFORT, as in ros_control.
 
         Raises:
             ControllerError: there is none of this number.
@@ -58,7 +58,7 @@ class LoadedController:
 
     Attributes:
         failure: why the manager stopped it; "" when it did not.
-        fault: the hardware's fault it was told last; "" when it knows of none.
+        fault: the hardware fault it was notified of last; "" for none.
         joints: the joints it claims, whatever the interface.
     """
 
@@ -120,19 +120,19 @@ class LoadedController:
             LOGGER.exception("controller '%s': %s", self.name, self.failure)
 
     def notify_fault(self, time_s: float, faults: Sequence[HardwareFault]) -> None:
-        """Tell it what the hardware of its joints suffers from, when that is news to it."""
+        """Notifies it of a change of the faults of its joints' hardware."""
         reason = "; ".join(fault.reason for fault in faults if not fault.joints.isdisjoint(self.joints))
         if reason == self.fault:
             return
         self.fault = reason
-        told = "on_hardware_fault()" if reason else "on_hardware_recovered()"
+        method = "on_hardware_fault()" if reason else "on_hardware_recovered()"
         try:
             if reason:
                 self.controller.on_hardware_fault(time_s, reason)
             else:
                 self.controller.on_hardware_recovered(time_s)
         except Exception as error:  # a user's controller may raise anything; the loop must go on
-            self.fail(time_s, f"{told} raised {type(error).__name__}: {error}")
+            self.fail(time_s, f"{method} raised {type(error).__name__}: {error}")
 
     def fail(self, time_s: float, reason: str) -> str:
         """Stop it because it raised; call from the except block. Returns `reason`."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moves a gripper of one joint to a position with bounded effort, and notices when something is in its way.
+"""Moves a gripper of one joint to a position with bounded effort, and detects a stall.
 
-A grasp ends in a *stall*: the fingers cannot go on because they hold something. As in ros_controllers the goal is then
-aborted with `stalled` set, and the command stays, so that the fingers go on squeezing.
+A grasp ends in a stall: the fingers stop short of the goal because they hold an object. As in ros_controllers the goal
+is then aborted with `stalled` set, and the command stays in force, so that the fingers keep their grip.
 """
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ GripperGoalHandle = RealtimeGoalHandle[GripperState]
 
 
 class GripperGoalError(Exception):
-    """A gripper goal that cannot be taken up."""
+    """A gripper goal cannot be accepted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +58,9 @@ class _Goal:
 class GripperActionController(Controller):
     """position_controllers/GripperActionController.
 
-    A joint counts as standing still when it has stayed within `stall_velocity_threshold * stall_timeout` of one place
-    for `stall_timeout`: the mean velocity over that time, rather than the velocity of one cycle, so that the trembling
-    of a contact does not hide a stall. The time counts from the beginning of the goal at the earliest.
+    A joint is stalled when it has stayed within `stall_velocity_threshold * stall_timeout` of one position for
+    `stall_timeout`. That compares the mean velocity over this time with the threshold, not the velocity of one cycle,
+    because a contact makes the joint vibrate. The time counts from the start of the goal at the earliest.
 
     While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason. When
     the measured position is not a number the goal is aborted, and the joint is held where it was measured last.
@@ -102,7 +102,7 @@ class GripperActionController(Controller):
     # ---- any thread ----
 
     def submit(self, position: float, max_effort: float, goal_handle: GripperGoalHandle) -> None:
-        """Hand a goal to the control loop.
+        """Hands a goal to the control loop.
 
         Args:
             position: where to go [rad|m].
@@ -123,7 +123,7 @@ class GripperActionController(Controller):
             self._reject_waiting("the controller was stopped")
 
     def cancel(self, goal_handle: GripperGoalHandle) -> None:
-        """Ask the control loop to stop working on the goal of `goal_handle`."""
+        """Requests that the control loop stops following the goal of `goal_handle`."""
         self._mailbox.put(goal_handle)
 
     # ---- control loop ----
@@ -155,7 +155,7 @@ class GripperActionController(Controller):
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
-        if self._active is not None:    # a gripper that has come to its end goes on squeezing, one on its way stops
+        if self._active is not None:    # a gripper at its goal keeps its grip, a moving one stops
             self._hold()
             self._apply(0.0)
         self._finish(status, self._state(False, False), text)
@@ -218,14 +218,14 @@ class GripperActionController(Controller):
             self.on_feedback(goal.goal_handle, self._state(False, False))
 
     def _hold(self) -> None:
-        """Stay, with no more effort than before: there may be something between the fingers."""
+        """Holds the position with no more effort than before, because the fingers may hold an object."""
         if math.isfinite(self._handle.position):
             self._measured = self._handle.position
         self._command = self._measured
         self._handle.held = True
 
     def _apply(self, period_s: float) -> None:
-        """Command the joint; `period_s` [s] is the time since the last call, 0 at a start."""
+        """Commands the joint; `period_s` [s] is the time since the last call, 0 at a start."""
         del period_s
         self._handle.command = self._command
         self._handle.max_effort = self._max_effort

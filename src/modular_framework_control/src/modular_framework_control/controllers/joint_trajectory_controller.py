@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes joints follow trajectories, with tolerances, under the parameters of ros_controllers' trajectory controller.
 
-Goals, commands and cancellations arrive from any thread in a mailbox that `update` empties; whatever depends on time is
-decided in `update`, by the time given there. A trajectory is followed by a clock of its own, which slows down and
-stands still with the robot.
+Goals, commands and cancellations from any thread go through a mailbox, which `update` processes; everything that
+depends on time is decided there, with the time that `update` is given. A trajectory has a clock of its own, which slows
+down and stops with the robot.
 """
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class JointTrajectoryController(Controller):
     # ---- any thread ----
 
     def submit(self, goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None = None) -> None:
-        """Hand a goal (with a goal handle) or a command (without) to the control loop.
+        """Hands a goal (with a goal handle) or a command (without one) to the control loop.
 
         Raises:
             GoalRejectedError: it is malformed or the controller does not run; the goal handle is not changed. If the
@@ -124,15 +124,15 @@ class JointTrajectoryController(Controller):
             self._reject_waiting("the controller was stopped")
 
     def cancel(self, goal_handle: TrajectoryGoalHandle) -> None:
-        """Ask the control loop to stop following the goal of `goal_handle`."""
+        """Requests that the control loop stops following the goal of `goal_handle`."""
         self._mailbox.put(goal_handle)
 
     def desired_at(self, time_s: float) -> Array:
-        """Desired position, velocity and acceleration at `time_s` [s], shape (3, joints), if the robot lets itself be
-        moved as fast as now.
+        """Returns the desired position, velocity and acceleration at `time_s` [s], shape (3, joints), if the robot
+        keeps its present speed scaling.
 
         Raises:
-            ControllerError: the controller does not run, or the motion that far back is forgotten.
+            ControllerError: the controller does not run, or the motion at that time is no longer stored.
         """
         if not self._running:
             raise ControllerError("the controller is not running; nothing is desired")
@@ -205,7 +205,7 @@ class JointTrajectoryController(Controller):
         self._report(time_s, desired, error)
 
     def _watch_positions(self) -> None:
-        """Stop when a position is no longer a number, and again, from where the joints are, when all are numbers."""
+        """Stops the motion when a position is no longer a number, and again at the measured positions when all are."""
         missing = "" if np.isfinite(self._actual[POSITION]).all() else unmeasured(self._handles)
         if bool(missing) != bool(self._unmeasured):
             self._unmeasured = missing
@@ -223,7 +223,7 @@ class JointTrajectoryController(Controller):
 
     def _desired_and_measured(self) -> tuple[Array, Array]:
         """The state desired now, and positions and velocities measured, in the turn in which the joints are commanded;
-        those desired in place of what is not a number."""
+        the desired values where those are not numbers."""
         desired, error = self._desired_and_error()
         actual = desired[:2] - error
         return desired, np.where(np.isfinite(actual), actual, desired[:2])
@@ -260,7 +260,7 @@ class JointTrajectoryController(Controller):
             self._stop()
 
     def _take_up(self, goal: ValidatedGoal) -> str:
-        """Begin to follow a goal: it replaces the goal before it, and its motion from the start of the new one on.
+        """Begins to follow a goal, which replaces the active goal, and the motion from the start of the new one on.
 
         Returns:
             Why it cannot be followed, or "".
@@ -290,7 +290,7 @@ class JointTrajectoryController(Controller):
         return ""
 
     def _beyond_limits(self, goal: ValidatedGoal, track: Track, late_s: float) -> str:
-        """What a goal, joined to the motion so far, asks beyond the limits of its joints; "" for nothing."""
+        """Describes how a goal, joined to the present motion, violates the limits of its joints; "" if it does not."""
         if goal.spline is None or goal.violations is None:
             return ""
         first = int(np.searchsorted(goal.spline.times_s, late_s, side="right"))
@@ -319,7 +319,7 @@ class JointTrajectoryController(Controller):
             goal.goal_handle.activate()
 
     def _stop(self) -> None:
-        """Come to rest from where the joints are measured."""
+        """Stops the motion, beginning at the measured positions."""
         desired, actual = self._desired_and_measured()
         self._plan.follow(self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate),
                           self._clock.now_s)
@@ -327,7 +327,7 @@ class JointTrajectoryController(Controller):
             handle.held = self._stop_motion.holds(self._clock.rate)
 
     def _check(self, goal: ValidatedGoal, now_s: float, error: Array) -> bool:
-        """End a goal that is reached or whose tolerances are violated; returns whether the motion is to stop."""
+        """Ends a goal that is reached or whose tolerances are violated; returns whether the motion must stop."""
         tolerances, late_s = goal.tolerances, now_s - self._plan.end_s
         if late_s < 0.0:
             outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""

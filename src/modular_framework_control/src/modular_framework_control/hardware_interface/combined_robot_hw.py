@@ -49,18 +49,18 @@ class HardwarePart:
 
 
 class CombinedRobotHW(RobotHW):
-    """The hardware of a list, as one.
+    """Several pieces of hardware as one robot.
 
     Parameters, in the namespace given to `init`: `robot_hardware`, a list of names; for each name a namespace with
     `type` (package/Class, see plugins.py) and whatever that hardware reads.
 
     The interfaces of all parts are combined class by class. A joint may be in different interfaces of different parts;
-    two parts may not command it through the same interface. When two parts measure it, the later one in the list is
-    the one whose state is seen, and a warning says so. Each part decides about the claims on its own joints only; of a
-    joint that several parts command, one controller may claim one interface.
+    two parts may not command it through the same interface. If two parts measure it, the state of the later one in the
+    list is used, with a warning. Each part decides about the claims on its own joints only; of a joint that several
+    parts command, one controller may claim one interface.
 
     Args:
-        make: makes hardware of a type name; looks among the plugins of the workspace when not given.
+        make: makes hardware of a type name; by default from the plugins of the workspace.
     """
 
     def __init__(self, make: Callable[[str], RobotHW] | None = None) -> None:

@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 
 
 class JointStateHandle:
-    """Measured state of one joint; the `RobotHW` writes it in `read()`, everybody else reads it.
+    """Measured state of one joint; the `RobotHW` writes it in `read()`, all others only read it.
 
     Attributes:
         name: joint name as in the robot description.
@@ -42,10 +42,10 @@ class JointHandle:
         state: the handle registered with the JointStateInterface (shared, not copied).
         command: in the unit of the interface: position [rad|m], velocity [rad/s|m/s] or effort [Nm|N].
         max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
-            Only hardware that says so (`supports_max_effort`) heeds it.
+            Only hardware with `supports_max_effort` uses it.
         supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
-        limits: what the hardware keeps the joint within, set by what enforces limits. None: the hardware enforces none.
-        held: set by `hold`; what enforces limits goes on from that command, and clears it.
+        limits: enforced for this joint, set by the limiter; None: none are enforced.
+        held: set by `hold`; the limiter continues from that command, and clears it.
     """
 
     __slots__ = ("state", "command", "max_effort", "supports_max_effort", "limits", "held")
@@ -75,12 +75,11 @@ class JointHandle:
         return self.state.effort
 
     def hold(self, position: float) -> None:
-        """Command a joint that takes positions to stay where it stands, whatever it was commanded before; where that is
-        not a number the last command stays.
+        """Commands a position-controlled joint to stop at its present position, whatever the last command was.
 
         Args:
-            position: where that is [rad|m]: as measured; for a joint that turns without end, in the turn in which it is
-                commanded.
+            position: the measured one [rad|m]; of a continuous joint, in the turn of its last command. If it is not a
+                number, the last command stays.
         """
         if math.isfinite(position):
             self.command = position
@@ -91,7 +90,7 @@ class JointHandle:
 
 
 def unmeasured(handles: Iterable[JointHandle]) -> str:
-    """Which joints have a measured position that is not a finite number; "" when none has."""
+    """Names the joints whose measured position is not a finite number; "" if there are none."""
     faults = [f"joint '{handle.name}' is measured at {handle.position}" for handle in handles
               if not math.isfinite(handle.position)]
     return f"{', '.join(faults)}; expected a position: see why the hardware reads none" if faults else ""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interfaces that hand out handles: what a controller may see and command of a robot.
+"""Hardware interfaces as in ros_control: through their handles a controller reads and commands a robot.
 
-The words are those of ros_control. A `RobotHW` makes one handle per joint and keeps it; controllers ask an interface
-for the handle by name, once, and afterwards read and write plain attributes. Interfaces that command a joint note who
-asked (a *claim*), so that two controllers never command the same joint through interfaces that exclude each other.
+A `RobotHW` makes one handle per joint. A controller gets the handle from an interface by name, once, and then reads and
+writes plain attributes. Interfaces that command joints record which handles were taken (a *claim*), so that two
+controllers never command the same joint through interfaces that exclude each other.
 """
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from modular_framework_control.hardware_interface.handles import (
 
 
 class HardwareInterfaceError(Exception):
-    """A resource of the hardware was asked for that it does not have, or was registered twice."""
+    """A resource does not exist in the hardware, or was registered twice."""
 
 
 class _Named(Protocol):
@@ -91,7 +91,7 @@ class HardwareInterface(Generic[HandleT]):
         return list(self._handles.values())
 
     def take_claims(self) -> tuple[str, ...]:
-        """Joints claimed since the last call, in the order they were asked for; forgets them."""
+        """Returns the joints claimed since the last call, in the order of the claims, and clears them."""
         claims = tuple(self._claims)
         self._claims.clear()
         return claims
@@ -192,7 +192,7 @@ def interface_from_name(type_name: str) -> type[AnyInterface]:
 
 @dataclass(frozen=True, slots=True)
 class InterfaceResources:
-    """The joints a controller claims of one interface, in the order in which it asked for them."""
+    """The joints that a controller claims in one interface, in the order of the claims."""
 
     hardware_interface: str
     resources: tuple[str, ...]
@@ -200,7 +200,7 @@ class InterfaceResources:
 
 @dataclass(frozen=True, slots=True)
 class ControllerInfo:
-    """What the hardware is told of a controller when it is asked about a switch."""
+    """A controller, as the hardware gets it with a switch."""
 
     name: str
     type: str

@@ -31,7 +31,7 @@ class JointLimits:
         max_position: [rad] or [m].
         max_velocity: largest absolute velocity [rad/s] or [m/s].
         max_effort: largest absolute effort [Nm] or [N].
-        continuous: whether the joint turns without end, so that positions 2 pi apart are the same place.
+        continuous: whether the joint turns without end, so that positions 2 pi apart are the same.
         max_acceleration: largest absolute acceleration [rad/s^2] or [m/s^2].
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps joint commands within the limits of the robot, whatever a controller asks for.
+"""Keeps joint commands within the limits of the robot, whatever a controller commands.
 
 A hardware does so first thing in `write`: with one object per command handle (`limit_handle`), or for all its handles
 at once (`JointLimitGuard`). The rules for positions, velocities and efforts, with and without soft limits, are those of
@@ -47,9 +47,9 @@ class PositionJointSaturation:
     """Saturates position commands: inside the range, and no faster than the velocity limit from one cycle to the next.
 
     With soft limits the speed towards an end of the soft range is besides at most `k_position` times the way left.
-    It looks at commands, not at measured positions, which lag behind them; only a joint that is held
-    (`JointHandle.hold`) gets that command at once, as it is where the joint stands. One that stands outside its range
-    comes back no faster than the velocity limit.
+    It limits the change from the last command, not from the measured position, which lags behind. Only the command of
+    `JointHandle.hold` is passed on at once, because it is the measured position. A joint outside its range returns no
+    faster than the velocity limit.
 
     Args:
         handle: the joint.
@@ -119,36 +119,36 @@ class PosVelJointSaturation(PositionJointSaturation):
 
 
 class _Saturation:
-    """What bounds the velocities or efforts of one joint, and remembers what it was asked for and what it gave.
+    """Bounds the velocities or efforts of one joint; stores the controller's command and the one it became.
 
-    A controller that stops commands 0 once. What was given in its place was not asked for by any controller, so the 0
-    stays in force until a controller commands something else. A position that was given is different: it is where the
-    joint is to stay.
+    A controller that stops commands 0 once. The limited command that replaced it must not become the command of the
+    next cycle, so the 0 stays in force until a controller commands something else. That differs from a position, where
+    the limited command is where the joint is to stay.
     """
 
-    __slots__ = ("handle", "limits", "soft", "_wanted", "_given")
+    __slots__ = ("handle", "limits", "soft", "_command", "_limited")
 
     def __init__(self, handle: JointHandle, limits: JointLimits, soft: SoftJointLimits | None = None) -> None:
         self.handle = handle
         self.limits = limits
         self.soft = soft
-        self._wanted = 0.0
-        self._given: float | None = None
+        self._command = 0.0
+        self._limited: float | None = None
 
     def reset(self) -> None:
-        """Forget what was given, after the joint was moved by other means; what is asked for stays."""
-        self.handle.command = self._asked()
-        self._given = None
+        """Clears the limited command, after the joint was moved by other means; the command of the controller stays."""
+        self.handle.command = self._commanded()
+        self._limited = None
 
-    def _asked(self) -> float:
-        """What was commanded last by anybody else; 0 when that is not a number."""
+    def _commanded(self) -> float:
+        """Returns the last command of a controller; 0 if that is not a number."""
         command = self.handle.command
-        if command is not self._given:
-            self._wanted = command if command == command else 0.0
-        return self._wanted
+        if command is not self._limited:
+            self._command = command if command == command else 0.0
+        return self._command
 
-    def _give(self, command: float) -> None:
-        self._given = self.handle.command = command + 0.0   # a sum is an object of its own, as no command of others is
+    def _set_limited(self, command: float) -> None:
+        self._limited = self.handle.command = command + 0.0   # a new object: `is` finds commands of others
 
 
 class VelocityJointSaturation(_Saturation):
@@ -167,21 +167,21 @@ class VelocityJointSaturation(_Saturation):
     def enforce_limits(self, period_s: float) -> None:
         """Replace `handle.command` by the nearest allowed one."""
         limits, state = self.limits, self.handle.state
-        command, position = self._asked(), state.position
+        command, position = self._commanded(), state.position
         if self.soft is None:
             lowest, highest = -limits.max_velocity, limits.max_velocity
         else:
             lowest, highest = soft_velocities(position, limits, self.soft)
         if limits.max_acceleration < math.inf:
             change = limits.max_acceleration * max(0.0, period_s)
-            last = state.velocity if self._given is None else self._given
+            last = state.velocity if self._limited is None else self._limited
             lowest, highest = max(lowest, last - change), min(highest, last + change)
         command = max(lowest, min(highest, command))
         if position >= limits.max_position:
             command = min(command, 0.0)
         if position <= limits.min_position:
             command = max(command, 0.0)
-        self._give(command)
+        self._set_limited(command)
 
 
 class EffortJointSaturation(_Saturation):
@@ -213,7 +213,7 @@ class EffortJointSaturation(_Saturation):
             lowest = max(lowest, 0.0)
         if position > limits.max_position or velocity > limits.max_velocity:
             highest = min(highest, 0.0)
-        self._give(max(lowest, min(highest, self._asked())))
+        self._set_limited(max(lowest, min(highest, self._commanded())))
 
 
 def _clamped(value: float, bound: float) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fake hardware: joints that do what they are told, for demonstrations and tests without a robot or physics."""
+"""Mock hardware: joints that follow their commands exactly, for demonstrations and tests without robot or physics."""
 from __future__ import annotations
 
 import logging
@@ -72,7 +72,7 @@ class MockRobotHW(RobotHW):
             return
         for handle, position in zip(self._handles, self._sent, strict=True):
             state = handle.state
-            if self._sent_period_s > 0.0:     # while time stands still a joint keeps the velocity it has
+            if self._sent_period_s > 0.0:     # without time the velocity does not change
                 state.velocity = (position - state.position) / self._sent_period_s
             state.position = position
 

@@ -52,14 +52,14 @@ class Plugin:
 
 
 def _packages_of_workspace() -> Mapping[str, Path]:
-    # Imported here, as only who looks for plugins needs to know the workspace.
+    # Imported here, because only a search for plugins needs the workspace.
     from modular_framework_control.hardware_interface.workspace_packages import packages_of_workspace
 
     return packages_of_workspace()
 
 
 class PluginIndex:
-    """The classes of one base that packages offer; looked for at the first question, then kept.
+    """The classes of one base that packages offer; searched once, at the first use.
 
     Args:
         base: ROBOT_HW_BASE or CONTROLLER_BASE.
@@ -95,7 +95,7 @@ class PluginIndex:
             expected: class that it must be derived from.
 
         Raises:
-            PluginError: nobody offers it (the message lists what is offered and which descriptions are faulty), its
+            PluginError: no package offers it (the message lists what is offered and which descriptions are faulty), its
                 module cannot be imported, or it is something else.
         """
         plugin = self._plugins().get(name)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The seam between controllers and whatever moves: base class of every robot, simulated or real.
+"""Base class of every robot, simulated or real, that controllers drive.
 
-A user's own hardware is one subclass: a constructor without parameters, `init` that registers its interfaces, `read`
-that fills the joint states and `write` that sends the commands. Whoever owns the loop calls, once per cycle:
+Hardware is one subclass: a constructor without parameters, `init` that registers its interfaces, `read`
+that fills the joint states and `write` that sends the commands. The owner of the loop calls once per cycle:
 `hw.read(t, dt)`, `controller_manager.update(t, dt)`, `hw.write(t, dt)`.
 """
 from __future__ import annotations
@@ -35,11 +35,11 @@ class SwitchState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class HardwareFault:
-    """Why some joints cannot be moved just now.
+    """Why some joints cannot be moved at the moment.
 
     Attributes:
         reason: for a human: "protective stop", "link to 10.0.0.2 lost".
-        joints: the joints it is about.
+        joints: the joints concerned.
     """
 
     reason: str
@@ -47,15 +47,15 @@ class HardwareFault:
 
 
 class RobotHW:
-    """Base of all robot hardware; as it stands it has no joints.
+    """Base of all robot hardware, without joints.
 
     Attributes:
-        announces_ready: whether this hardware itself says True on its `topic_to_wait_for`; when not, whoever runs it
-            says so on its behalf once its loop runs.
+        announces_ready: whether this hardware itself publishes True on its `topic_to_wait_for`; if not, the node that
+            runs it publishes it once its loop runs.
 
     `init`, `close`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `fault`,
     `do_switch` and `switch_result` run in the control loop and must neither block nor raise for an expected condition.
-    What is started there inherits the priority of the loop, so start threads and processes in `init`.
+    Threads and processes started there inherit the priority of the loop, so start them in `init`.
     """
 
     announces_ready: ClassVar[bool] = False
@@ -122,15 +122,15 @@ class RobotHW:
         """Disconnect, and end what `init` began, once the control loop has ended. May be called twice."""
 
     def fault(self) -> str:
-        """Why this hardware cannot follow commands just now (a lost link, a protective stop); "" when it can.
+        """Returns why this hardware cannot follow commands (a lost link, a protective stop); "" if it can.
 
-        Asked in every cycle, after `read`. The manager tells those controllers that command its joints: their goals end
-        with this reason, and they hold until it is "" again.
+        Called in every cycle, after `read`. The manager notifies the controllers that command its joints: their goals
+        end with this reason, and they hold until it is "" again.
         """
         return ""
 
     def faults(self) -> Sequence[HardwareFault]:
-        """The fault with the joints it is about; hardware made of several pieces tells those of each piece."""
+        """Returns the fault with its joints; hardware made of several parts has one entry per part with a fault."""
         reason = self.fault()
         return (HardwareFault(reason, self.commanded_joints),) if reason else ()
 
@@ -143,8 +143,8 @@ class RobotHW:
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         """Why these controllers may not run together; "" when they may.
 
-        The rule of the base class: a joint may be claimed once, by one controller through one interface. Hardware that
-        knows better overrides this.
+        The rule of the base class: a joint may be claimed once, by one controller through one interface. Hardware with
+        another rule overrides this.
         """
         owners: dict[str, tuple[str, str]] = {}
         conflicts: dict[str, None] = {}
@@ -176,7 +176,7 @@ class RobotHW:
 
 
 def speed_scaling_handles(robot_hw: RobotHW, joints: Iterable[str]) -> tuple[SpeedScalingHandle, ...]:
-    """The handles that tell how fast any of these joints lets itself be moved; none when nothing scales its speed."""
+    """Returns the speed scaling handles of these joints; none if nothing scales their speed."""
     interface = robot_hw.find(SpeedScalingInterface)
     wanted = set(joints)
     return () if interface is None else tuple(h for h in interface.handles if not wanted.isdisjoint(h.joints))

@@ -28,7 +28,7 @@ from modular_framework_control.hardware_interface.robot_hw import RobotHW, Switc
 
 ResultT = TypeVar("ResultT")
 TIMELY_SHARE = 0.7
-"""Of the time that a jump takes at the greatest velocity; who is there in less was faster."""
+"""Share of the time that a jump takes at the velocity limit; a joint that needs less exceeded the limit."""
 
 
 class RobotHWConformance(ABC):
@@ -108,7 +108,7 @@ class RobotHWConformance(ABC):
         self._read(robot_hw)
 
     def _ready(self) -> tuple[RobotHW, list[JointHandle]]:
-        """Hardware without a fault that has been told to stay where it is."""
+        """Returns hardware without a fault whose joints are commanded to their present positions."""
         robot_hw = self.make_robot_hw()
         self._made.append(robot_hw)
         self._read(robot_hw)
@@ -185,7 +185,7 @@ class RobotHWConformance(ABC):
         robot_hw, handles = self._ready()
         limits = self.limits()
         limited = [handle for handle in handles if math.isfinite(limits[handle.name].max_velocity)]
-        assert limited, f"limits() tells no finite max_velocity of any of {[handle.name for handle in handles]}"
+        assert limited, f"limits() has no finite max_velocity of any of {[handle.name for handle in handles]}"
         goals = {handle.name: handle.position for handle in handles}
         for handle in limited:
             goals[handle.name] = self._target(handle, self.jump)
@@ -197,7 +197,7 @@ class RobotHWConformance(ABC):
             assert self._duration_of_jump(robot_hw, handle, goals) >= least_s, handle
 
     def _duration_of_jump(self, robot_hw: RobotHW, handle: JointHandle, goals: Mapping[str, float]) -> float:
-        """How long the joint takes from where it leaves its place until it arrives [s]; fails when it does not."""
+        """Returns how long the joint takes from its start position to its goal [s]; fails if it does not arrive."""
         start, left_s = handle.position, math.nan
         for _ in range(round((self.settle_s + self.jump / self.limits()[handle.name].max_velocity) / self.period_s)):
             self._cycle(robot_hw, goals)

@@ -27,7 +27,7 @@ class AckermannSteeringController(MobileBaseController):
     when not set, the latter of a cylinder only; `wheel_separation_h_multiplier`, `wheel_radius_multiplier`,
     `steer_pos_multiplier` 1.
 
-    While a position is not a number the odometry stands still, and the base comes to rest.
+    While a position is not a number the odometry does not change, and the base comes to rest.
     """
 
     interface_class = VelocityJointInterface

@@ -89,7 +89,7 @@ class DiffDriveController(MobileBaseController):
     `right_wheel_radius_multiplier`, 1; `publish_cmd` false: publish what is commanded; and
     `publish_wheel_joint_controller_state` false.
 
-    While the position of a wheel is not a number the odometry stands still, and the base comes to rest.
+    While the position of a wheel is not a number the odometry does not change, and the base comes to rest.
 
     Attributes:
         settings: a DiffDriveSettings.

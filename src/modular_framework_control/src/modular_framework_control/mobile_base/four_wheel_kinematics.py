@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How four wheels that all steer stand and turn for a motion of their base, and the other way round.
+"""Kinematics of a base with four steered wheels: from its motion to steering angles and wheel speeds, and back.
 
-Wheels are counted front left, front right, rear left, rear right. Each turns about a vertical steering axis; it stands
-beside that axis, away from the middle, by `steering_offset`.
+The order of the wheels is front left, front right, rear left, rear right. Each turns about a vertical steering axis and
+is mounted outside of that axis, at a distance of `steering_offset`.
 """
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ SIDES = (1.0, -1.0, 1.0, -1.0)
 ENDS = (1.0, 1.0, -1.0, -1.0)
 """Of each wheel: 1 front, -1 rear."""
 FASTEST_AXLE = 2.0
-"""How many times as fast as the middle of the base an axle moves at most: where front and rear steer against each other
-by more than some 60 degrees, the base is the slower."""
+"""Largest ratio of the speed of an axle to that of the middle of the base. It is reached where front and rear steer in
+opposite directions by more than about 60 degrees; beyond, the base is slowed down."""
 
 
 @dataclass(frozen=True, slots=True)

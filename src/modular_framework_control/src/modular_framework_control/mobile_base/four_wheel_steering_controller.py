@@ -27,7 +27,7 @@ from modular_framework_ros.node_handle import (
 )
 
 SLOWEST = 1e-3
-"""A base that is to drive no faster than this [m/s] stands: with a turn alone the wheels would have to swing about."""
+"""Slowest linear velocity [m/s]; below it the base stops, as a pure rotation would need large steering angles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class FourWheelSteeringController(MobileBaseController):
     joints each, the left one first; `track`, `wheel_base`, `wheel_radius` and `wheel_steering_y_offset` [m]: of the
     robot description when not set. Of the limits, those of accelerations and of `angular/z` are for `BaseVelocity`.
 
-    While a wheel's velocity or angle is not a number the odometry stands still, and the base comes to rest.
+    While a wheel's velocity or angle is not a number the odometry does not change, and the base comes to rest.
 
     Attributes:
         on_steering: called with `on_odometry`.
@@ -166,8 +166,8 @@ class FourWheelSteeringController(MobileBaseController):
             angles = self._steer(self._steering, period_s)
         else:
             velocity: BaseVelocity = self._limits.limit(AT_REST if command is None else command, period_s)
-            stands = abs(velocity.linear) <= SLOWEST
-            self._twist = PlanarTwist() if stands else PlanarTwist(velocity.linear, 0.0, velocity.angular)
+            at_rest = abs(velocity.linear) <= SLOWEST
+            self._twist = PlanarTwist() if at_rest else PlanarTwist(velocity.linear, 0.0, velocity.angular)
             angles = self.geometry.wheels(self._twist)[0]
         for wheel, value in zip(self._wheels, self.geometry.wheels(self._twist)[1], strict=True):
             wheel.command = value

@@ -192,7 +192,7 @@ class MobileBaseController(Controller, ABC):
             self._drive(command if measured else None, time_s, period_s)
 
     def _report(self, time_s: float) -> bool:
-        """Hand the odometry out if that is due; answers whether it is."""
+        """Publishes the odometry if that is due; returns whether it was."""
         settings, pose = self.settings, self.odometry
         period_s = period_of(settings.publish_rate)
         if settings.publish_rate != self._rate:
@@ -205,27 +205,27 @@ class MobileBaseController(Controller, ABC):
         return True
 
     def _in_force(self, time_s: float) -> Any:
-        """The last command; None when it is too old."""
+        """Returns the last command; None if it is too old."""
         command = self._latest
         if command is not self._latest_seen:
             self._latest_seen, self._seen_s = command, time_s
         return None if time_s - self._seen_s > self._timeout_s else command
 
     def _forget(self) -> None:
-        """Forget commands, also those that limits go by."""
+        """Clears all commands, including those that accelerations are limited by."""
         self._latest = self._latest_seen = None
 
     @abstractmethod
     def _follow_wheels(self, time_s: float) -> bool:
-        """Bring the odometry up to date; answers whether it is known how the wheels stand."""
+        """Updates the odometry; returns whether all wheels are measured."""
 
     @abstractmethod
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        """Command the joints so that the base does what is asked for; with None it comes to rest within its limits."""
+        """Commands the joints for a command to the base; with None the base comes to rest within its limits."""
 
     @abstractmethod
     def _brake(self) -> None:
-        """Command the joints to stand still at once."""
+        """Commands the joints to stop at once."""
 
 
 class TwistLimits:
@@ -244,7 +244,7 @@ class TwistLimits:
         self.forget()
 
     def forget(self) -> None:
-        """The base stands."""
+        """Clears the stored velocities, as of a base at rest."""
         self.last = self._before_last = AT_REST
 
     def limit(self, wanted: BaseVelocity, period_s: float) -> BaseVelocity:

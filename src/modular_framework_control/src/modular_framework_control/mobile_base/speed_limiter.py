@@ -35,7 +35,7 @@ class SpeedLimiter:
         """The velocity to command: the jerk is limited first, then the acceleration, then the velocity.
 
         Args:
-            wanted: velocity that is asked for.
+            wanted: the requested velocity.
             last: velocity commanded in the last cycle.
             before_last: velocity commanded in the cycle before that.
             period_s: time since the last cycle [s].

@@ -59,7 +59,7 @@ class LoopStatistics:
         self.reset()
 
     def reset(self) -> None:
-        """Begins anew."""
+        """Sets all figures to 0."""
         self._late = array("L", bytes(array("L").itemsize * (_BUCKETS + 1)))
         self._cycles = self._missed = self._overruns = 0
         self._late_max_s = self._work_s = self._work_max_s = 0.0

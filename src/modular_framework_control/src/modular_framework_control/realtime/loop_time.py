@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The time of a control loop on a real robot, which nobody who sets the clock of the system can disturb.
+"""The time of a control loop on a real robot, which does not depend on the setting of the system clock.
 
-Taken from that clock, the time of a loop would go back when it is set back, and controllers would begin anew; set
-forward, it would carry trajectories to their end in one cycle. So the loop counts on the monotonic clock. Only the
-stamps of messages follow the system's, by which all other programs count.
+If the loop used the system clock, setting it back would restart the controllers, and setting it forward would carry
+trajectories to their end in one cycle. So the loop uses the monotonic clock. Only the stamps of messages follow the
+system clock, as those of all other programs do.
 
-A loop that is held up, as by a computer that does something else for a while, has not moved the robot meanwhile. Its
-time then stands still: what was to be done goes on later, and is not caught up with at once.
+A loop that was delayed has not moved the robot meanwhile. Its time does not count the delay: motions continue later and
+do not catch up at once.
 """
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from collections.abc import Callable
 NOTICED_STEP_S = 1e-3
 WARN_THRESHOLD_S = 0.1
 QUICK_S = 5e-4
-"""A reading of both clocks that took longer says too little about how far they are apart [s]."""
+"""If reading both clocks took longer than this, their difference is not known well enough [s]."""
 
 LOGGER = logging.getLogger("rosout.control_loop")
 
 
 class LoopTime:
-    """Time that begins as that of the system's clock, and from then on goes on steadily, as long as it is asked for.
+    """Time that begins as the system clock and then increases steadily, as long as it is read.
 
     Args:
-        system: clock that may be set by anybody [s].
+        system: clock that may be set at any time [s].
         steady: clock that never jumps [s].
 
     Attributes:
-        ahead_s: by how much the system's clock is ahead of this time [s]; changes when it is set. Time of the loop and
-            stamps of messages differ by it.
-        longest_step_s: how far it goes on at most from one look to the next [s].
+        ahead_s: how much the system clock is ahead of this time [s]; changes when it is set. Stamps of messages are
+            ahead by it.
+        longest_step_s: largest increase from one reading to the next [s].
     """
 
     def __init__(self, system: Callable[[], float] = time.time, steady: Callable[[], float] = time.monotonic) -> None:
@@ -45,7 +45,7 @@ class LoopTime:
         self.longest_step_s = math.inf
 
     def now(self) -> float:
-        """The time now [s]; looks whether the system's clock was set meanwhile."""
+        """Returns the time now [s]; checks whether the system clock was set meanwhile."""
         steady_s = self._steady()
         system_s = self._system()
         held_up_s = steady_s - self._last_s - self.longest_step_s

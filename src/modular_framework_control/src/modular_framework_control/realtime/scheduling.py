@@ -2,7 +2,7 @@
 """Asks the operating system to let the control loop run on time, where it permits that.
 
 What Python itself does against a steady loop is made small too: another thread gives the interpreter up after a
-fraction of a cycle, and what exists when the loop begins is never looked through for garbage again.
+fraction of a cycle, and the garbage collector ignores all objects that exist when the loop begins.
 """
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import threading
 
 PRIORITY = 80
 OTHERS_BELOW = 10
-"""How much less urgent the other threads of a process are than the one that matters."""
+"""By how much the priority of the other threads of a process is lower than that of the loop."""
 _SWITCH_INTERVAL_S = 2e-4
 _LATENCY_DEVICE = "/dev/cpu_dma_latency"
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
@@ -32,8 +32,8 @@ def prepare_interpreter() -> None:
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     """Run this process before ordinary ones, the calling thread before its others (SCHED_FIFO); keep its memory in RAM.
 
-    The other threads go first too, as the loop waits while one of them holds Python's interpreter: a process that takes
-    the processor from that one would hold up the loop.
+    The other threads get a real-time priority too, because the loop waits while one of them holds Python's interpreter:
+    a process that takes the processor from that thread would delay the loop.
 
     Args:
         priority: of the calling thread, above OTHERS_BELOW and up to 99; a process that serves the control loop takes

@@ -27,7 +27,7 @@ class ControllerManagerClientError(Exception):
 
 
 class RefusedError(ControllerManagerClientError):
-    """The controller manager has answered that it does not do what it was asked for."""
+    """The controller manager refused a request."""
 
 
 class ControllerManagerClient:
@@ -36,7 +36,7 @@ class ControllerManagerClient:
     Args:
         namespace: namespace of the robot; "" for that of the node.
         timeout_s: how long to wait for a service [s of real time]; infinite waits for ever, 0 not at all.
-        ended: set when nobody waits any more.
+        ended: set to end all waits.
         await_clock: whether the time counts only from when the simulated clock, if it is to be used, has begun.
     """
 
@@ -115,5 +115,5 @@ class ControllerManagerClient:
 
 
 def _simulation_is_starting() -> bool:
-    """Whether nobody has told the simulated time yet: a simulation that loads a large world takes its time."""
+    """Whether there is no simulated time yet: a simulation that loads a large world takes a while."""
     return not rospy.rostime.is_wallclock() and rospy.get_rostime().is_zero()

@@ -30,7 +30,7 @@ INHIBIT_PERIOD_S = 1.0
 def spawner_main() -> int:
     """Load and start controllers, wait for the end of this process, then stop and unload them in reverse.
 
-    What cannot be loaded is told, and the others are started all the same; the exit code tells of it in the end.
+    If some cannot be loaded, that is reported, the others are started, and the exit code is 1.
     """
     parser = argparse.ArgumentParser(prog="spawner", description=spawner_main.__doc__)
     parser.add_argument("--stopped", action="store_true", help="load the controllers but do not start them")
@@ -40,14 +40,14 @@ def spawner_main() -> int:
 
 
 def unspawner_main() -> int:
-    """Keep controllers stopped, whoever starts them, until the end of this process; then start them again."""
+    """Keep controllers stopped, even if something starts them, until the end of this process; then start them again."""
     parser = argparse.ArgumentParser(prog="unspawner", description=unspawner_main.__doc__)
     _add_common(parser)
     return _run(parser, "unspawner", _unspawn)
 
 
 def controller_manager_main() -> int:
-    """Ask the controller manager once: load, unload, start, stop, spawn, kill, list, list-types, reload-libraries."""
+    """Send one request: load, unload, start, stop, spawn, kill, list, list-types or reload-libraries."""
     parser = argparse.ArgumentParser(prog="controller_manager", description=controller_manager_main.__doc__)
     commands = [*_PER_CONTROLLER, "list", "list-types", "reload-libraries"]
     parser.add_argument("command", choices=commands, type=lambda word: _SHORT_COMMANDS.get(word, word),
@@ -92,7 +92,7 @@ def _run(parser: argparse.ArgumentParser, name: str,
 
 
 def names_of(arguments: Sequence[str]) -> list[str]:
-    """Controller names: a word is a name, an existing YAML file stands for its keys (or for its list of names).
+    """Controller names: a word is a name, an existing YAML file is replaced by its keys (or by its list of names).
 
     Raises:
         ControllerManagerClientError: a file that holds no names.
@@ -195,7 +195,7 @@ def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, end
 
 
 def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> None:
-    """Returns when the topic says True, or at the end; a topic that stays silent for long is told once."""
+    """Waits until the topic says True or `ended` is set; warns once if there is no message for `warn_after_s` [s]."""
     ready = threading.Event()
     subscriber = rospy.Subscriber(topic, Bool, lambda message: ready.set() if message.data else None)
     warn_at_s = time.monotonic() + warn_after_s

@@ -56,10 +56,10 @@ def ready_topics_of(robot_hw: RobotHW, robot_hw_nh: NodeHandle) -> ReadyTopics:
 
 
 class HardwareReadiness:
-    """Waits for hardware that announces itself; announces the other.
+    """Waits for hardware that announces itself, and announces the rest.
 
     Args:
-        topics: who says what where; all are std_msgs/Bool, latched.
+        topics: of the hardware that is awaited and of the hardware to announce; all are std_msgs/Bool, latched.
     """
 
     def __init__(self, topics: ReadyTopics) -> None:
@@ -69,7 +69,7 @@ class HardwareReadiness:
         self._publishers: list[rospy.Publisher] = []
 
     def connect(self) -> None:
-        """Subscribe what is waited for."""
+        """Subscribes the topics of awaited hardware."""
         for name, topic in self._topics.awaited.items():
             self._subscribers.append(rospy.Subscriber(topic, Bool, self._on_ready, self._ready[name], queue_size=1))
 
@@ -83,7 +83,7 @@ class HardwareReadiness:
 
         Args:
             timeout_s: how long to wait for all of them together [s of real time].
-            ended: set when nobody waits any more.
+            ended: set to end the wait.
 
         Raises:
             HardwareNotReadyError: not all have; names each that has not.

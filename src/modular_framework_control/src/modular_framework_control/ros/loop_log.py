@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Carries what the control loop says to the log, so that the loop never waits for a file, a terminal or /rosout."""
+"""Passes log records of the control loop to another thread, so that the loop never waits for a file or /rosout."""
 from __future__ import annotations
 
 import contextlib
@@ -14,7 +14,7 @@ ROSOUT = "rosout"
 
 
 class LoopLog(logging.Handler):
-    """Takes the place of the handlers of rospy's logger; a thread of its own hands the records to them."""
+    """Replaces the handlers of rospy's logger; a thread of its own passes the records to them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -25,11 +25,11 @@ class LoopLog(logging.Handler):
         self._complaining: int | None = None
 
     def createLock(self) -> None:  # noqa: N802  # the name is logging's
-        """None is needed, and the loop need not wait for one."""
+        """Makes no lock, so that the loop never waits for one."""
         self.lock = None
 
     def begin(self) -> None:
-        """Take the records from now on, unless another one does."""
+        """Takes the records from now on, unless another LoopLog does."""
         if any(isinstance(handler, LoopLog) for handler in self._logger.handlers):
             return
         self._outbox.start()
@@ -37,12 +37,12 @@ class LoopLog(logging.Handler):
         self._logger.handlers, self._logger.propagate = [self], False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hand on the record with the text it has now."""
+        """Passes the record on with the text it has now."""
         if threading.get_ident() == self._complaining:
             return
         try:
             record.msg, record.args = record.getMessage(), None
-        except Exception:   # what does not fit together must not end the loop that says it
+        except Exception:   # a wrong format must not end the loop
             self._complain(self, record)
             return
         self._outbox.put(self._write, record)
@@ -56,22 +56,21 @@ class LoopLog(logging.Handler):
 
     def _hand(self, take: Callable[[logging.LogRecord], object], handler: logging.Handler,
               record: logging.LogRecord) -> None:
-        """Let `handler` have the record; that it cannot be written is never written to the log, where it would meet the
-        same handler again, for ever."""
+        """Passes the record to `handler`. An error of the handler is not logged, which would call the handler again."""
         try:
             take(record)
         except Exception:
             self._complain(handler, record)
 
     def _complain(self, handler: logging.Handler, record: logging.LogRecord) -> None:
-        """Do what logging does about an error of a handler: say it on the standard error, if there is one."""
+        """Prints an error of a handler to the standard error, as logging does."""
         self._complaining = threading.get_ident()
         with contextlib.suppress(Exception):
             handler.handleError(record)
         self._complaining = None
 
     def end(self) -> None:
-        """Leave the records to those that had them before, after they got all; may be called twice."""
+        """Writes all records that wait, then restores the former handlers; may be called twice."""
         if self._served is None:
             return
         added = [handler for handler in self._logger.handlers if handler is not self]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells over ROS how the control loop keeps its time and whether the hardware follows."""
+"""Publishes how well the control loop keeps its rate, and whether the hardware has a fault."""
 from __future__ import annotations
 
 import threading
@@ -19,10 +19,10 @@ OVERRUN_WARNING_PERIOD_S = 10.0
 
 class LoopReport:
     """Publishes `/diagnostics` (diagnostic_msgs/DiagnosticArray) once a second of real time; serves `~reset_statistics`
-    (std_srvs/Empty), which begins the figures anew.
+    (std_srvs/Empty), which resets the statistics.
 
-    The status is a warning when cycles were late since the last one, an error when the hardware has a fault. Values:
-    `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
+    The status is a warning when cycles were late since the last message, an error when the hardware has a fault.
+    Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
     `work_max_us`, `no_processor_us` (for how long in all the loop was to run and had no processor),
     `no_processor_max_us` (the longest such time), `fault`.
 
@@ -30,7 +30,7 @@ class LoopReport:
         statistics: figures that the loop writes.
         period_s: period of the loop [s].
         hardware: what the loop drives, for `hardware_id`.
-        fault: asked for the fault of the hardware, "" for none.
+        fault: returns the fault of the hardware, "" for none.
     """
 
     def __init__(self, statistics: LoopStatistics, period_s: float, hardware: str, fault: Callable[[], str]) -> None:
@@ -43,13 +43,13 @@ class LoopReport:
         self._thread = threading.Thread(target=self._work, name="loop_report", daemon=True)
 
     def connect(self) -> None:
-        """Open topic and service, and begin to report."""
+        """Opens topic and service, and begins to publish."""
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
         self._service = rospy.Service("~reset_statistics", Empty, self._on_reset)
         self._thread.start()
 
     def close(self) -> None:
-        """Report no more; may be called twice."""
+        """Ends the publishing; may be called twice."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(2.0)
@@ -68,18 +68,19 @@ class LoopReport:
 
     def _publish(self, figures: LoopFigures) -> None:
         late = figures.missed + figures.overruns
-        news, self._late = late > self._late, late
+        late_since_last, self._late = late > self._late, late
         fault = self._fault()
         text = (f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
                 f"{figures.missed} were left out")
-        if news:
+        if late_since_last:
             rospy.logwarn_throttle(OVERRUN_WARNING_PERIOD_S,
                                    f"control loop at {text}; the longest took {figures.work_max_s * 1e3:.1f} ms, its "
                                    f"period is {self._period_s * 1e3:.1f} ms; it was without a processor for "
                                    f"{figures.no_processor_max_s * 1e3:.1f} ms at most")
         status = DiagnosticStatus(name=f"{rospy.get_name().lstrip('/')}: control loop", hardware_id=self._hardware,
                                   message=f"hardware fault: {fault}; {text}" if fault else text)
-        status.level = DiagnosticStatus.ERROR if fault else DiagnosticStatus.WARN if news else DiagnosticStatus.OK
+        level = DiagnosticStatus.WARN if late_since_last else DiagnosticStatus.OK
+        status.level = DiagnosticStatus.ERROR if fault else level
         values = {"rate": 1.0 / self._period_s, "cycles": figures.cycles, "missed": figures.missed,
                   "overruns": figures.overruns, "late_p50_us": figures.late_p50_s * 1e6,
                   "late_p99_us": figures.late_p99_s * 1e6, "late_max_us": figures.late_max_s * 1e6,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Carries what the control loop has to say to ROS, so that the loop never waits for a message to be sent."""
+"""Publishes the messages of the control loop on another thread, so that the loop never waits for ROS."""
 from __future__ import annotations
 
 import queue
@@ -13,7 +13,7 @@ _Job = tuple[Callable[..., None], tuple[Any, ...]]
 
 
 class Outbox:
-    """A queue worked off by one thread, in order.
+    """A queue of jobs that one thread runs in sequence.
 
     Args:
         backlog: how many jobs may wait before jobs that may be dropped are dropped.
@@ -25,25 +25,25 @@ class Outbox:
         self._thread = threading.Thread(target=self._work, name="control_outbox", daemon=True)
 
     def start(self) -> None:
-        """Begin to work."""
+        """Starts the thread."""
         self._thread.start()
 
     def put(self, job: Callable[..., None], *arguments: Any) -> None:
-        """Queue a job that must not be lost (a result)."""
+        """Queues a job that must not be dropped (a result)."""
         self._jobs.put((job, arguments))
 
     def put_droppable(self, job: Callable[..., None], *arguments: Any) -> None:
-        """Queue a job that is dropped when too many wait (a state)."""
+        """Queues a job that is dropped if too many wait (a state)."""
         if self._jobs.qsize() < self._backlog:
             self._jobs.put((job, arguments))
 
     def publish(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
-        """Queue a message, which is made when its turn comes, unless nobody listens or too many jobs wait."""
+        """Queues a message, made by `make` on the thread, unless there is no subscriber or too many jobs wait."""
         if publisher.impl.has_connections():    # publisher.get_num_connections() would wait for a lock
             self.put_droppable(lambda: publisher.publish(make()))
 
     def flush(self, timeout_s: float = 2.0) -> None:
-        """Wait until everything queued so far has been worked off, at most `timeout_s` [s]."""
+        """Waits until all jobs queued so far have run, at most `timeout_s` [s]."""
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             reached = threading.Event()
             self._jobs.put((reached.set, ()))
@@ -51,7 +51,7 @@ class Outbox:
                 rospy.logwarn("control outbox: messages still wait after %.1f s", timeout_s)
 
     def close(self) -> None:
-        """Work off what waits, then end; may be called twice."""
+        """Runs the jobs that wait, then ends the thread; may be called twice."""
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._jobs.put(None)
             self._thread.join(timeout=2.0)

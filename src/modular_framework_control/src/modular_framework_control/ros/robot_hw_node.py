@@ -50,15 +50,15 @@ class RobotHwNode:
     `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
     says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
     itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that
-    is not permitted the log says so once, and the loop runs as it can.
+    is not permitted, a warning says so once, and the loop runs without.
 
     Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
     `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning. What
     `LoopReport` publishes and serves is there as long as the loop runs.
 
     Args:
-        ended: set by whoever wants the loop to end; controllers are then stopped, goals end, and the hardware is closed
-            while the node can still say so.
+        ended: set to end the loop; controllers are then stopped, goals end, and the hardware is closed while the node
+            can still publish.
         loop_time: time of the loop, unless the clock is simulated; stamps follow the clock of the system.
     """
 
@@ -115,10 +115,10 @@ class RobotHwNode:
         self._robot_hw.close()
 
     def run(self) -> bool:
-        """Run the control loop until it is told to end; then stop all controllers and bring the robot to rest.
+        """Runs the control loop until `ended` is set; then stops all controllers and brings the robot to rest.
 
         Returns:
-            Whether it ended because it was told to; otherwise the log says why.
+            Whether it ended by `ended`; otherwise the log says why.
         """
         if self._manager is None:
             raise RuntimeError("connect() comes before run()")
@@ -210,7 +210,7 @@ class RobotHwNode:
             going = self._attempt_last("read") and self._attempt_last("write")
 
     def _attempt_last(self, step: str) -> bool:
-        """Read or write a period after the last cycle; answers whether that succeeded."""
+        """Reads or writes one period after the last cycle; returns whether that succeeded."""
         return _attempt(f"last {step} of hardware {type(self._robot_hw).__name__}",
                         lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s))
 
@@ -223,7 +223,7 @@ class RobotHwNode:
             manager.connect()
             self._connected.set()
             self._readiness.announce()
-        except Exception as error:  # on this thread nobody else would see it, and the node would run without services
+        except Exception as error:  # otherwise the thread ends without a message, and the node runs without services
             if not rospy.is_shutdown():
                 self._failure = str(error) or type(error).__name__
                 rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())

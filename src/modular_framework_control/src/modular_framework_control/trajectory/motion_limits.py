@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a trajectory may ask of joints whose limits are known: positions and velocities, at its points and between them.
+"""Checks a trajectory against the limits of its joints: positions and velocities, at its points and between them.
 
-Between points the curve is sampled. A motion that is a little too fast is followed: the hardware keeps to its limits,
-and the joint comes a little late.
+Between points the curve is sampled. A motion that is slightly too fast is accepted: the hardware enforces its limits,
+and the joint arrives a little late.
 """
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from modular_framework_control.hardware_interface.joint_limit_parameters import 
 from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track
 
 VELOCITY_SHARE = 1.05
-"""Share of a velocity limit up to which a trajectory is followed: time parameterisations interpolate that much over."""
+"""Largest velocity as a multiple of the limit: time parameterisations overshoot by that much between their points."""
 POINT_MARGIN = 1e-3
 """How far a point may lie beyond a position limit [rad|m]: rounding of angles."""
 CURVE_MARGIN = 1e-2
-"""How far the curve between points may go beyond a position limit, and how far a joint may fall behind on its way to
-the first point that is followed [rad|m]."""
+"""How far the curve between points may go beyond a position limit, and how far a joint may lag behind in the first
+segment [rad|m]."""
 _MOST_FAULTS = 8
 _SEGMENTS_AT_ONCE = 1024
 _NO_SPEED = "with it the joint may not move at all: correct it in robot_description or joint_limits"
@@ -70,42 +70,42 @@ class MotionLimits:
         return MotionLimits(self.lowest[chosen], self.highest[chosen], self.fastest[chosen], self.braking[chosen])
 
     def with_positions(self, positions: Array) -> MotionLimits:
-        """The same, widened to where the joints are, shape (joints,): one that stands outside may come back."""
+        """Returns the limits widened to these positions, shape (joints,), so that a joint outside may come back."""
         return MotionLimits(np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest,
                             self.braking)
 
 
 class LimitViolations:
-    """Everything that a trajectory asks beyond limits; a point that is left out, and the way to it, do not count.
+    """All violations of limits by a trajectory. Points that are left out, and the segments before them, do not count.
 
     Args:
         names: the joints of the trajectory.
         limits: their limits.
-        here: where they are, shape (joints,).
+        measured: positions of the joints [rad|m], shape (joints,).
     """
 
-    def __init__(self, names: Sequence[str], limits: MotionLimits, here: Array) -> None:
+    def __init__(self, names: Sequence[str], limits: MotionLimits, measured: Array) -> None:
         self._names = tuple(names)
         self._limits = limits
-        self._here = here
+        self._measured = measured
         self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []
 
     def add(self, kind: _Kind, values: Array, beyond: NDArray[np.bool_], first_point: int) -> None:
-        """Note values, shape (points, joints), where `beyond`, the first row being of `first_point`."""
+        """Adds the values, shape (points, joints), where `beyond` is true; the first row belongs to `first_point`."""
         if beyond.any():
             indices: NDArray[np.int64] = np.argwhere(beyond) + (first_point, 0)
             self._found.append((kind, indices, values[beyond]))
 
     def text(self, first: int = 0, first_segment: int = 1) -> str:
-        """The excesses in one text, of very many only the first few; "" when there are none.
+        """Describes the violations in one text, of very many only the first few; "" if there are none.
 
         Args:
             first: the first point that counts.
-            first_segment: the first point whose way to it counts.
+            first_segment: the first point whose segment before it counts.
         """
         described: list[str] = []
         count = 0
-        for kind, indices, values in self._found:       # may be very many, and the control loop asks
+        for kind, indices, values in self._found:       # there may be very many, and the control loop calls this
             begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_segment
             counted = np.flatnonzero(indices[:, 0] >= begin)
             count += len(counted)
@@ -131,22 +131,22 @@ class LimitViolations:
                         f"{fastest:.6g}; " + ("give the point a later time_from_start" if fastest > 0.0 else _NO_SPEED))
 
     def _range(self, joint: int) -> str:
-        lowest, highest, here = self._limits.lowest[joint], self._limits.highest[joint], self._here[joint]
-        outside = f" (it stands outside, at {here:.6g})" if not lowest <= here <= highest else ""
+        lowest, highest, measured = self._limits.lowest[joint], self._limits.highest[joint], self._measured[joint]
+        outside = f" (it stands outside, at {measured:.6g})" if not lowest <= measured <= highest else ""
         return f"its limits are {lowest:.6g} to {highest:.6g}{outside}"
 
 
-def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits, here: Array) -> LimitViolations:
-    """What a trajectory asks beyond limits, at its points and between them.
+def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits, measured: Array) -> LimitViolations:
+    """Finds the violations of limits by a trajectory, at its points and between them.
 
     Args:
         spline: the trajectory.
         names: its joints.
         limits: their limits.
-        here: where they are, shape (joints,); one that stands outside its range may come back.
+        measured: positions of the joints [rad|m], shape (joints,); a joint outside its range may come back.
     """
-    found = LimitViolations(names, limits, here)
-    limits = limits.with_positions(here)
+    found = LimitViolations(names, limits, measured)
+    limits = limits.with_positions(measured)
     positions, velocities = spline.states[:, POSITION], spline.states[:, VELOCITY]
     found.add(_Kind.POINT_POSITION, positions,
               (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN), 0)
@@ -162,18 +162,19 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
     return found
 
 
-def first_segment_violations(track: Track, names: Sequence[str], limits: MotionLimits, here: Array, point: int) -> str:
-    """What the way from the present motion to the first point that is followed asks beyond limits; "" for nothing.
+def first_segment_violations(track: Track, names: Sequence[str], limits: MotionLimits, measured: Array,
+                             point: int) -> str:
+    """Describes the violations in the segment from the present motion to the first point; "" if there are none.
 
     Args:
-        track: the motion, as it was joined to the one so far.
+        track: the new motion, joined to the present one.
         names: its joints.
         limits: their limits.
-        here: where they are, shape (joints,).
+        measured: positions of the joints [rad|m], shape (joints,).
         point: number of that point.
     """
-    found = LimitViolations(names, limits, here)
-    limits = limits.with_positions(here)
+    found = LimitViolations(names, limits, measured)
+    limits = limits.with_positions(measured)
     coefficients, duration_s = track.first_segment()
     ways = _SegmentExtremes(coefficients[np.newaxis], np.array([duration_s]))
     speeds = np.abs(ways.velocities)
@@ -191,7 +192,7 @@ def _add_positions(found: LimitViolations, ways: _SegmentExtremes, limits: Motio
 
 
 class _SegmentExtremes:
-    """Extremes of polynomial segments.
+    """Extremes of positions and velocities in polynomial segments.
 
     Args:
         coefficients: of shape (segments, 6, joints).

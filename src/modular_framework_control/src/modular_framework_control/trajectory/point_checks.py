@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a sender may ask a trajectory controller for: joints, sizes, numbers, times, checked before anything moves."""
+"""Checks the points of a trajectory before it is followed: joint names, sizes, numbers and times."""
 from __future__ import annotations
 
 import math
@@ -18,7 +18,7 @@ _MOST_FAULTS_LISTED = 8
 
 
 def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool) -> str:
-    """What is wrong with the joint names of a trajectory; "" when nothing is.
+    """Describes what is wrong with the joint names of a trajectory; "" if nothing is.
 
     Args:
         names: as sent.
@@ -38,8 +38,7 @@ def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool
 
 
 def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, str]:
-    """Leave out values of points beyond those of the joints that are named, which ros_controllers allows goals for some
-    of the joints to have.
+    """Drops values of points beyond the number of named joints, which ros_controllers allows in goals for some joints.
 
     Returns:
         The trajectory with one value a joint, and what was left out, or "".
@@ -57,21 +56,21 @@ def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, s
 
 
 def check_points(trajectory: JointTrajectory) -> None:
-    """Check sizes, numbers and times of a trajectory.
+    """Checks sizes, numbers and times of a trajectory.
 
     Raises:
         InvalidTrajectoryError: lists the faults: which point, which joint, what was got, what is allowed.
     """
-    told = _joined(_faults_of(trajectory))
-    if told:
-        raise InvalidTrajectoryError(told)
+    faults = _joined(_faults_of(trajectory))
+    if faults:
+        raise InvalidTrajectoryError(faults)
 
 
 def _joined(faults: Iterator[str]) -> str:
-    """The faults in one text; of very many only the first, and how many there are besides."""
-    told = list(islice(faults, _MOST_FAULTS_LISTED))
+    """Joins the faults to one text; of very many only the first, and the number of the others."""
+    listed = list(islice(faults, _MOST_FAULTS_LISTED))
     more = sum(1 for _ in faults)
-    return "; ".join(told) + (f"; and {more} more" if more else "")
+    return "; ".join(listed) + (f"; and {more} more" if more else "")
 
 
 def _faults_of(trajectory: JointTrajectory) -> Iterator[str]:

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How joints come to rest when a motion is broken off: where they are, as fast as they may.
+"""Computes the motion in which joints come to rest when a motion is stopped before its end.
 
-A stop begins at the measured state, whatever was desired: a trajectory that the joints could not follow has nothing to
-say about where they end.
+A stop begins at the measured state, not at the desired one, because the joints may not have followed the trajectory.
 """
 from __future__ import annotations
 

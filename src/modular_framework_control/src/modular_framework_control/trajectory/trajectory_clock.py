@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The time by which a trajectory is followed: that of the control loop, slowed down as the robot is.
+"""The clock of a trajectory: the time of the control loop, scaled with the speed of the robot.
 
-A robot whose speed slider is at a tenth, or which is paused, cannot be where an unslowed trajectory wants it. So the
-trajectory waits for the robot: its clock runs at the robot's share of the planned speed. It slows down at once and
-becomes faster gradually, so that a robot let go starts without a jerk.
+A robot whose speed slider is at 10 %, or which is paused, cannot follow a trajectory at its planned speed. So the clock
+of the trajectory runs at the robot's share of that speed. It slows down at once and speeds up gradually, so that a
+robot that resumes starts without a jerk.
 """
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class TrajectoryClock:
     """A clock that is never faster than that of the loop.
 
     Args:
-        handles: say how fast the joints let themselves be moved; the slowest sets the rate.
+        handles: speed scaling of the joints; the smallest factor sets the rate.
 
     Attributes:
         now_s: its time [s]; that of the loop as long as nothing slowed it.

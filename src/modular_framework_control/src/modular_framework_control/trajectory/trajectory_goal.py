@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is asked of a trajectory controller and what it answers: goal, result code, snapshot of its state."""
+"""Goal, result code and state snapshot of a trajectory controller."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ class TrajectoryErrorCode(IntEnum):
 
 
 class GoalRejectedError(Exception):
-    """A goal that the controller will not take up; carries the result code."""
+    """A goal that the controller rejects, with the result code."""
 
     def __init__(self, code: TrajectoryErrorCode, reason: str) -> None:
         super().__init__(reason)
@@ -35,7 +35,7 @@ TrajectoryGoalHandle = RealtimeGoalHandle[TrajectoryErrorCode]
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryGoal:
-    """What an action client asks for.
+    """The goal of an action client.
 
     Attributes:
         trajectory: the motion.

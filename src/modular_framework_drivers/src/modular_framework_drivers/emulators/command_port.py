@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Takes orders for an emulator from outside, so that tests and people can make it fail on command.
+"""A TCP port for commands to an emulator, with which tests and people inject faults.
 
 Text lines over TCP, on the loopback interface if no other is given: `command key=value ...`; one line is the answer to
 each, `ok ...` or `error ...`. `help` lists the commands. From a shell: `echo unplug | nc 127.0.0.1 29900`.
@@ -19,7 +19,7 @@ Value = bool | int | float | str
 
 
 class CommandError(Exception):
-    """An order that cannot be carried out; the text says what is allowed."""
+    """A command cannot be carried out; the text says what is allowed."""
 
 
 def parse_value(text: str) -> Value:
@@ -35,7 +35,7 @@ def parse_value(text: str) -> Value:
 
 
 def run_command(commands: Mapping[str, Command], line: str) -> str:
-    """Carry out one line.
+    """Carries out one line.
 
     Args:
         commands: what can be done, by name; a docstring's first line is its help.
@@ -125,7 +125,7 @@ class CommandPort:
 
 
 def answer(commands: Mapping[str, Command], line: str) -> str:
-    """The line that answers an order."""
+    """Returns the line that answers a command."""
     if not line.strip():
         return "error: empty line; `help` lists the commands"
     try:
@@ -135,7 +135,7 @@ def answer(commands: Mapping[str, Command], line: str) -> str:
 
 
 def send_command(port: int, command: str, address: str = LOOPBACK, timeout_s: float = 5.0, **arguments: Any) -> str:
-    """Give one order to a running emulator.
+    """Sends one command to a running emulator.
 
     Args:
         port: its command port.

@@ -188,7 +188,7 @@ class DynamixelLine:
         self.faults = LineFaults()
 
     def state(self) -> str:
-        """Tells what the servos do."""
+        """State of the servos."""
         with self._lock:
             return "; ".join(_describe(finger) for finger in self.fingers)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A Dynamixel MX-64 as it looks from its serial line: packets of protocol 1.0, and the table of registers behind them.
 
-What turns the shaft is elsewhere (`dynamixel_finger`); the servo reads its goals and is told what it measures.
+The motor is elsewhere (`dynamixel_finger`): it reads the goals of the servo and gives it the measured values.
 """
 from __future__ import annotations
 

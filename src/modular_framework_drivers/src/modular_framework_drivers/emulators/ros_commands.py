@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Offers the orders of an emulator as services too, for whoever has a ROS master and no TCP client at hand."""
+"""Offers the commands of an emulator as ROS services too."""
 from __future__ import annotations
 
 import inspect
@@ -13,13 +13,13 @@ from modular_framework_drivers.emulators.command_port import Command
 
 
 def offer_commands(commands: Mapping[str, Command]) -> list[rospy.Service]:
-    """Advertise `~<command>` (std_srvs/Trigger) for every order that needs no argument."""
+    """Advertises `~<command>` (std_srvs/Trigger) for every command that needs no argument."""
     return [rospy.Service(f"~{name}", Trigger, _CommandService(command)) for name, command in commands.items()
             if all(one.default is not one.empty for one in inspect.signature(command).parameters.values())]
 
 
 class _CommandService:
-    """One order as the callback of a service."""
+    """A command as the callback of a service."""
 
     def __init__(self, command: Command) -> None:
         self._command = command

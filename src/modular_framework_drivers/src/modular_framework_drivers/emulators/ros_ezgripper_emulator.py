@@ -25,9 +25,9 @@ class EzGripperEmulatorNode:
     Parameters: `~port_name`: path under which the serial port is found; `~baudrate` [bit/s] 57600 and `~servo_ids` [1]
     of the servos; `~position` [rad] 0.5: where the knuckle joint is at first; `~object` [rad] -1: position of the
     knuckle joint at which an object stops the fingers, once they have been shut and opened, negative for none;
-    `~command_port` 29900: orders and faults.
+    `~command_port` 29900: TCP port of the commands.
 
-    Services (std_srvs/Trigger): `~<order>` for every order that needs no argument.
+    Services (std_srvs/Trigger): `~<command>` for every command that needs no argument.
     """
 
     def __init__(self) -> None:

@@ -16,8 +16,8 @@ class UrEmulatorNode:
     `~positions`: of the joints at the beginning [rad], six numbers; `~unlock_delay` 5.0: time after a protective stop
     before it can be unlocked [s]; `~command_port` 29901; `~log` "": file for the commanded path.
 
-    Services (std_srvs/Trigger): `~<order>` for every order that needs no argument; the others are given at the command
-    port only.
+    Services (std_srvs/Trigger): `~<command>` for every command that needs no argument; the others are available at the
+    command port only.
     """
 
     def __init__(self) -> None:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the program that ur-rtde uploads does on a controller, without an interpreter of URScript.
 
-ur-rtde's control script reads an order from an integer register and its arguments from the registers beside it, every
-cycle. Orders that are streamed are done at once. Any other order is done when it changes from none to that order; the
-script then says so in its state register and waits for the order to be cleared. The numbers of the orders and the
-registers are those of ur-rtde 1.6.
+ur-rtde's control script reads a command from an integer register and its arguments from the registers beside it, every
+cycle. Streamed commands are carried out at once. Any other is carried out when the register changes from none to it;
+the script then reports that in its state register and waits until the command is cleared. The numbers of the commands
+and the registers are those of ur-rtde 1.6.
 """
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ READY, DONE = 1, 2
 
 
 class Command(IntEnum):
-    """Orders of the control script that the emulator carries out."""
+    """Commands of the control script that the emulator carries out."""
 
     NONE = 0
     MOVEJ = 1
@@ -84,7 +84,7 @@ class ControlScript:
         return cls(controller, int(offset.group(1)) if offset else 0)
 
     def cycle(self) -> bool:
-        """One pass of its main loop; False when it was told to end."""
+        """Runs its main loop once; returns False when it is stopped."""
         if self._moving:
             if not self._controller.motion.finished:
                 return True
@@ -125,7 +125,7 @@ class ControlScript:
             self._controller.outputs.doubles[self._offset] = self._controller.period_s
 
     def _execute(self, command: int) -> bool:
-        """Begin an order that is not streamed; False when the program ends."""
+        """Begins a command that is not streamed; returns False when the program ends."""
         controller = self._controller
         match command:
             case Command.STOP_SCRIPT:

@@ -114,7 +114,7 @@ class UrController:
 
     @property
     def target_positions(self) -> Sequence[float]:
-        """Where the joints are told to be [rad]."""
+        """Commanded positions of the joints [rad]."""
         command = self.motion.command
         return command.target if command.drive in (Drive.SERVO, Drive.MOVE) else self.motion.positions
 

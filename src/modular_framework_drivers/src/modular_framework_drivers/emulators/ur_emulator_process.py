@@ -31,7 +31,7 @@ class EmulatedArm:
 
     def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0,
                  positions: Sequence[float] = HOME) -> None:
-        draw = random.Random(os.urandom(8))    # 127.x.y.z is this machine; nobody else's test draws the same
+        draw = random.Random(os.urandom(8))    # 127.x.y.z is this machine; tests that run at the same time draw others
         self.address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
         self._process = subprocess.Popen(
             [sys.executable, "-m", _MODULE, "--quiet", "--address", self.address, "--model", model,
@@ -42,11 +42,11 @@ class EmulatedArm:
             raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")
 
     def command(self, command: str, **arguments: Any) -> str:
-        """Give an order at the command port."""
+        """Sends a command to the command port."""
         return send_command(COMMAND_PORT, command, self.address, **arguments)
 
     def state(self) -> dict[str, str]:
-        """What the order `state` tells, by name."""
+        """Returns the values of the command `state`, by name."""
         return dict(pair.split("=") for pair in self.command("state").split())
 
     def positions(self) -> list[float]:

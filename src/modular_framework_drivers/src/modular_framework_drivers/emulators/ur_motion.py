@@ -21,7 +21,7 @@ _UR5_LINKS = ((0.0, 0.089159, math.pi / 2), (-0.425, 0.0, 0.0), (-0.39225, 0.0, 
 
 
 class Drive(Enum):
-    """What the joints are told to do."""
+    """Kind of a motion."""
 
     HOLD = "hold"
     SERVO = "servo"
@@ -62,7 +62,7 @@ class ArmMotion:
         self.command = MotionCommand(Drive.HOLD)
 
     def set_command(self, command: MotionCommand) -> None:
-        """Replace what the joints are doing."""
+        """Replaces the present motion."""
         self.command = command
 
     @property

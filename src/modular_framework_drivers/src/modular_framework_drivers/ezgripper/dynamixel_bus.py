@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads and writes the registers of Dynamixel servos over a serial line, through the maker's dynamixel-sdk.
 
-What the SDK leaves open is closed here: it waits without burning the processor, a lost or damaged packet is tried
-again, an answer of the wrong length is no answer, and every failure is an exception that says what to look at.
+It adds to the SDK: waits that do not use the processor, retries of lost or damaged packets, a check of the length of
+answers, and exceptions that say what to check.
 """
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ from modular_framework_drivers.ezgripper.mx64 import MODEL_NUMBER, Register, Ser
 READ, WRITE = 2, 3
 WRITE_TIMEOUT_S = 0.5
 LATE_S = 0.1
-"""An answer that comes later than this does not come [s]."""
+"""An answer that comes later than this counts as lost [s]."""
 LEAST_TRIES = 3
 BAUDRATES = (9600, 19200, 57600, 115200, 500000, 1000000, 2000000, 3000000)
 BUS_ERRORS = ServoErrors.CHECKSUM | ServoErrors.INSTRUCTION | ServoErrors.RANGE | ServoErrors.ANGLE_LIMIT
 
 
 class BusError(Exception):
-    """The servos cannot be talked to; the text names port, servo and what to look at."""
+    """Communication with the servos failed; the text names port, servo and what to check."""
 
 
 class PortLostError(BusError):
-    """The serial port is not there (any more), or belongs to somebody else."""
+    """The serial port does not exist (any more), or another program uses it."""
 
 
 class NoAnswerError(BusError):
-    """A servo does not answer, or not in words that can be understood."""
+    """A servo does not answer, or with damaged packets."""
 
 
 class RefusedError(BusError):
-    """A servo answers that it does not accept an instruction."""
+    """A servo refused an instruction."""
 
 
 class _Port(PortHandler):  # type: ignore[misc]
-    """The SDK's port, but it sleeps while it waits for bytes, on a clock that nobody sets."""
+    """The SDK's port, which sleeps while it waits for bytes and uses the monotonic clock."""
 
     def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802 (the SDK's name)
         self.ser = serial.Serial(self.port_name, cflag_baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
@@ -63,12 +63,12 @@ class _Port(PortHandler):  # type: ignore[misc]
 
 
 class DynamixelBus:
-    """Servos on one serial line. Not for several threads at once.
+    """Servos on one serial line; to be used by one thread.
 
     Args:
         port_name: serial port, for example /dev/ttyUSB0.
         baudrate: [bit/s].
-        timeout_s: a servo that has not answered for so long, and not to three tries, counts as silent [s].
+        timeout_s: a servo counts as silent after this time and three tries without an answer [s].
     """
 
     def __init__(self, port_name: str, baudrate: int, timeout_s: float = 0.1) -> None:
@@ -101,7 +101,7 @@ class DynamixelBus:
             port.closePort()
 
     def model_number(self, servo_id: int) -> int:
-        """The model of a servo; the way to find out whether it is there."""
+        """Reads the model of a servo; also shows whether it answers."""
         return from_bytes(self.read(servo_id, MODEL_NUMBER)[0])
 
     def read(self, servo_id: int, register: Register) -> tuple[bytes, ServoErrors]:
@@ -135,7 +135,7 @@ class DynamixelBus:
 
     def _transact(self, servo_id: int, instruction: int, parameters: list[int], size: int,
                   what: str) -> tuple[bytes, ServoErrors]:
-        """Send one instruction until it is answered; the answer has `size` bytes."""
+        """Sends an instruction until it is answered; the answer has `size` bytes."""
         if self._port is None:
             raise PortLostError(f"port {self._name} is not open")
         damaged, silent, errors = False, 0, ServoErrors.NONE
@@ -149,7 +149,7 @@ class DynamixelBus:
                 answer, result, bits = self._packets.txRxPacket(self._port, packet)
                 silent += result == COMM_RX_TIMEOUT
                 if silent and result == COMM_SUCCESS:
-                    self._let_pass(self._port, silent * (size + 6), sent_s + LATE_S)
+                    self._discard_late(self._port, silent * (size + 6), sent_s + LATE_S)
             except (OSError, termios.error) as error:
                 self.close()
                 raise PortLostError(f"port {self._name} is gone: {_reason(error)}; check the cable") from error
@@ -161,8 +161,8 @@ class DynamixelBus:
         raise NoAnswerError(self._silence(servo_id, damaged, tries))
 
     @staticmethod
-    def _let_pass(port: _Port, late_bytes: int, end_s: float) -> None:
-        """Let late answers to earlier tries go by, which do not say whose they are."""
+    def _discard_late(port: _Port, late_bytes: int, end_s: float) -> None:
+        """Discards late answers to earlier tries, which cannot be told from the answer to the last one."""
         while late_bytes > 0 and select.select([port.ser.fileno()], [], [], max(0.0, end_s - time.monotonic()))[0]:
             late_bytes -= len(port.ser.read(late_bytes))
 
@@ -180,7 +180,7 @@ class DynamixelBus:
 
 
 def _reason(error: OSError | termios.error) -> str:
-    """What is wrong with a port, in the words of the operating system where there are any."""
+    """Describes an error of a port, with the text of the operating system if there is one."""
     number = error.errno if isinstance(error, OSError) else error.args[0]
     if number == errno.EAGAIN:
         return "another program has it"

@@ -55,7 +55,7 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
             position_tolerance [rad] 0.03, stall_time [s] 0.25, link_timeout [s] 0.1.
 
     Raises:
-        ParameterError: tells all that is wrong.
+        ParameterError: lists all faults.
     """
     faults: list[str] = []
 

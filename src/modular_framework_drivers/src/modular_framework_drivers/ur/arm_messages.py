@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the control loop and the processes that hold ur-rtde say to each other; one datagram per message.
+"""The messages between the control loop and the processes that run ur-rtde; one datagram per message.
 
 The first byte is the kind; numbers follow in the machine's own byte order, as both ends run on one machine. CONNECTING
 comes from both processes when they begin to connect; STATE, and ALIVE while there is none, from the one that reads;
-READY once and TAKEN after each command from the one that commands; FAILED with the reason from both, as the last one.
+READY once and ACCEPTED after each command from the one that commands; FAILED with the reason from both, as the last
+message.
 """
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the modes of an arm's controller mean for who wants to move it."""
+"""Faults of an arm from the modes of its controller."""
 from __future__ import annotations
 
 from modular_framework_drivers.ur.arm_messages import ArmState
@@ -18,7 +18,7 @@ _REMEDIES = {3: "find its cause and call dashboard/unlock_protective_stop", 6: f
 
 
 def robot_fault(state: ArmState, address: str) -> str:
-    """Why an arm in that state cannot be moved, and what to do; "" when it can."""
+    """Returns why an arm in this state cannot be moved, and what to do; "" if it can."""
     mode = state.safety_mode
     if mode not in (_SAFETY_NORMAL, _SAFETY_REDUCED):
         name, remedy = _SAFETY_MODES.get(mode, f"safety mode {mode}"), _REMEDIES.get(mode, "look at its pendant")

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A process with a socket of datagrams to it; nothing here blocks but `end`."""
+"""A process with a datagram socket to it; nothing here blocks but `end`.
+
+A pipe of multiprocessing would not do: its `send` blocks while the pipe is full, which the control loop must not do.
+"""
 from __future__ import annotations
 
 import socket
@@ -10,13 +13,13 @@ from collections.abc import Iterator, Sequence
 from modular_framework_drivers.ur.arm_messages import MESSAGE_SIZE
 
 _ORDINARY = ("chrt", "--other", "0")
-"""Makes itself ordinary and becomes the command that follows: the starter may run in real time, and to start an
-interpreter takes long. A child that is ordinary before its exec would hold its starter up, and all other threads
-of that with it, for as long as others use the processors."""
+"""Prefix of the command that gives the process ordinary scheduling, because the parent may run in real time and an
+interpreter takes long to start. It is set after the exec: the parent waits until the exec, so a child with ordinary
+scheduling before it would delay the parent while other programs use the processors."""
 
 
 class ChildProcess:
-    """A Python module run as a process of its own, with ordinary scheduling whatever its starter has.
+    """A Python module run as a process of its own, with ordinary scheduling, whatever the scheduling of its parent.
 
     Args:
         module: what to run; gets the first argument, the file descriptor of its socket, then the others.
@@ -41,13 +44,13 @@ class ChildProcess:
         self.ended = False
 
     def messages(self) -> Iterator[bytes]:
-        """What has come since the last call; sets `ended` when nothing more can come."""
+        """Yields the messages since the last call; sets `ended` when no more can come."""
         while not self.ended:
             try:
                 message = self._socket.recv(MESSAGE_SIZE)
             except BlockingIOError:
                 return
-            except ConnectionResetError:    # it went without reading all we said; what it said comes next
+            except ConnectionResetError:    # it ended without reading all messages to it; those from it come next
                 continue
             except OSError:
                 message = b""
@@ -57,14 +60,14 @@ class ChildProcess:
             yield message
 
     def send(self, message: bytes) -> bool:
-        """Send if the process can take it; False when it does not."""
+        """Sends a message; returns False if the process cannot take it now."""
         try:
             return self._socket.send(message) == len(message)
         except OSError:
             return False
 
     def end(self, patience_s: float = 0.0) -> None:
-        """End the process, at once or after it had `patience_s` [s] to do so by itself; may be called twice."""
+        """Ends the process, at once or after it had `patience_s` [s] to end by itself; may be called twice."""
         self.ended = True
         self._socket.close()
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks every position command before it goes to the arm: what the arm cannot do must not reach it.
+"""Checks every position command before it is sent to the arm.
 
 A command that is no number, lies outside a joint's range or is far from the last one is refused; the arm brakes and
 holds. One that is only faster, or accelerates more, than a joint may is followed as fast as the joint may; so is one
@@ -20,12 +20,12 @@ from modular_framework_control.hardware_interface.joint_limit_parameters import 
 from modular_framework_control.hardware_interface.joint_limits import soft_velocities
 from modular_framework_control.trajectory.motion_limits import CURVE_MARGIN
 
-_SLACK = 1e-6     # rounding that is forgiven [rad], and as a share of a limit
+_SLACK = 1e-6     # tolerance for rounding [rad], and as a share of a limit
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedJoint:
-    """A joint and what it may do.
+    """A joint with its limits.
 
     Attributes:
         name: of the joint.
@@ -74,13 +74,13 @@ class CommandCheck:
         self._targets = [0.0] * len(self._joints)
 
     def reset(self, positions: Sequence[float]) -> None:
-        """Begin anew from an arm that rests at `positions` [rad]."""
+        """Restarts from an arm at rest at `positions` [rad]."""
         self.sent = list(positions)
         self._targets = list(positions)
         self._velocities = [0.0] * len(self._joints)
 
     def admit(self, commands: Sequence[float], period_s: float) -> str:
-        """Set `sent` to what the arm is to be told.
+        """Sets `sent` to the command for the arm.
 
         Args:
             commands: positions [rad].
@@ -124,9 +124,10 @@ class CommandCheck:
         self._targets[index] = self.sent[index]
 
     def _approach(self, index: int, command: float, joint: CheckedJoint, period_s: float) -> None:
-        """Go to the command at once if velocity and acceleration allow it, else as fast as they do.
+        """Moves to the command at once if the limits of velocity and acceleration allow it, else as fast as they do.
 
-        "At once" also asks that the joint can be as fast as the commands are in the next cycle, lest it run past them.
+        "At once" also requires that the joint can have the velocity of the commands in the next cycle, so that it does
+        not overshoot.
         """
         position, velocity = self.sent[index], self._velocities[index]
         slowest, fastest = joint.velocity_range(position, period_s)
@@ -149,7 +150,7 @@ class CommandCheck:
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:
-    """Highest speed from which one can still stop within `distance` [m|rad], braking once per period.
+    """Returns the highest speed from which a joint can stop within `distance` [rad], braking once per period.
 
     A cycle at that speed leaves a distance whose closing speed is lower by what is braked in a cycle, or nothing.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks the dashboard server of an arm for something, one line at a time."""
+"""Client of the dashboard server of an arm; one line per request."""
 from __future__ import annotations
 
 import socket
@@ -8,11 +8,11 @@ DASHBOARD_PORT = 29999
 
 
 class DashboardError(Exception):
-    """The dashboard server could not be asked."""
+    """The dashboard server did not answer."""
 
 
 def ask_dashboard(address: str, line: str, timeout_s: float = 2.0, port: int = DASHBOARD_PORT) -> str:
-    """The answer to one line.
+    """Sends one line and returns the answer.
 
     Args:
         address: of the arm's controller.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arm of Universal Robots in a ROS node: says when it is ready, and offers to resume after a fault."""
+"""An arm of Universal Robots in a ROS node: publishes when it is ready, serves `resume` and the dashboard."""
 from __future__ import annotations
 
 import threading
@@ -32,7 +32,7 @@ _WATCH_PERIOD_S = 0.05
 
 
 class UrArmRobotHW(UrArmHardware):
-    """An arm of Universal Robots; its parameters are told at `UrArmHardware`.
+    """An arm of Universal Robots; its parameters are listed at `UrArmHardware`.
 
     Publishes `topic_to_wait_for` (std_msgs/Bool, latched) whenever it changes whether the arm follows commands. Offers,
     below its own namespace, `resume` and `dashboard/<name>` for the names in DASHBOARD_SERVICES (std_srvs/Trigger).

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The connection to an arm as the control loop sees it: the newest state, and whether commands get through.
+"""The connection to an arm, for the control loop: the newest state, and whether commands are accepted.
 
-Two processes hold ur-rtde (rtde_process.py). A thread starts them, and starts them again when a connection fails; the
-control loop only takes datagrams from them and sends datagrams to them. That the arm is silent is for the process that
-listens to say: a loop that comes late itself knows nothing of it.
+Two processes run ur-rtde (rtde_process.py). A thread starts them, and starts them again when a connection fails; the
+control loop only exchanges datagrams with them. Whether the arm is silent is decided by the process that reads it,
+because a control loop that is late itself cannot tell.
 """
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _RETRY_S = 0.5                  # between two attempts to connect
 _START_TIMEOUT_S = 30.0         # for a process to start; a busy computer takes its time
 _CONNECT_TIMEOUT_S = 5.0        # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0       # from then until the program is uploaded and runs
-_SILENCE_TIMEOUT_S = 0.5                   # a process that says nothing for so long does nothing either
+_SILENCE_TIMEOUT_S = 0.5        # a process that sends nothing for so long counts as failed
 _STOP_PATIENCE_S = 1.5          # for the arm to come to rest when the link is closed
-_FINAL_STOP_S = 0.1              # for a given up process to send its stop, behind all commands still on their way
+_FINAL_STOP_S = 0.1             # for a process that is ended to send its stop, behind all commands still queued
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,14 +65,14 @@ class LinkSettings:
 
 
 class _RtdeProcess:
-    """A process that holds ur-rtde.
+    """A process that runs ur-rtde.
 
     Attributes:
-        process: itself.
-        works: whether it has delivered a state, or is ready for commands.
-        failed: whether it is of no more use.
-        silence: since when it owes a message.
-        owes: whether it owes one.
+        process: the process.
+        working: whether it has sent a state, or is ready for commands.
+        failed: whether it must be replaced.
+        silence: for how long an expected message has not come.
+        awaits_message: whether one is expected.
     """
 
     __slots__ = ("process", "working", "failed", "silence", "awaits_message", "_patience_s", "_since_s")
@@ -84,11 +84,11 @@ class _RtdeProcess:
         self._since_s, self._patience_s = now_s, _START_TIMEOUT_S
 
     def connects(self, now_s: float, patience_s: float) -> None:
-        """It has started, and has `patience_s` [s] from now on to connect."""
+        """Notes that it has started, and has `patience_s` [s] from now on to connect."""
         self._since_s, self._patience_s = now_s, patience_s
 
     def too_late(self, now_s: float) -> str:
-        """Why it takes too long to work; "" when it does not."""
+        """Returns by when it should have connected, if that is over; else ""."""
         if self.working or self.failed or now_s - self._since_s <= self._patience_s:
             return ""
         return f"within {self._patience_s:g} s"
@@ -118,19 +118,19 @@ class RtdeLink:
         self.program_failed_s = 0.0
 
     def connect(self) -> None:
-        """Begin to connect, and go on until `close`; returns at once."""
+        """Begins to connect, and connects again until `close`; returns at once."""
         self._keeper = threading.Thread(target=self._keep, name="ur_link", daemon=True)
         self._keeper.start()
 
     def close(self) -> None:
-        """End the connection and stop the arm; may be called twice."""
+        """Ends the connection and stops the arm; may be called twice."""
         self._closing.set()
         if self._keeper is not None:
             self._keeper.join(timeout=10.0)
             self._keeper = None
 
     def request_program(self) -> None:
-        """Have the program that takes commands uploaded, anew if it was, as soon as the arm is connected."""
+        """Requests that the program that takes commands is uploaded (again) as soon as the arm is connected."""
         control = self._control
         if control is not None and control.working:    # its program may have ended before the arm followed it
             control.failed, self.commanding = True, False
@@ -138,7 +138,7 @@ class RtdeLink:
         self._program_wanted = True
 
     def drop_program(self, reason: str) -> None:
-        """Give up commanding until the next `request_program`."""
+        """Stops commanding until the next `request_program`."""
         LOGGER.error("arm at %s: takes no commands: %s", self._settings.address, reason)
         self._drop(reason)
 
@@ -151,7 +151,7 @@ class RtdeLink:
         self.program_failed_s = time.monotonic()
 
     def poll(self) -> None:
-        """Take in what the processes have said."""
+        """Reads the messages of the processes."""
         now_s = time.monotonic()
         states, control = self._states, self._control
         if states is not None:
@@ -160,7 +160,7 @@ class RtdeLink:
             self._read_replies(control, now_s)
 
     def servo(self, positions: Sequence[float], time_s: float) -> None:
-        """Send the joints to `positions` [rad] within `time_s` [s]."""
+        """Commands the joints to `positions` [rad] within `time_s` [s]."""
         control = self._control
         if self.commanding and control is not None:
             control.process.send(servo_message(positions, time_s))
@@ -191,7 +191,7 @@ class RtdeLink:
     def _lose(self, states: _RtdeProcess, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
-            if self._has_commanded:    # before that nothing has moved, and nobody needs to be asked to begin again
+            if self._has_commanded:    # before the first command nothing has moved, and no `resume` is needed
                 self._drop("its program was given up when the link was lost")
         if not states.failed:
             states.failed = True
@@ -268,7 +268,7 @@ class RtdeLink:
     def _control_arguments(self) -> list[str]:
         settings, wanted = self._settings, self._settings.speed_scale
         if wanted is not None and self._has_commanded and self.state is not None:
-            wanted = min(wanted, self.state.speed_fraction)    # who has made it slower meanwhile has done so on purpose
+            wanted = min(wanted, self.state.speed_fraction)    # somebody at the robot has lowered it meanwhile
         scale = [] if wanted is None else ["--speed-scale", _written(wanted)]
         return [*scale, "--payload", _written(settings.payload_kg),
                 "--payload-centre", *map(_written, settings.payload_centre_m),
@@ -280,5 +280,5 @@ class RtdeLink:
 
 
 def _written(number: float) -> str:
-    """For a command line, on which -5e-05 would be an option."""
+    """A number for a command line, where -5e-05 would be read as an option."""
     return f"{number:.9f}"

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The processes that hold ur-rtde, one to read the arm's state and one to command it.
+"""The processes that run ur-rtde, one to read the arm's state and one to command it.
 
-ur-rtde stops the whole interpreter while it connects and uploads its program, and ends the process on some faults of
-the network; nothing of that may touch the control loop. Each process lives for one connection: it says what went wrong
-and ends, or is ended; whoever started it starts the next. It also ends, and stops the arm, when its starter is gone.
+ur-rtde blocks the whole interpreter while it connects and uploads its program, and it ends the process on some faults
+of the network; neither may affect the control loop. Each process lives for one connection: it reports what failed and
+ends, or is ended, and its parent starts the next one. It also ends, and stops the arm, when its parent is gone.
 
-Both run in real time where that is wanted and permitted, but only once they are connected: less urgent than the control
-loop, before everything else.
+Both use real-time scheduling where that is wanted and permitted, once they are connected, with a lower priority than
+the control loop.
 """
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ _VARIABLES = ["timestamp", "actual_q", "actual_qd", "actual_current", "actual_TC
 
 
 class ConnectionEndedError(Exception):
-    """The connection to the arm is of no more use; the text says why."""
+    """The connection to the arm has failed; the text says why."""
 
 
 def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
-    """Send every state the arm reports, until the connection fails.
+    """Sends every state that the arm reports, until the connection fails.
 
     Args:
         options: the command line.
@@ -54,7 +54,7 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
 
     Raises:
         ConnectionEndedError: the connection failed.
-        RuntimeError: there was none to be had.
+        RuntimeError: there was no connection.
     """
     from rtde_receive import RTDEReceiveInterface
 
@@ -83,14 +83,14 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
 
 
 def _state_of(arm: Any, now_s: float, timestamp_s: float) -> ArmState:
-    """The state that ur-rtde received last."""
+    """Returns the state that ur-rtde received last."""
     return ArmState(now_s, timestamp_s, tuple(arm.getActualQ()), tuple(arm.getActualQd()),
                     tuple(arm.getActualCurrent()), tuple(arm.getActualTCPForce()), arm.getTargetSpeedFraction(),
                     arm.getSpeedScaling(), arm.getRobotMode(), arm.getSafetyMode(), arm.getRuntimeState())
 
 
 def _send(channel: socket.socket, message: bytes) -> None:
-    """Send if there is room; a control loop that is held up gets the newest state later.
+    """Sends a message unless the socket is full; a control loop that is late gets a newer state later.
 
     Raises:
         BrokenPipeError: the control loop is gone.
@@ -100,13 +100,13 @@ def _send(channel: socket.socket, message: bytes) -> None:
 
 
 def _take_priority(options: argparse.Namespace) -> None:
-    """Run in real time if that is wanted; a refusal is told by the control loop, which is refused the same."""
+    """Requests real-time scheduling if wanted; a refusal is not logged, because the control loop logs its own."""
     if options.real_time:
         run_in_real_time(_PRIORITY)
 
 
 def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
-    """Upload ur-rtde's program and pass on the commands of the control loop until it ends.
+    """Uploads ur-rtde's program and passes on the commands of the control loop until that ends.
 
     Args:
         options: the command line.
@@ -131,29 +131,29 @@ def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
     while message := _newest(channel):
         if message[:1] == SERVO:
             positions, time_s = read_servo_message(message)
-            # a program that is paused or stopped takes none; which of them it is the state of the arm tells
+            # a paused or stopped program accepts none; the state of the arm says which of the two it is
             if arm.servoJ(positions, 0.0, 0.0, time_s, options.lookahead, options.gain):
-                with contextlib.suppress(BrokenPipeError):   # nobody is there any more; the next message says so
+                with contextlib.suppress(BrokenPipeError):   # the parent is gone; the next message says so
                     _send(channel, ACCEPTED)
     arm.servoStop(_STOP_DECELERATION)
     arm.stopScript()
 
 
 def _newest(channel: socket.socket) -> bytes:
-    """The last of the messages that wait, after waiting for one; empty when the other end is gone."""
+    """Waits for a message and returns the last one in the queue; empty if the other end is gone."""
     try:
         message = channel.recv(MESSAGE_SIZE)
         while message:
             message = channel.recv(MESSAGE_SIZE, socket.MSG_DONTWAIT)
     except BlockingIOError:
         return message
-    except ConnectionResetError:    # it went without reading what we said last
+    except ConnectionResetError:    # it ended without reading the last message to it
         return b""
     return message
 
 
 def command_line() -> argparse.ArgumentParser:
-    """What the processes are to be told."""
+    """The arguments of the processes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("role", choices=("state", "control"))
     parser.add_argument("channel", type=int, help="file descriptor of the socket to the control loop")
@@ -183,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         except Exception as error:  # ur-rtde raises many kinds; all mean that this connection is over
             text = str(error).strip() or type(error).__name__
-            if "Failed to start control script" in text:    # ur-rtde does not say so of every arm
+            if "Failed to start control script" in text:    # ur-rtde gives this reason for some arms only
                 text += "; is the arm in remote control?"
             try:
                 _send(channel, FAILED + text.encode()[:MESSAGE_SIZE - 1])

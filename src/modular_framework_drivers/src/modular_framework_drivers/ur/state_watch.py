@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells a link that is silent from a computer that is busy, and the state of an arm from garbage on the line."""
+"""Distinguishes a silent link from a busy computer, and a state of the arm from corrupted data."""
 from __future__ import annotations
 
 import math
@@ -13,10 +13,10 @@ _SLACK = 0.05                   # rounding and jitter of the clock [rad]
 
 
 class SilenceWatch:
-    """How long nothing was heard, as far as somebody listened.
+    """Measures for how long no message was received, as far as it was checked.
 
-    A listener that is called every few milliseconds and comes a second late has not heard a second of silence: what was
-    said meanwhile may be on its way through this computer. So no look counts for more than 20 ms.
+    A check that runs every few milliseconds but comes a second late has not seen a second of silence: messages may be
+    in the queues of this computer. So the time between two checks counts for 20 ms at most.
 
     Args:
         now_s: on a clock that never jumps [s].
@@ -29,14 +29,14 @@ class SilenceWatch:
         self._silent_s = 0.0
 
     def update(self, now_s: float, heard: bool) -> float:
-        """Note whether something was heard since the last look; returns how long nothing was [s]."""
+        """Notes whether a message was received since the last call; returns the length of the silence [s]."""
         self._silent_s = 0.0 if heard else self._silent_s + min(now_s - self._last_s, _LONGEST_STEP_S)
         self._last_s = now_s
         return self._silent_s
 
 
 def is_plausible(state: ArmState, last: ArmState | None) -> bool:
-    """Whether an arm can be in that state after the last one; garbage on the line, read as a state, cannot."""
+    """Whether an arm can be in this state after the last one; corrupted data, read as a state, is not plausible."""
     if not math.isfinite(state.timestamp_s) or not all(abs(position) <= _MAX_POSITION for position in state.positions):
         return False
     if last is None:

@@ -28,15 +28,15 @@ JOINT_NAMES = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wris
                "wrist_3_joint")
 _PERIOD_SMOOTHING = 0.02
 _SHORTEST_PERIOD_S = 0.002
-_LONGEST_PERIOD_S = 0.05    # what was to be done in a cycle that came later is caught up with, not done at once
-_CAUSE_S = 0.03      # so much later than the end of its program a state of the arm tells why [s]
+_LONGEST_PERIOD_S = 0.05    # a longer one is not made up for at once
+_CAUSE_S = 0.03      # by which the state that explains the end of the program may come after it [s]
 
 
 class UrArmHardware(RobotHW):
     """An arm that is commanded by joint positions.
 
     Parameters, below its own namespace: `robot_ip_address` (required); `robot_id` "": prefix of the joint names, an
-    underscore is put between; `speed_scale` [0..1]: what to set the speed slider to, untouched when not given;
+    underscore is put between; `speed_scale` [0..1]: value for the speed slider, which is left as it is by default;
     `payload_mass_kg` 0 and `payload_center_of_mass_m` [0, 0, 0]: of the manipulator, in the flange frame;
     `link_timeout` 0.12 [s]: without news for so long the link counts as lost; `servoj_gain` 2000 and
     `servoj_lookahead_time` 0.03 [s]; `max_jump_rad` 0.5: a command further from the last one is refused;
@@ -101,7 +101,7 @@ class UrArmHardware(RobotHW):
 
     @property
     def address(self) -> str:
-        """Of the arm's controller."""
+        """Address of the arm's controller."""
         return self._settings.address if self._settings is not None else ""
 
     def read(self, time_s: float, period_s: float) -> None:
@@ -110,17 +110,17 @@ class UrArmHardware(RobotHW):
         self._link.poll()
         state = self._link.state
         if state is not None:
-            self._take(state)
+            self._update_handles(state)
         self._stop_with_the_program(state)
         following = self._link.commanding and not self._robot_fault and self._program_runs(state)
         if not following or not self._following:
             for handle in self._handles:
                 handle.command = handle.position
-            self._begin_where_it_is(self._check)
+            self._restart_from_measured(self._check)
         self._following = following
         self._fault = self._current_fault()
 
-    def _take(self, state: ArmState) -> None:
+    def _update_handles(self, state: ArmState) -> None:
         self._robot_fault = robot_fault(state, self.address)
         known = self._link is not None and not self._link.lost
         for handle, position, velocity, current in zip(self._handles, state.positions, state.velocities,
@@ -133,7 +133,7 @@ class UrArmHardware(RobotHW):
         self._scaling.factor = min(max(state.speed_fraction * state.speed_scaling, 0.0), 1.0) if playing else 0.0
 
     def _stop_with_the_program(self, state: ArmState | None) -> None:
-        """A program that was ended, by whomever, is not started again until somebody says so."""
+        """Gives up a program that has ended, for any reason, until `resume` is called."""
         if self._link is None or not self._link.commanding or not self._following:
             return
         fault = self._robot_fault.partition(";")[0]
@@ -147,7 +147,7 @@ class UrArmHardware(RobotHW):
         if self._link is None or self._check is None or not self._following:
             return
         if self._link.state is None or self._link.state.runtime_state != PROGRAM_PLAYING:
-            self._begin_where_it_is(self._check)    # a paused arm goes on from where it stands, not from what it missed
+            self._restart_from_measured(self._check)    # a paused arm continues from where it stands
             return
         period_s = min(period_s, _LONGEST_PERIOD_S)
         if period_s > 0.0:
@@ -158,7 +158,7 @@ class UrArmHardware(RobotHW):
         self._refused = refused
         self._link.servo(self._check.sent, self._servo_time_s)
 
-    def _begin_where_it_is(self, check: CommandCheck) -> None:
+    def _restart_from_measured(self, check: CommandCheck) -> None:
         check.reset([handle.position for handle in self._handles])
         self._refused = ""
 
@@ -175,7 +175,7 @@ class UrArmHardware(RobotHW):
             self._link.close()
 
     def resume(self, timeout_s: float = 20.0) -> str:
-        """Let the arm follow commands again after a fault; waits until it does. Not for the control loop.
+        """Makes the arm follow commands again after a fault; waits until it does. Not for the control loop.
 
         Args:
             timeout_s: how long that may take [s].
@@ -223,5 +223,6 @@ class UrArmHardware(RobotHW):
         return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
 
     def _cause_may_follow(self, link: RtdeLink) -> bool:
-        """A stop of the arm ends its program, and that may be known before the stop itself."""
+        """Whether a state may still come that explains the end of the program, which may be reported before the stop of
+        the arm that caused it."""
         return link.state is None or link.state.received_s < link.program_failed_s + _CAUSE_S
