@@ -35,7 +35,8 @@ def dot_text(tree: SourceTree, table: LayerTable) -> str:
     exempt = {(each.importer, each.imported) for each in imports if any(it.covers(each) for it in table.exemptions)}
     pairs = {(each.importer, each.imported) for each in imports} - exempt
     lines = [_HEADER]
-    for package in sorted(tree.folders):
+    connected = {package_of(module) for pair in pairs | exempt for module in pair}
+    for package in sorted(connected):
         lines += _package_lines(package, tree, table, pairs)
     for upper, lower in sorted(without_shortcuts(between(pairs, package_of))):
         lines.append(f"  {_arrow(upper, lower, table, _BETWEEN_PACKAGES)}")
@@ -56,7 +57,7 @@ def without_shortcuts(edges: Edges) -> Edges:
 
 
 def _package_lines(package: str, tree: SourceTree, table: LayerTable, pairs: Edges) -> Iterator[str]:
-    rooms = [room for level in table.rooms.get(package, ()) for room in level]
+    rooms = [room for level in table.levels(package) for room in level]
     if not rooms:
         style = _FORWARDING_NODE if tree.folders[package].startswith("compat/") else _PACKAGE_NODE
         yield f'  "{package}" [{style}];'
@@ -69,7 +70,7 @@ def _package_lines(package: str, tree: SourceTree, table: LayerTable, pairs: Edg
     for upper, lower in sorted(arrows):
         yield f'    "{package}/{upper}" -> "{package}/{lower}";'
     for room in rooms:
-        if not any(room in arrow for arrow in arrows):  # an arrow that is not seen keeps it near the others
+        if len(rooms) > 1 and not any(room in arrow for arrow in arrows):  # an unseen arrow keeps it near the others
             upper, lower = (rooms[1], room) if room == rooms[0] else (room, rooms[0])
             yield f'    "{package}/{upper}" -> "{package}/{lower}" [style=invis];'
     yield "  }"
@@ -87,10 +88,10 @@ def _arrow(upper: str, lower: str, table: LayerTable, style: str) -> str:
     """Writes an arrow between two packages: it starts and ends at the frame of one that has rooms."""
     ends = [f'"{upper}"', f'"{lower}"']
     if upper in table.rooms:
-        ends[0] = f'"{upper}/{table.rooms[upper][0][0]}"'
+        ends[0] = f'"{upper}/{table.levels(upper)[0][0]}"'
         style += f', ltail="cluster_{upper}"'
     if lower in table.rooms:
-        ends[1] = f'"{lower}/{table.rooms[lower][-1][0]}"'
+        ends[1] = f'"{lower}/{table.levels(lower)[-1][0]}"'
         style += f', lhead="cluster_{lower}"'
     return f"{' -> '.join(ends)} [{style}];"
 

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "layers"))
 
 from architecture_drawing import dot_text, draw, is_up_to_date, without_shortcuts  # noqa: E402
 from layer_checks import find_faults  # noqa: E402
-from layer_table import LayerTable, TableError, parse_layer_table, read_layer_table  # noqa: E402
+from layer_table import LayerTable, TableError, make_layer_table, read_layer_table  # noqa: E402
 from source_tree import SourceTree, read_source_tree  # noqa: E402
 
 
@@ -25,7 +25,7 @@ def table(**changes: object) -> LayerTable:
         "rooms": {"house": ["cellar", ["kitchen", "bedroom"], "roof"]},
         "ros_interface": {"house": ["roof"]},
     }
-    return parse_layer_table(text | changes)
+    return make_layer_table(text | changes)
 
 
 def tree(folder: Path, modules: dict[str, str]) -> SourceTree:
@@ -43,7 +43,7 @@ def tree(folder: Path, modules: dict[str, str]) -> SourceTree:
 
 
 def faults(folder: Path, modules: dict[str, str], rules: LayerTable | None = None) -> list[str]:
-    return [str(fault) for fault in find_faults(tree(folder, modules), rules or table())]
+    return find_faults(tree(folder, modules), rules or table())
 
 
 def test_imports_that_run_down_pass(tmp_path: Path) -> None:
