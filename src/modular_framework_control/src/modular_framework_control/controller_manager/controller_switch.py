@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
@@ -85,7 +85,7 @@ class LoadedController:
         """Start it; returns why it failed, or ""."""
         try:
             self.controller.starting(time_s)
-        except Exception as error:  # a user's controller may raise anything; the loop must go on
+        except Exception as error:  # a user's controller may raise anything; the loop must continue
             return self.fail(time_s, f"starting() raised {type(error).__name__}: {error}")
         self.failure = self.fault = ""
         self.statistics.reset()
@@ -93,30 +93,29 @@ class LoadedController:
         return ""
 
     def wait(self, time_s: float) -> str:
-        """One cycle of waiting for the hardware; returns why it cannot go on waiting, or ""."""
+        """Waits one cycle for the hardware; returns why it cannot wait any longer, or ""."""
         self.state = ControllerState.WAITING
         try:
             self.controller.waiting(time_s)
-        except Exception as error:  # a user's controller may raise anything; the loop must go on
+        except Exception as error:  # a user's controller may raise anything; the loop must continue
             return self.fail(time_s, f"waiting() raised {type(error).__name__}: {error}")
         return ""
 
     def abort(self, time_s: float) -> None:
-        """Start it no more; a failure while aborting is reported and leaves it aborted."""
-        self.state = ControllerState.ABORTED
-        try:
-            self.controller.aborting(time_s)
-        except Exception as error:
-            self.failure = f"aborting() raised {type(error).__name__}: {error}"
-            LOGGER.exception("controller '%s': %s", self.name, self.failure)
+        """Ends its start; an exception in `aborting` is logged and leaves it aborted."""
+        self._end(ControllerState.ABORTED, self.controller.aborting, time_s)
 
     def stop(self, time_s: float) -> None:
-        """Stop it; a failure while stopping is reported and leaves it stopped."""
-        self.state = ControllerState.STOPPED
+        """Stops it; an exception in `stopping` is logged and leaves it stopped."""
+        self._end(ControllerState.STOPPED, self.controller.stopping, time_s)
+
+    def _end(self, state: ControllerState, hook: Callable[[float], None], time_s: float) -> None:
+        self.state = state
         try:
-            self.controller.stopping(time_s)
-        except Exception as error:
-            self.failure = f"stopping() raised {type(error).__name__}: {error}"
+            hook(time_s)
+        except Exception as error:  # a user's controller may raise anything; the loop must continue
+            name = "aborting" if state is ControllerState.ABORTED else "stopping"
+            self.failure = f"{name}() raised {type(error).__name__}: {error}"
             LOGGER.exception("controller '%s': %s", self.name, self.failure)
 
     def notify_fault(self, time_s: float, faults: Sequence[HardwareFault]) -> None:
@@ -131,7 +130,7 @@ class LoadedController:
                 self.controller.on_hardware_fault(time_s, reason)
             else:
                 self.controller.on_hardware_recovered(time_s)
-        except Exception as error:  # a user's controller may raise anything; the loop must go on
+        except Exception as error:  # a user's controller may raise anything; the loop must continue
             self.fail(time_s, f"{method} raised {type(error).__name__}: {error}")
 
     def fail(self, time_s: float, reason: str) -> str:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that do at once what one topic says: a position, velocity or effort for one joint or for several.
+"""Controllers that follow the commands of one topic: positions, velocities or efforts of one joint or of several.
 
-Where the hardware takes what is commanded, it is passed on; where it takes something else, gains make it that.
+If the hardware takes the commanded quantity, the command is passed on; if it takes another one, a PID computes that.
 """
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ CYCLES_PER_REPORT = 10
 
 @dataclass(frozen=True, slots=True)
 class JointControlSnapshot:
-    """What a controller with gains of one joint saw and did in a cycle.
+    """State of a PID controller of one joint in a cycle.
 
     Attributes:
         time_s: time of the cycle [s].
         period_s: time since the one before [s].
-        set_point: what is wanted.
-        process_value: what is measured of it.
-        process_value_dot: how fast that changes; 0 where it is not measured.
-        error: what the gains made the command of.
+        set_point: commanded value.
+        process_value: measured value.
+        process_value_dot: its rate of change; 0 where that is not measured.
+        error: input of the PID.
         command: to the joint.
-        gains: what the command was made with.
+        gains: of the PID.
     """
 
     time_s: float
@@ -50,9 +50,10 @@ class JointControlSnapshot:
 
 
 class JointCommandController(Controller):
-    """Base: commands arrive from any thread as a whole and are in force from the next cycle on.
+    """Base class: a command of any thread is in force, as a whole, from the next cycle on.
 
-    While the hardware has a fault the joints are kept where they are, and commands are refused with its reason.
+    While the hardware has a fault the joints are held, and commands are refused with its reason. When the
+    controller stops, the joints come to rest.
 
     Parameters, below the controller's name: `joints`, or `joint` for controllers of one.
 
@@ -66,7 +67,7 @@ class JointCommandController(Controller):
     def __init__(self) -> None:
         self.joint_names: list[str] = []
         self._handles: list[JointHandle] = []
-        self._wanted: tuple[float, ...] = ()
+        self._set_points: tuple[float, ...] = ()
         self._fault = ""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -79,23 +80,26 @@ class JointCommandController(Controller):
         return True
 
     def submit(self, values: Sequence[float]) -> None:
-        """Take a command, from any thread.
+        """Takes a command from any thread.
 
         Args:
             values: one number a joint, in the unit of what is controlled.
 
         Raises:
-            ControllerError: not as many as joints, not finite, or the hardware has a fault; what was in force stays.
+            ControllerError: not as many as joints, not finite, or the hardware has a fault; the last command stays.
         """
         if self._fault:
             raise ControllerError(self._fault)
         if len(values) != len(self.joint_names) or not all(map(math.isfinite, values)):
             raise ControllerError(f"got {list(values)!r}; expected {len(self.joint_names)} finite numbers, for: "
                                   f"{', '.join(self.joint_names)}")
-        self._wanted = tuple(values)
+        self._set_points = tuple(values)
 
     def starting(self, time_s: float) -> None:
         self._fault = ""
+        self._rest()
+
+    def stopping(self, time_s: float) -> None:
         self._rest()
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
@@ -112,35 +116,24 @@ class JointCommandController(Controller):
             self._command(period_s)
 
     def _rest(self) -> None:
-        """Keep the joints where they are."""
-        self._wanted = self._resting()
+        """Holds the joints."""
+        self._set_points = self._resting()
         self._command(0.0)
 
     def _resting(self) -> tuple[float, ...]:
-        """What keeps the joints where they are."""
+        """Returns the command that holds the joints."""
         return (0.0,) * len(self._handles)
 
     def _command(self, period_s: float) -> None:
-        """Command the joints what is wanted; `period_s` [s] is the time since the last call, 0 at a start."""
-        for handle, value in zip(self._handles, self._wanted, strict=True):
+        """Writes the command to the joints; `period_s` [s] is the time since the last call, 0 at a start."""
+        for handle, value in zip(self._handles, self._set_points, strict=True):
             handle.command = value
-
-
-class _ZeroedWhenStopped(JointCommandController):
-    """One whose joints take velocities or efforts: they get none when it does not run."""
-
-    def stopping(self, time_s: float) -> None:
-        for handle in self._handles:
-            handle.command = 0.0
 
 
 class PositionJointPositionController(JointCommandController):
     """position_controllers/JointPositionController: positions [rad|m] for joints that take positions."""
 
     interface_class = PositionJointInterface
-
-    def stopping(self, time_s: float) -> None:
-        self._rest()
 
     def _rest(self) -> None:
         super()._rest()
@@ -157,7 +150,7 @@ class PositionJointGroupPositionController(PositionJointPositionController):
     single = False
 
 
-class VelocityJointVelocityController(_ZeroedWhenStopped):
+class VelocityJointVelocityController(JointCommandController):
     """velocity_controllers/JointVelocityController: velocities [rad/s|m/s] for joints that take velocities."""
 
     interface_class = VelocityJointInterface
@@ -169,7 +162,7 @@ class VelocityJointGroupVelocityController(VelocityJointVelocityController):
     single = False
 
 
-class EffortJointEffortController(_ZeroedWhenStopped):
+class EffortJointEffortController(JointCommandController):
     """effort_controllers/JointEffortController: efforts [Nm|N] for joints that take efforts."""
 
     interface_class = EffortJointInterface
@@ -181,8 +174,8 @@ class EffortJointGroupEffortController(EffortJointEffortController):
     single = False
 
 
-class GainsController(_ZeroedWhenStopped):
-    """Base of those with gains.
+class GainsController(JointCommandController):
+    """Base class of controllers with a PID for each joint; they command 0 when they stop.
 
     Parameters besides: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several.
 
@@ -209,11 +202,15 @@ class GainsController(_ZeroedWhenStopped):
         self._cycles += 1
         if self.single and self.on_state is not None and self._cycles % CYCLES_PER_REPORT == 0:
             value, rate = self._measured()
-            self.on_state(JointControlSnapshot(time_s, period_s, self._wanted[0], value, rate, self._error,
+            self.on_state(JointControlSnapshot(time_s, period_s, self._set_points[0], value, rate, self._error,
                                                self._handles[0].command, self._pids[0].gains))
 
+    def stopping(self, time_s: float) -> None:
+        for handle in self._handles:
+            handle.command = 0.0
+
     def _measured(self) -> tuple[float, float]:
-        """What is controlled of the first joint, and how fast it changes."""
+        """Returns the controlled value of the first joint, and its rate of change."""
         return self._handles[0].position, self._handles[0].velocity
 
     def _rest(self) -> None:
@@ -223,7 +220,7 @@ class GainsController(_ZeroedWhenStopped):
 
 
 class _PositionByGains(GainsController):
-    """Positions [rad|m], kept within the limits that are known, for joints that take something else."""
+    """Positions [rad|m], bounded by the known limits, for joints that do not take positions."""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
@@ -234,7 +231,7 @@ class _PositionByGains(GainsController):
         return tuple(handle.position for handle in self._handles)
 
     def _command(self, period_s: float) -> None:
-        for handle, value, limits, pid in zip(self._handles, self._wanted, self._limits, self._pids, strict=True):
+        for handle, value, limits, pid in zip(self._handles, self._set_points, self._limits, self._pids, strict=True):
             if limits.continuous:
                 error = math.remainder(value - handle.position, 2.0 * math.pi)
             else:
@@ -278,7 +275,7 @@ class EffortJointVelocityController(GainsController):
         super()._rest()
 
     def _command(self, period_s: float) -> None:
-        error = self._wanted[0] - self._handles[0].velocity
+        error = self._set_points[0] - self._handles[0].velocity
         known = period_s > 0.0 and math.isfinite(self._last_error)
         rate = (error - self._last_error) / period_s if known else 0.0
         self._last_error = self._error = error

@@ -46,7 +46,7 @@ class JointLimiter(Protocol):
 class PositionJointSaturation:
     """Saturates position commands: inside the range, and no faster than the velocity limit from one cycle to the next.
 
-    With soft limits the speed towards an end of the soft range is besides at most `k_position` times the way left.
+    With soft limits the speed towards an end of the soft range is also at most `k_position` times the distance to it.
     It limits the change from the last command, not from the measured position, which lags behind. Only the command of
     `JointHandle.hold` is passed on at once, because it is the measured position. A joint outside its range returns no
     faster than the velocity limit.
@@ -124,6 +124,11 @@ class _Saturation:
     A controller that stops commands 0 once. The limited command that replaced it must not become the command of the
     next cycle, so the 0 stays in force until a controller commands something else. That differs from a position, where
     the limited command is where the joint is to stay.
+
+    Args:
+        handle: the joint.
+        limits: its limits.
+        soft: its soft limits, if any.
     """
 
     __slots__ = ("handle", "limits", "soft", "_command", "_limited")
@@ -153,13 +158,8 @@ class _Saturation:
 
 class VelocityJointSaturation(_Saturation):
     """Saturates velocity commands: largest velocity, largest change from one command to the next, the first one from
-    the measured velocity; only the way back at an end of the range, whatever change that takes. With soft limits at
-    most `k_position` times the way left. Not a number becomes 0.
-
-    Args:
-        handle: the joint.
-        limits: its limits.
-        soft: its soft limits, if any.
+    the measured velocity; at an end of the range only velocities back into it, whatever change that takes. With soft
+    limits at most `k_position` times the distance to their end. Not a number becomes 0.
     """
 
     __slots__ = ()
@@ -188,11 +188,6 @@ class EffortJointSaturation(_Saturation):
     """Saturates effort commands: largest effort; none that drives a joint further out of its range or beyond its
     largest velocity. With soft limits at most `k_velocity` times what is left to the velocity that is allowed there.
     Not a number becomes 0.
-
-    Args:
-        handle: the joint.
-        limits: its limits.
-        soft: its soft limits, if any.
     """
 
     __slots__ = ()
