@@ -36,6 +36,7 @@ def find_faults(tree: SourceTree, table: LayerTable) -> list[str]:
         *unlisted_packages(tree, table),
         *unlisted_rooms(tree, table),
         *full_folders(tree, table),
+        *missing_modules(tree, table),
         *(text for each, text in broken if each not in exempt),
         *circles(tree, exempt),
         *(
@@ -81,6 +82,15 @@ def full_folders(tree: SourceTree, table: LayerTable) -> Iterator[str]:
         if count > table.max_modules_in_a_folder:
             yield fault(folder, f"{count} modules in one folder", f"at most {table.max_modules_in_a_folder}",
                         "divide it into rooms named after the field's nouns")
+
+
+def missing_modules(tree: SourceTree, table: LayerTable) -> Iterator[str]:
+    """Finds imports of modules that a package of the tree does not have, generated ones aside."""
+    for each in tree.imports:
+        package = package_of(each.imported)
+        if package in tree.folders and each.imported not in tree.files and not table.is_ros(each.imported):
+            yield fault(_where(tree, each), f"imports {each.imported}, which does not exist",
+                        f"modules of {package}", "correct the name, or add the module")
 
 
 def package_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, str]]:

@@ -99,6 +99,12 @@ def test_the_modules_directly_in_a_folder_are_a_room(tmp_path: Path) -> None:
     assert "house's room '.' imports house.cellar.wood; allowed: no other room" in found
 
 
+@pytest.mark.parametrize("text", ["import house.cellar.gold", "from house.cellar.gold import bar"])
+def test_an_import_of_a_module_that_does_not_exist_fails(tmp_path: Path, text: str) -> None:
+    found, = faults(tmp_path, {"house.kitchen.stove": text})
+    assert found.startswith("src/house/src/house/kitchen/stove.py:1: imports house.cellar.gold, which does not exist")
+
+
 def test_an_import_between_packages_has_to_be_in_the_table(tmp_path: Path) -> None:
     found, = faults(tmp_path, {"ground.stone": "import house.cellar.coal", "house.cellar.coal": ""})
     assert found == (
