@@ -2,7 +2,6 @@
 """The node robot_hw as an operator sees it: its figures, its faults, how it waits for its hardware and how it ends."""
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -177,28 +176,18 @@ while time.monotonic() < end_s:
 """
 
 
-def bound_threads(process: int) -> list[tuple[int, int]]:
-    """Processor and scheduling policy of the threads that are bound to one processor."""
-    found = []
-    for thread in (int(entry.name) for entry in Path(f"/proc/{process}/task").iterdir()):
-        with contextlib.suppress(ProcessLookupError):   # it has ended meanwhile
-            if len(allowed := os.sched_getaffinity(thread)) == 1:
-                found.append((next(iter(allowed)), os.sched_getscheduler(thread)))
-    return sorted(found)
-
-
 def test_a_processor_that_something_more_urgent_takes_away_costs_hardly_a_cycle(
         robot: Any, real_time_permitted: bool) -> None:
     processors = sorted(os.sched_getaffinity(0))[-2:]
     if len(processors) < 2 or not real_time_permitted:
         pytest.skip("needs two processors and the right to real-time scheduling")
-    assert bound_threads(rosnode_pid("/robot_hw")) == [(processor, os.SCHED_FIFO) for processor in processors]
     rospy.ServiceProxy("robot_hw/reset_statistics", Empty)()
     for processor in processors:
         subprocess.run([sys.executable, "-c", HOG, str(processor)], check=True, timeout=30.0)
     values = figures()[2]
     assert int(values["cycles"]) + int(values["missed"]) > 100
     assert int(values["missed"]) < 25, "one processor was away for 50 cycles, then the other"
+    assert int(values["missed"]) == 0 or float(values["no_processor_max_us"]) >= 8000.0 or int(values["overruns"]) > 0
 
 
 def test_what_every_controller_claims_is_listed_on_the_wire(robot: Any) -> None:
