@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A container that runs all its states at the same time, each in a thread, and ends when the last one has ended."""
+
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from smach import log
@@ -11,11 +12,11 @@ from smach.container import Container
 from smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError, SmachError
 from smach.state import State
 from smach.user_data import UserData
-from smach.util import is_shutdown
+from smach.util import NameMap, Names, is_shutdown
 
 __all__ = ["Concurrence"]
 
-OutcomeMap = Mapping[str, Mapping[str, str]]
+OutcomeMap = Mapping[str, NameMap]
 ChildTerminationCallback = Callable[[dict[str, "str | None"]], "bool | list[str] | tuple[str, ...] | None"]
 OutcomeCallback = Callable[[dict[str, "str | None"]], "str | None"]
 
@@ -29,10 +30,10 @@ class Concurrence(Container):
 
     def __init__(
         self,
-        outcomes: Iterable[str],
+        outcomes: Names,
         default_outcome: str,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
         outcome_map: OutcomeMap | None = None,
         outcome_cb: OutcomeCallback | None = None,
         child_termination_cb: ChildTerminationCallback | None = None,
@@ -64,7 +65,7 @@ class Concurrence(Container):
 
     # ---- construction --------------------------------------------------------------------------------------
     @staticmethod
-    def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
+    def add(label: str, state: State, remapping: NameMap | None = None) -> State:
         """Adds a state to the concurrence that is open.
 
         Args:
@@ -242,7 +243,7 @@ class Concurrence(Container):
         elif answer:
             self._preempt_active()
 
-    def _preempt_active(self, labels: Iterable[str] | None = None) -> None:
+    def _preempt_active(self, labels: Names | None = None) -> None:
         """Asks running children to stop: all of them, or those named."""
         with self._lock:
             wanted = set(self._active if labels is None else labels)
@@ -261,9 +262,7 @@ class Concurrence(Container):
             try:
                 chosen = self._outcome_cb(dict(outcomes))
             except Exception as raised:
-                raise InvalidUserCodeError(
-                    f"outcome callback raised {type(raised).__name__}: {raised}"
-                ) from raised
+                raise InvalidUserCodeError(f"outcome callback raised {type(raised).__name__}: {raised}") from raised
         if chosen is None:
             chosen = next(
                 (

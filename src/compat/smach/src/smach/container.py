@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A container: a state made of states. Building (``with container:``), userdata and callbacks common to all kinds."""
+
 from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,6 +13,7 @@ from smach import log
 from smach.exceptions import InvalidConstructionError, InvalidStateError, InvalidUserCodeError
 from smach.state import State
 from smach.user_data import Remapper, UserData
+from smach.util import NameMap, Names
 
 __all__ = ["Container"]
 
@@ -30,9 +32,7 @@ class Container(State):
 
     _construction = _Construction()
 
-    def __init__(
-        self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()
-    ) -> None:
+    def __init__(self, outcomes: Names = (), input_keys: Names = (), output_keys: Names = ()) -> None:
         """Declares the interface of the container, as of any state."""
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
@@ -114,7 +114,7 @@ class Container(State):
     def __exit__(self, exc_type: object, exc_val: object, exc_tb: object) -> None:
         if exc_type is not None:
             stack = self._construction.stack
-            del stack[stack.index(self):]
+            del stack[stack.index(self) :]
             return
         try:
             self.check_consistency()
@@ -126,9 +126,7 @@ class Container(State):
         """Returns the container being built; raises ``InvalidConstructionError`` when there is none of this kind."""
         stack = cls._construction.stack
         if not stack:
-            raise InvalidConstructionError(
-                f"no container is open; call {cls.__name__}.add inside 'with container:'"
-            )
+            raise InvalidConstructionError(f"no container is open; call {cls.__name__}.add inside 'with container:'")
         if not isinstance(stack[-1], cls):
             raise InvalidConstructionError(
                 f"{cls.__name__}.add was called while a {type(stack[-1]).__name__} is open; use its own add"
@@ -150,11 +148,9 @@ class Container(State):
             if key in self.userdata:
                 parent_ud[key] = self.userdata[key]
 
-    def _execute_child(self, label: str, state: State, remapping: Mapping[str, str]) -> str:
+    def _execute_child(self, label: str, state: State, remapping: NameMap) -> str:
         """Runs a child with its own view of the userdata; raises ``InvalidUserCodeError`` for whatever it raises."""
-        view = Remapper(
-            self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping
-        )
+        view = Remapper(self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping)
         try:
             return state.execute(view)
         except InvalidUserCodeError:

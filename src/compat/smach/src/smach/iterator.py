@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A container that runs one state again and again, once for each item of a sequence."""
+
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from smach import log
@@ -11,7 +12,7 @@ from smach.container import Container
 from smach.exceptions import InvalidStateError, InvalidTransitionError
 from smach.state import State
 from smach.user_data import UserData
-from smach.util import is_shutdown
+from smach.util import NameMap, Names, is_shutdown
 
 __all__ = ["Iterator"]
 
@@ -21,9 +22,9 @@ class Iterator(Container):
 
     def __init__(
         self,
-        outcomes: Iterable[str],
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
+        outcomes: Names,
+        input_keys: Names = (),
+        output_keys: Names = (),
         it: Iterable[Any] | Callable[[], Iterable[Any]] = (),
         it_label: str = "it_data",
         exhausted_outcome: str = "exhausted",
@@ -54,9 +55,9 @@ class Iterator(Container):
     def set_contained_state(
         label: str,
         state: State,
-        loop_outcomes: Iterable[str] = (),
-        break_outcomes: Iterable[str] = (),
-        final_outcome_map: Mapping[str, str] | None = None,
+        loop_outcomes: Names = (),
+        break_outcomes: Names = (),
+        final_outcome_map: NameMap | None = None,
     ) -> None:
         """Sets the state that is run for each item.
 

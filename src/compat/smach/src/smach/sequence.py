@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state machine whose states follow each other in the order they were added."""
-from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from __future__ import annotations
 
 from smach.exceptions import InvalidStateError
 from smach.state import State
 from smach.state_machine import StateMachine
+from smach.util import NameMap, Names
 
 __all__ = ["Sequence"]
 
@@ -15,11 +15,7 @@ class Sequence(StateMachine):
     """Each state's connector outcome leads to the next state; the last one's leads out of the sequence."""
 
     def __init__(
-        self,
-        outcomes: Iterable[str],
-        connector_outcome: str,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
+        self, outcomes: Names, connector_outcome: str, input_keys: Names = (), output_keys: Names = ()
     ) -> None:
         """Makes an empty sequence.
 
@@ -33,12 +29,7 @@ class Sequence(StateMachine):
         self._connector_outcome = connector_outcome
 
     @staticmethod
-    def add(
-        label: str,
-        state: State,
-        transitions: Mapping[str, str] | None = None,
-        remapping: Mapping[str, str] | None = None,
-    ) -> State:
+    def add(label: str, state: State, transitions: NameMap | None = None, remapping: NameMap | None = None) -> State:
         """Adds a state to the sequence that is open.
 
         Args:

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state: something that runs, reads and writes userdata, ends with one of its outcomes, and can be asked to stop."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from smach.exceptions import InvalidUserCodeError
-from smach.util import CBInterface, has_smach_interface
+from smach.util import CBInterface, Names, has_smach_interface
 
 __all__ = ["CBState", "State"]
 
@@ -15,11 +16,7 @@ class State:
     """Base of all states: declares outcomes and userdata keys; ``execute`` is written by the user."""
 
     def __init__(
-        self,
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        self, outcomes: Names = (), input_keys: Names = (), output_keys: Names = (), io_keys: Names = ()
     ) -> None:
         """Declares the interface of the state.
 
@@ -47,7 +44,7 @@ class State:
         raise InvalidUserCodeError(f"{type(self).__name__} does not define execute(self, userdata)")
 
     # ---- interface -----------------------------------------------------------------------------------------
-    def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
+    def register_outcomes(self, new_outcomes: Names) -> None:
         """Adds outcomes to those the state may return."""
         self._outcomes.update(dict.fromkeys(new_outcomes))
 
@@ -55,13 +52,13 @@ class State:
         """Returns the outcomes, in the order of declaration."""
         return tuple(self._outcomes)
 
-    def register_io_keys(self, keys: Iterable[str]) -> None:
+    def register_io_keys(self, keys: Names) -> None:
         """Adds userdata keys that are read and written."""
         both = dict.fromkeys(keys)
         self._input_keys.update(both)
         self._output_keys.update(both)
 
-    def register_input_keys(self, keys: Iterable[str]) -> None:
+    def register_input_keys(self, keys: Names) -> None:
         """Adds userdata keys that are read."""
         self._input_keys.update(dict.fromkeys(keys))
 
@@ -69,7 +66,7 @@ class State:
         """Returns the userdata keys that are read."""
         return tuple(self._input_keys)
 
-    def register_output_keys(self, keys: Iterable[str]) -> None:
+    def register_output_keys(self, keys: Names) -> None:
         """Adds userdata keys that are written."""
         self._output_keys.update(dict.fromkeys(keys))
 
@@ -103,10 +100,10 @@ class CBState(State):
         cb: Callable[..., str],
         cb_args: Iterable[Any] = (),
         cb_kwargs: Mapping[str, Any] | None = None,
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        outcomes: Names = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        io_keys: Names = (),
     ) -> None:
         """Makes a state of a function; an interface declared with ``cb_interface`` is taken over.
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A container that runs one state at a time and follows transitions from outcome to state until it reaches one of
 its own outcomes."""
+
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping
 from typing import Any
 
 from smach import log
@@ -12,7 +12,7 @@ from smach.container import Container
 from smach.exceptions import InvalidStateError, InvalidTransitionError
 from smach.state import State
 from smach.user_data import UserData
-from smach.util import is_shutdown
+from smach.util import NameMap, Names, is_shutdown
 
 __all__ = ["StateMachine"]
 
@@ -20,9 +20,7 @@ __all__ = ["StateMachine"]
 class StateMachine(Container):
     """Runs its states in the order its transitions give, starting with the first one added."""
 
-    def __init__(
-        self, outcomes: Iterable[str], input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()
-    ) -> None:
+    def __init__(self, outcomes: Names, input_keys: Names = (), output_keys: Names = ()) -> None:
         """Makes an empty machine; states are added inside ``with machine:``."""
         super().__init__(outcomes, input_keys, output_keys)
         self._states: dict[str, State] = {}
@@ -37,12 +35,7 @@ class StateMachine(Container):
 
     # ---- construction --------------------------------------------------------------------------------------
     @staticmethod
-    def add(
-        label: str,
-        state: State,
-        transitions: Mapping[str, str] | None = None,
-        remapping: Mapping[str, str] | None = None,
-    ) -> State:
+    def add(label: str, state: State, transitions: NameMap | None = None, remapping: NameMap | None = None) -> State:
         """Adds a state to the machine that is open.
 
         Args:
@@ -73,9 +66,9 @@ class StateMachine(Container):
     def add_auto(
         label: str,
         state: State,
-        connector_outcomes: Iterable[str],
-        transitions: Mapping[str, str] | None = None,
-        remapping: Mapping[str, str] | None = None,
+        connector_outcomes: Names,
+        transitions: NameMap | None = None,
+        remapping: NameMap | None = None,
     ) -> State:
         """Adds a state, some of whose outcomes lead to the state that is added next.
 
@@ -104,7 +97,7 @@ class StateMachine(Container):
                 self._transitions[self._connector_label][outcome] = label
         self._connector_label, self._connector_outcomes = None, []
 
-    def check_state_spec(self, label: str, state: State, transitions: Mapping[str, str]) -> None:
+    def check_state_spec(self, label: str, state: State, transitions: NameMap) -> None:
         """Raises when a state cannot be added under a label with these transitions."""
         if label in self._states:
             raise InvalidStateError(f"the machine already has a state with the label '{label}'")

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Userdata: the variables states hand to each other, and the view of them that one state is allowed to have."""
+
 from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Iterable, KeysView, Mapping
+from collections.abc import KeysView
 from typing import Any
 
 from smach import log
 from smach.exceptions import InvalidUserCodeError
+from smach.util import NameMap, Names
 
 __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
@@ -37,7 +39,7 @@ class UserData(_ItemsAsAttributes):
         with self._lock:
             self._data.update(ud._data)
 
-    def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
+    def extract(self, keys: Names, remapping: NameMap) -> UserData:
         """Returns shallow copies of some values under other names.
 
         Args:
@@ -52,7 +54,7 @@ class UserData(_ItemsAsAttributes):
             result[renamed.get(key, key)] = copy.copy(self[key])
         return result
 
-    def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
+    def merge(self, ud: UserData, keys: Names, remapping: NameMap) -> None:
         """Takes shallow copies of some values of another userdata.
 
         Args:
@@ -146,11 +148,7 @@ class Remapper(_ItemsAsAttributes):
     """The view a state has of its container's userdata: only its declared keys, under its own names."""
 
     def __init__(
-        self,
-        ud: Any,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        remapping: Mapping[str, str] | None = None,
+        self, ud: Any, input_keys: Names = (), output_keys: Names = (), remapping: NameMap | None = None
     ) -> None:
         """Wraps userdata in the interface of a state.
 

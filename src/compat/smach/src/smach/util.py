@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shutdown check shared by all containers, and the decorator that gives a plain function a state's interface."""
+
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 __all__ = ["CBInterface", "cb_interface", "has_smach_interface", "is_shutdown", "set_shutdown_check"]
+
+Names = Iterable[str]
+"""Outcomes, labels or userdata keys."""
+
+NameMap = Mapping[str, str]
+"""Transitions or remappings: one name -> another."""
 
 
 class _ShutdownCheck:
@@ -40,10 +47,10 @@ class CBInterface:
     def __init__(
         self,
         cb: Callable[..., Any],
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        outcomes: Names = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        io_keys: Names = (),
     ) -> None:
         """Wraps ``cb``; keys in ``io_keys`` count as input and as output."""
         both = list(io_keys)
@@ -73,11 +80,7 @@ class cb_interface:  # noqa: N801 - public name
     """Decorator: declares outcomes and userdata keys of a function, for use with ``CBState``."""
 
     def __init__(
-        self,
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        self, outcomes: Names = (), input_keys: Names = (), output_keys: Names = (), io_keys: Names = ()
     ) -> None:
         """Stores the interface that the decorated function will carry."""
         self._interface = (tuple(outcomes), tuple(input_keys), tuple(output_keys), tuple(io_keys))

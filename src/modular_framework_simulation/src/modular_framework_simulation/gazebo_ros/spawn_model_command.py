@@ -11,22 +11,6 @@ from enum import Enum
 from modular_framework_simulation.models.poses import Pose
 
 
-class Format(Enum):
-    """Language of a model description."""
-
-    SDF = "sdf"
-    URDF = "urdf"
-
-
-class Source(Enum):
-    """Where a model description comes from."""
-
-    FILE = "file"
-    PARAM = "param"
-    DATABASE = "database"
-    STDIN = "stdin"
-
-
 @dataclass(frozen=True, slots=True)
 class SpawnCommand:
     """What spawn_model was asked to do.
@@ -56,6 +40,22 @@ class SpawnCommand:
     wait_for: str
     unpause: bool
     bond: bool
+
+
+class Format(Enum):
+    """Language of a model description."""
+
+    SDF = "sdf"
+    URDF = "urdf"
+
+
+class Source(Enum):
+    """Where a model description comes from."""
+
+    FILE = "file"
+    PARAM = "param"
+    DATABASE = "database"
+    STDIN = "stdin"
 
 
 def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:

@@ -34,6 +34,15 @@ class Mesh:
     scale: Vector3 = (1.0, 1.0, 1.0)
 
 
+class JointType(Enum):
+    """The joints a simulated model may have."""
+
+    FIXED = "fixed"
+    REVOLUTE = "revolute"
+    CONTINUOUS = "continuous"
+    PRISMATIC = "prismatic"
+
+
 Geometry = Box | Cylinder | Sphere | Plane | Mesh
 
 
@@ -96,15 +105,6 @@ class Link:
     inertial: Inertial | None
     collisions: tuple[Collision, ...]
     visuals: tuple[Visual, ...]
-
-
-class JointType(Enum):
-    """The joints a simulated model may have."""
-
-    FIXED = "fixed"
-    REVOLUTE = "revolute"
-    CONTINUOUS = "continuous"
-    PRISMATIC = "prismatic"
 
 
 @dataclass(frozen=True, slots=True)
