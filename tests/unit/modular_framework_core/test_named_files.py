@@ -11,8 +11,8 @@ from modular_framework_core.managers.joint_bounds import bounds_from_urdf
 from modular_framework_core.managers.named_joint_states import load_joint_states
 from modular_framework_core.managers.named_poses import NamedPose, Placement
 from modular_framework_core.managers.named_trajectories import load_trajectories
-from modular_framework_core.rotations import quaternion_from_rpy
 from modular_framework_core.scene.sensor_frames import load_sensor_frames
+from modular_framework_urdf.rotations import quaternion_from_rpy
 
 EXAMPLE_TRAJECTORY = """
 example_trajectory:

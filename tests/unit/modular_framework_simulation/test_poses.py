@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from modular_framework_simulation.models.poses import Pose, normalised_quaternion, rpy_from_quaternion
+from modular_framework_simulation.models.poses import Pose, normalised_quaternion
+from modular_framework_urdf.rotations import rpy_from_quaternion
 
 ANGLE = st.floats(-3.1, 3.1)
 LENGTH = st.floats(-10.0, 10.0)

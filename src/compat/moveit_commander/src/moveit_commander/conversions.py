@@ -10,6 +10,8 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, Vector3
 
+from modular_framework_urdf import rotations
+from modular_framework_urdf.rotations import quaternion_from_rpy
 from moveit_commander.exception import MoveItCommanderException
 
 
@@ -25,27 +27,11 @@ def msg_from_string(msg: Any, data: bytes) -> None:
     msg.deserialize(data)
 
 
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> list[float]:
-    """Returns the quaternion xyzw of turns about the fixed axes x, then y, then z [rad]."""
-    cr, sr = math.cos(roll / 2.0), math.sin(roll / 2.0)
-    cp, sp = math.cos(pitch / 2.0), math.sin(pitch / 2.0)
-    cy, sy = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
-    return [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy]
-
-
 def rpy_from_quaternion(quaternion: Sequence[float]) -> list[float]:
-    """Turns about the fixed axes x, y, z [rad] of a quaternion xyzw; at pitch +-pi/2 the yaw is chosen as 0."""
-    x, y, z, w = quaternion
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    if norm < 1e-9:
+    """Returns the turns about the fixed axes x, y, z [rad] of a quaternion xyzw; at pitch +-pi/2 the yaw is 0."""
+    if math.hypot(*quaternion) < 1e-9:
         raise MoveItCommanderException(f"quaternion {list(quaternion)} has no length; a unit quaternion is needed")
-    x, y, z, w = x / norm, y / norm, z / norm, w / norm
-    sine = 2.0 * (w * y - z * x)
-    if abs(sine) > 1.0 - 1e-12:
-        return [2.0 * math.atan2(x, w), math.copysign(math.pi / 2.0, sine), 0.0]
-    return [math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(sine),
-            math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))]
+    return list(rotations.rpy_from_quaternion(quaternion))
 
 
 def pose_to_list(pose_msg: Pose) -> list[float]:
@@ -58,7 +44,7 @@ def list_to_pose(pose_list: Sequence[float]) -> Pose:
     """Builds a pose from [x, y, z, roll, pitch, yaw] or [x, y, z, qx, qy, qz, qw] [m, rad]."""
     values = [float(value) for value in pose_list]
     if len(values) == 6:
-        values = values[:3] + quaternion_from_rpy(*values[3:])
+        values = [*values[:3], *quaternion_from_rpy(*values[3:])]
     elif len(values) != 7:
         raise MoveItCommanderException(f"a pose list has {len(values)} numbers; 6 (x, y, z, roll, pitch, yaw) or "
                                        "7 (x, y, z, qx, qy, qz, qw) are needed")

@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from sensor_msgs.msg import JointState
 
 from modular_framework_core.msg import ManipulatorState, StandardisedGrasp, TorqueIntensity
-from modular_framework_core.rotations import quaternion_from_rpy
+from modular_framework_urdf.rotations import quaternion_from_rpy
 
 
 def generate_joint_state_message(joint_names: Sequence[str], position: Sequence[float], velocity: Sequence[float] = (),

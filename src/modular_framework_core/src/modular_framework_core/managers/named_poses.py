@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
-from modular_framework_core.rotations import quaternion_from_rpy
+from modular_framework_urdf.rotations import quaternion_from_rpy
 
 POSITION_KEYS = ("x", "y", "z")
 RPY_KEYS = ("r", "p", "y")

@@ -14,9 +14,9 @@ from gazebo_msgs.srv import DeleteModel, DeleteModelRequest, SpawnModel, SpawnMo
 from geometry_msgs.msg import Point, Pose, Quaternion
 
 from modular_framework_core import srv
-from modular_framework_core.rotations import quaternion_from_rpy
 from modular_framework_core.scene.manage_object import ObjectRequest, ObjectRequestError, parse_request
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SERVICE_TIMEOUT_S = 15.0
 

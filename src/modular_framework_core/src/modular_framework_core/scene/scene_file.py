@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from modular_framework_urdf.rotations import multiply_quaternions, rotate_vector
+
 SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "cone": 2, "plane": 4}
 """Numbers of each kind of shape: sides; radius; radius and length; radius and length; a, b, c and d. All [m] or 1."""
 
@@ -240,9 +242,9 @@ def _shape_lines(shape: SceneShape, thing: SceneObject | None) -> list[str]:
     """Lines of a shape; its pose is combined with that of the object, if one is given."""
     position, quaternion = shape.position, shape.quaternion_xyzw
     if thing is not None:
-        turned = _rotated(thing.quaternion_xyzw, position)
+        turned = rotate_vector(thing.quaternion_xyzw, position)
         position = tuple(a + b for a, b in zip(thing.position, turned, strict=True))
-        quaternion = _product(thing.quaternion_xyzw, quaternion)
+        quaternion = multiply_quaternions(thing.quaternion_xyzw, quaternion)
     sizes = [_numbers(shape.size)]
     if shape.kind == "mesh":
         sizes = [f"{len(shape.vertices)} {len(shape.triangles)}", *map(_numbers, shape.vertices),
@@ -256,16 +258,3 @@ def _pose_lines(position: Vector, quaternion_xyzw: Vector) -> list[str]:
 
 def _numbers(values: Vector) -> str:
     return " ".join(f"{value:.12g}" for value in values)
-
-
-def _product(first: Vector, second: Vector) -> Vector:
-    """Product of two quaternions xyzw: the second rotation in the frame of the first."""
-    x, y, z, w = first
-    a, b, c, d = second
-    return (w * a + x * d + y * c - z * b, w * b - x * c + y * d + z * a,
-            w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c)
-
-
-def _rotated(quaternion: Vector, vector: Vector) -> Vector:
-    x, y, z, w = quaternion
-    return _product(_product(quaternion, (*vector, 0.0)), (-x, -y, -z, w))[:3]

@@ -10,7 +10,7 @@ import yaml
 
 from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
 from modular_framework_core.managers.named_poses import NamedPose, frame_name, parse_pose
-from modular_framework_core.rotations import quaternion_from_rpy
+from modular_framework_urdf.rotations import quaternion_from_rpy
 
 FRAME_KEYS = ("frame_id", "origin_frame_id", "frame_x", "frame_y", "frame_z", "frame_roll", "frame_pitch", "frame_yaw")
 

@@ -6,35 +6,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from modular_framework_urdf.rotations import (
+    Quaternion,
+    Vector3,
+    multiply_quaternions,
+    quaternion_from_rpy,
+    rotate_vector,
+)
 
 _IDENTITY_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 _ORIGIN: Vector3 = (0.0, 0.0, 0.0)
-
-
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Returns the xyzw quaternion of rotations about the fixed x, then y, then z axis [rad]."""
-    sr, cr = math.sin(roll / 2), math.cos(roll / 2)
-    sp, cp = math.sin(pitch / 2), math.cos(pitch / 2)
-    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
-
-
-def rpy_from_quaternion(quaternion: Quaternion) -> Vector3:
-    """Returns roll, pitch and yaw [rad] of an xyzw quaternion, pitch within [-pi/2, pi/2]."""
-    x, y, z, w = quaternion
-    sin_pitch = max(-1.0, min(1.0, 2 * (w * y - z * x)))
-    if abs(sin_pitch) > 1 - 1e-9:
-        return (0.0, math.copysign(math.pi / 2, sin_pitch), -2 * math.copysign(1.0, sin_pitch) * math.atan2(x, w))
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return (roll, math.asin(sin_pitch), yaw)
 
 
 def normalised_quaternion(quaternion: Quaternion) -> Quaternion:
@@ -50,30 +31,6 @@ def normalised_quaternion(quaternion: Quaternion) -> Quaternion:
         raise ValueError(f"quaternion {list(quaternion)} has length {norm:.4g}; expected 1")
     x, y, z, w = quaternion
     return (x / norm, y / norm, z / norm, w / norm)
-
-
-def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Returns the xyzw quaternion of rotation b followed by rotation a."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-def rotate_vector(quaternion: Quaternion, vector: Vector3) -> Vector3:
-    """Returns the vector turned by a unit xyzw quaternion."""
-    x, y, z, w = quaternion
-    vx, vy, vz = vector
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return (
-        vx + w * tx + y * tz - z * ty,
-        vy + w * ty + z * tx - x * tz,
-        vz + w * tz + x * ty - y * tx,
-    )
 
 
 @dataclass(frozen=True, slots=True)

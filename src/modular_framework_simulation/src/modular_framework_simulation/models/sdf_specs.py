@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from modular_framework_simulation.models.poses import Pose, Vector3
+from modular_framework_simulation.models.poses import Pose
 from modular_framework_urdf.robot import Box as Box
 from modular_framework_urdf.robot import Cylinder as Cylinder
 from modular_framework_urdf.robot import Sphere as Sphere
+from modular_framework_urdf.rotations import Vector3
 
 
 @dataclass(frozen=True, slots=True)

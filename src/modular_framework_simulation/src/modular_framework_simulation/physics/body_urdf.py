@@ -14,7 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_simulation.models.poses import Pose, rpy_from_quaternion
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_urdf.rotations import rpy_from_quaternion
 
 STATIC_LINK = "static"
 """Name of the one link of a static model in the written URDF."""

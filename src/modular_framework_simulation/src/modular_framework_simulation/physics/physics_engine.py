@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_simulation.errors import DescriptionError, SimulationError
-from modular_framework_simulation.models.poses import Vector3
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.rotations import Vector3
 
 BASE_INDEX = -1
 """The engine's number of a body's root link."""

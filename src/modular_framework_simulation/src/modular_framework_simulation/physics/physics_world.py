@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_simulation.models.poses import Pose, Vector3, rotate_vector
+from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
 from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
+from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 WORLD_FRAMES = ("", "world", "map")
 """Names that stand for the frame of the world in requests."""

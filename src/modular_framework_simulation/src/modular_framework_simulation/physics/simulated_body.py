@@ -6,9 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from modular_framework_simulation.errors import UnknownEntityError
-from modular_framework_simulation.models.poses import Pose, Vector3, rotate_vector
+from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Model
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
+from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 
 @dataclass(frozen=True, slots=True)
