@@ -64,6 +64,14 @@ def test_a_method_or_a_configuration_that_is_not_there_is_refused(tmp_path: Path
         check_arguments(str(tmp_path / "a.launch"), [f"method_launch_file:={file}", f"config_directory:={tmp_path}"])
 
 
+def test_a_misspelt_path_is_answered_with_the_nearest_one(tmp_path: Path) -> None:
+    (tmp_path / "a.launch").write_text(METHOD)
+    (tmp_path / "my_config").mkdir()
+    for argument, meant in (("config_directory", "my_config"), ("method_launch_file", "a.launch")):
+        with pytest.raises(roslaunch.core.RLException, match=re.escape(f"; did you mean '{tmp_path / meant}'")):
+            check_arguments(str(tmp_path / "a.launch"), [f"{argument}:={tmp_path / meant[:-1]}"])
+
+
 def test_a_wrong_default_is_refused_like_a_wrong_argument(tmp_path: Path) -> None:
     (tmp_path / "a.launch").write_text(METHOD.replace('default=""', 'default="nothing/a.launch"', 1))
     with pytest.raises(roslaunch.core.RLException, match="there is no package 'nothing'"):

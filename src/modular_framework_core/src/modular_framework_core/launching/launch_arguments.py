@@ -64,7 +64,7 @@ def _method_fault(value: str) -> str:
     allowed = "PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /"
     fault, package, file = f"argument '{METHOD}' is '{value}', ", *value.partition("/")[::2]
     if Path(value).is_absolute() or not file:
-        reason = "and there is no such file" if file else "which is no launch file"
+        reason = f"and there is no such file{_path_hint(Path(value))}" if file else "which is no launch file"
         return f"{fault}{reason}; allowed is {allowed}; correct it"
     finder = rospkg.RosPack()
     try:
@@ -85,7 +85,13 @@ def _folder_fault(values: dict[str, str]) -> str:
     if not value or Path(value).is_absolute() and Path(value).is_dir():
         return ""
     return (f"argument '{CONFIGURATION}' is '{value}', allowed is the path of a folder from /, such as a copy of the "
-            "folder config of modular_framework_api; correct it")
+            f"folder config of modular_framework_api; correct it{_path_hint(Path(value))}")
+
+
+def _path_hint(path: Path) -> str:
+    """Returns a hint at the path beside a missing one whose name is most like it; empty when there is none."""
+    beside = [str(entry) for entry in path.parent.iterdir()] if path.is_absolute() and path.parent.is_dir() else []
+    return _hint(str(path), beside)
 
 
 def _hint(name: str, known: Iterable[str]) -> str:
