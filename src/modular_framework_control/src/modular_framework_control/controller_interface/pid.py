@@ -47,7 +47,7 @@ class Pid:
         self._sum = 0.0
 
     def reset(self) -> None:
-        """Forget what was added up."""
+        """Clears the sum."""
         self._sum = 0.0
 
     def command(self, error: float, error_rate: float, period_s: float) -> float:
@@ -74,7 +74,7 @@ class Pid:
         return gains.p * error + _integral_part(gains, total) + gains.d * error_rate
 
     def _change_gains(self) -> None:
-        """Take the new gains over; a sum that the old ones left unused does not become a command."""
+        """Takes over the new gains; a sum that the old ones left unused does not become a command."""
         part = _integral_part(self._gains, self._sum)
         self._gains = self.gains
         self._sum = part / self._gains.i if self._gains.i != 0.0 else 0.0

@@ -92,7 +92,7 @@ class ControllerManager:
     # ---- control loop ----
 
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
-        """Update every running controller, then carry out a pending switch. Never raises, never waits.
+        """Updates every running controller, then carries out a pending switch. Never raises, never waits.
 
         Args:
             time_s: time of this cycle [s].
@@ -149,7 +149,7 @@ class ControllerManager:
     # ---- threads that may wait ----
 
     def load_controller(self, name: str) -> None:
-        """Make and initialise the controller whose parameters are below `name`.
+        """Makes and initialises the controller whose parameters are below `name`.
 
         Raises:
             ControllerError: already loaded, no or unknown type, its `init` failed, or its topics and actions cannot be
@@ -191,7 +191,7 @@ class ControllerManager:
         return tuple(claim for claim in claims if claim.resources or claim is claims[0])
 
     def unload_controller(self, name: str) -> None:
-        """Forget a controller that is not running.
+        """Forgets a controller that is not running.
 
         Raises:
             ControllerError: not loaded, or running.
@@ -207,7 +207,7 @@ class ControllerManager:
 
     def switch_controller(self, start: Sequence[str], stop: Sequence[str], strictness: int = Strictness.STRICT,
                           start_asap: bool = False, timeout_s: float = 0.0) -> None:
-        """Stop and start controllers in one cycle of the control loop; returns when that is done.
+        """Stops and starts controllers in one cycle of the control loop; returns when that is done.
 
         Args:
             start: names to start.
@@ -232,7 +232,7 @@ class ControllerManager:
                 raise ControllerError("; ".join(request.errors))
 
     def _prepare(self, request: SwitchRequest) -> None:
-        """Ask the hardware whether it can do the switch."""
+        """Asks the hardware whether it can do the switch."""
         try:
             conflict = self._robot_hw.check_for_conflict(request.plan.resulting)
             prepared = not conflict and self._robot_hw.prepare_switch(*request.hardware_lists)
@@ -245,7 +245,7 @@ class ControllerManager:
             raise ControllerError("cannot switch controllers: the hardware refused to prepare for it")
 
     def _hand_over(self, request: SwitchRequest) -> None:
-        """Put `request` into the slot of the loop and wait until it is done, as long as the loop runs."""
+        """Puts `request` into the slot of the loop and waits until it is done, as long as the loop runs."""
         with self._slot_lock:
             if self._ended:
                 raise ControllerError("cannot switch controllers: the control loop has ended; start its node again")
@@ -272,7 +272,7 @@ class ControllerManager:
         return [(name, BASE_CLASS) for name in self.types.names]
 
     def reload_controller_libraries(self, force_kill: bool = False) -> None:
-        """Look again for controller classes; with `force_kill`, stop and unload all controllers first.
+        """Searches for controller classes again; with `force_kill`, stops and unloads all controllers first.
 
         Raises:
             ControllerError: controllers are loaded and `force_kill` is False.
@@ -288,7 +288,7 @@ class ControllerManager:
             self.types.reload()
 
     def stop_all(self) -> None:
-        """Stop every running controller, which ends their goals, and refuse switches from now on, a pending one too.
+        """Stops every running controller, which ends their goals, and refuses switches from now on, also a pending one.
 
         The control loop must have ended. May be called twice.
         """
@@ -304,7 +304,7 @@ class ControllerManager:
                 entry.stop(self._last_time_s)
 
     def close(self) -> None:
-        """Stop and forget all controllers; the control loop must have ended. May be called twice."""
+        """Stops and removes all controllers; the control loop must have ended. May be called twice."""
         with self._services:
             self.stop_all()
             self._loaded = ()

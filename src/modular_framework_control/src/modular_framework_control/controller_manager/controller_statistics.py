@@ -42,7 +42,7 @@ class UpdateStatistics:
         self._overruns = 0
 
     def add(self, time_s: float, duration_s: float, overrun: bool) -> None:
-        """Count one update (mean and variance by Welford's recurrence).
+        """Counts one update (mean and variance by Welford's recurrence).
 
         Args:
             time_s: time of the loop [s].

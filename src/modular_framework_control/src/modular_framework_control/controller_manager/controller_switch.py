@@ -82,7 +82,7 @@ class LoadedController:
         return self.state is ControllerState.RUNNING
 
     def start(self, time_s: float) -> str:
-        """Start it; returns why it failed, or ""."""
+        """Starts it; returns why it failed, or ""."""
         try:
             self.controller.starting(time_s)
         except Exception as error:  # a user's controller may raise anything; the loop must continue
@@ -134,7 +134,7 @@ class LoadedController:
             self.fail(time_s, f"{method} raised {type(error).__name__}: {error}")
 
     def fail(self, time_s: float, reason: str) -> str:
-        """Stop it because it raised; call from the except block. Returns `reason`."""
+        """Stops it because it raised; call from the except block. Returns `reason`."""
         self.failure = reason
         self.state = ControllerState.STOPPED
         LOGGER.exception("controller '%s' is stopped: %s", self.name, reason)
@@ -162,7 +162,7 @@ class SwitchPlan:
 
 def plan_switch(loaded: Mapping[str, LoadedController], start: Sequence[str], stop: Sequence[str],
                 strictness: Strictness) -> SwitchPlan:
-    """Apply the rules of STRICT and BEST_EFFORT to a request.
+    """Applies the rules of STRICT and BEST_EFFORT to a request.
 
     A controller that runs and is named in both lists is restarted. Named in both while it does not run, it cannot be
     stopped, which STRICT refuses and BEST_EFFORT leaves out.
@@ -250,7 +250,7 @@ class SwitchRequest:
         return not self._waiting
 
     def give_up(self, time_s: float) -> None:
-        """Start no more of the controllers that still wait."""
+        """Starts no more of the controllers that still wait."""
         while self._waiting:
             self._waiting.pop(0).abort(time_s)
 

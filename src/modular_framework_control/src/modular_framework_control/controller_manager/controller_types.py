@@ -70,7 +70,7 @@ class ControllerTypes:
         return sorted({*self._locations, *self._factories, *self._plugins.names})
 
     def register(self, type_name: str, factory: Callable[[], Controller]) -> None:
-        """Make a class known under `type_name` ("package/Class"); an earlier one of that name is replaced."""
+        """Makes a class known under `type_name` ("package/Class"); an earlier one of that name is replaced."""
         if "/" not in type_name:
             raise ControllerError(f"controller type '{type_name}': expected the form package/Class")
         self._factories[type_name] = factory
@@ -109,5 +109,5 @@ class ControllerTypes:
         return controller
 
     def reload(self) -> None:
-        """Look again for classes and modules installed since the program started."""
+        """Searches again for classes and modules, installed since the program started."""
         self._plugins.reload()

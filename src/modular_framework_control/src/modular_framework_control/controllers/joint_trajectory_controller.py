@@ -229,13 +229,13 @@ class JointTrajectoryController(Controller):
         return desired, np.where(np.isfinite(actual), actual, desired[:2])
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
-        """Command the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
+        """Commands the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
         del error, period_s
         for handle, position in zip(self._handles, desired[POSITION].tolist(), strict=True):
             handle.command = position
 
     def _command_rest(self) -> None:
-        """Command what keeps the joints where they are measured; it stays in force while the controller is stopped."""
+        """Commands the joints to hold their measured positions; that stays in force while the controller is stopped."""
         _, actual = self._desired_and_measured()
         for handle, position in zip(self._handles, actual[POSITION].tolist(), strict=True):
             handle.hold(position)

@@ -151,7 +151,7 @@ class CombinedRobotHW(RobotHW):
 
     def _cycle(self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float,
                period_s: float) -> None:
-        """Read or write one part; that it raised is a fault of this part until the same step succeeds again."""
+        """Reads or writes one part; an exception is a fault of this part until the same step succeeds again."""
         try:
             step(time_s, period_s)
         except Exception as error:  # a user's hardware may raise anything; the others must go on

@@ -54,7 +54,7 @@ class HardwareInterface(Generic[HandleT]):
         self._claims: dict[str, None] = {}
 
     def register_handle(self, handle: HandleT) -> HandleT:
-        """Add a handle; returns it for chaining.
+        """Adds a handle; returns it for chaining.
 
         Raises:
             HardwareInterfaceError: a handle of that name is already registered.

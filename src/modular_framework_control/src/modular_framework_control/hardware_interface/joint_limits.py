@@ -37,10 +37,10 @@ class JointLimiter(Protocol):
     handle: Any
 
     def reset(self) -> None:
-        """Forget the last command, after the joint was moved by other means."""
+        """Clears the last command, after the joint was moved by other means."""
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replace the command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+        """Replaces the command by the nearest allowed one; `period_s` [s] is the time since the last call."""
 
 
 class PositionJointSaturation:
@@ -66,11 +66,11 @@ class PositionJointSaturation:
         self._last_command = math.nan
 
     def reset(self) -> None:
-        """Forget the last command, after the joint was moved by other means."""
+        """Clears the last command, after the joint was moved by other means."""
         self._last_command = math.nan
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replace `handle.command` by the nearest allowed one; a command that is not a number keeps the last one.
+        """Replaces `handle.command` by the nearest allowed one; a command that is not a number keeps the last one.
 
         Args:
             period_s: time since the last call [s].
@@ -165,7 +165,7 @@ class VelocityJointSaturation(_Saturation):
     __slots__ = ()
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replace `handle.command` by the nearest allowed one."""
+        """Replaces `handle.command` by the nearest allowed one."""
         limits, state = self.limits, self.handle.state
         command, position = self._commanded(), state.position
         if self.soft is None:
@@ -193,7 +193,7 @@ class EffortJointSaturation(_Saturation):
     __slots__ = ()
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replace `handle.command` by the nearest allowed one."""
+        """Replaces `handle.command` by the nearest allowed one."""
         del period_s
         limits, state = self.limits, self.handle.state
         position, velocity = state.position, state.velocity
@@ -293,12 +293,12 @@ class JointLimitGuard:
                                                    soft_limits_with_parameters(name, soft.get(name), root_nh)))
 
     def enforce(self, period_s: float) -> None:
-        """Replace every command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+        """Replaces every command by the nearest allowed one; `period_s` [s] is the time since the last call."""
         for limiter in self._limiters:
             limiter.enforce_limits(period_s)
 
     def reset(self, joints: Iterable[str] | None = None) -> None:
-        """Forget the last commands (of these joints), after they were moved by other means."""
+        """Clears the last commands (of these joints), after they were moved by other means."""
         names = self.limits.keys() if joints is None else set(joints)
         for limiter in self._limiters:
             if limiter.handle.name in names:

@@ -88,7 +88,7 @@ class PluginIndex:
         return name in self._plugins()
 
     def load(self, name: str, expected: type[Any]) -> type[Any]:
-        """Import the class offered under `name`.
+        """Imports the class offered under `name`.
 
         Args:
             name: package/Class.
@@ -115,7 +115,7 @@ class PluginIndex:
         return loaded
 
     def reload(self) -> None:
-        """Look again at the next question, also for modules installed or changed since they were imported."""
+        """Makes the next use search again, also for modules that were installed or changed since their import."""
         self._stale |= {plugin.module for plugin in (self._found or {}).values()}
         self._found = None
         importlib.invalidate_caches()

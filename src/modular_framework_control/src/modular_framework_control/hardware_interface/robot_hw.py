@@ -64,7 +64,7 @@ class RobotHW:
         self._interfaces: dict[type[HardwareInterface[Any]], HardwareInterface[Any]] = {}
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
-        """Read parameters, connect, and register the interfaces.
+        """Reads parameters, connects, and registers the interfaces.
 
         Args:
             root_nh: the namespace of the robot (robot_description is found there).
@@ -77,7 +77,7 @@ class RobotHW:
         return True
 
     def register_interface(self, interface: HardwareInterface[Any]) -> None:
-        """Offer `interface` to the controllers; called from `init`.
+        """Offers `interface` to the controllers; called from `init`.
 
         Raises:
             HardwareInterfaceError: an interface of this class is already registered.
@@ -113,13 +113,13 @@ class RobotHW:
         return sorted(interface.type_name for interface in self._interfaces.values())
 
     def read(self, time_s: float, period_s: float) -> None:
-        """Fill the joint states with what is measured at `time_s` [s], `period_s` [s] after the last call."""
+        """Fills the joint states with what is measured at `time_s` [s], `period_s` [s] after the last call."""
 
     def write(self, time_s: float, period_s: float) -> None:
-        """Send the commands of the joint handles; `period_s` [s] is the time since the last call."""
+        """Sends the commands of the joint handles; `period_s` [s] is the time since the last call."""
 
     def close(self) -> None:
-        """Disconnect, and end what `init` began, once the control loop has ended. May be called twice."""
+        """Disconnects, and ends what `init` began, once the control loop has ended. May be called twice."""
 
     def fault(self) -> str:
         """Returns why this hardware cannot follow commands (a lost link, a protective stop); "" if it can.
@@ -162,12 +162,12 @@ class RobotHW:
         return "; ".join(conflicts)
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
-        """Get ready for a switch, off the control loop; False refuses it."""
+        """Prepares a switch, on a thread that may wait; False refuses it."""
         del start, stop
         return True
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        """Begin the switch, in the control loop, before controllers are stopped and started."""
+        """Begins the switch, in the control loop, before controllers are stopped and started."""
 
     def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
         """How far the switch begun by `do_switch` is, as a whole or for one controller that is to start."""

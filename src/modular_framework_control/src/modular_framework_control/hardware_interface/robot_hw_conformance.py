@@ -90,7 +90,7 @@ class RobotHWConformance(ABC):
         self._in_loop(robot_hw.read, self._time_s, self.period_s)
 
     def _cycle(self, robot_hw: RobotHW, goals: Mapping[str, float] | None = None) -> None:
-        """Read, command as controllers do (where they are, without `goals`), write; then time passes."""
+        """Reads, commands as controllers do (the present positions, without `goals`), writes; then time passes."""
         self._in_loop(self._cycle_in_loop, robot_hw, goals)
         self._time_s += self.period_s
         self.advance(self.period_s)

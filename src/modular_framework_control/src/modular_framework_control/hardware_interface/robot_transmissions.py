@@ -106,7 +106,7 @@ class RobotTransmissions:
         return paths
 
     def propagate_states(self) -> None:
-        """Bring the joints where the actuators are; the first time they are also commanded to stay there."""
+        """Computes the joint states from those of the actuators; the first time also commands the joints to stay."""
         for info in self._infos:
             actuators = [self.actuators[name] for name in info.actuators]
             joints = [self._states[name] for name in info.joints]
@@ -123,7 +123,7 @@ class RobotTransmissions:
                         handle.command = handle.position
 
     def propagate_commands(self) -> None:
-        """Turn the commands of the joints into those of the actuators; not a number before states were propagated."""
+        """Computes the commands of the actuators from those of the joints; not a number before the first states."""
         for path in self._paths:
             commands = path.convert([joint.command if self._began else math.nan for joint in path.joints])
             for actuator, command in zip(path.actuators, commands, strict=True):

@@ -141,7 +141,7 @@ class MobileBaseController(Controller, ABC):
     # ---- any thread ----
 
     def submit(self, command: Any) -> None:
-        """Take a command, which is in force from the next cycle on until it is too old.
+        """Takes a command, which is in force from the next cycle on until it is too old.
 
         Args:
             command: with a property `finite`; its class depends on the controller.
@@ -156,7 +156,7 @@ class MobileBaseController(Controller, ABC):
         self._latest = command
 
     def drop_command(self) -> None:
-        """Let the command in force be in force no longer: the base comes to rest within its limits."""
+        """Drops the present command: the base comes to rest within its limits."""
         self._latest = None
 
     # ---- control loop ----

@@ -51,7 +51,7 @@ class PlanarOdometry:
         self._time_s = 0.0
 
     def start(self, time_s: float) -> None:
-        """Forget the velocities; the pose stays."""
+        """Clears the velocities; the pose stays."""
         self._linear.clear()
         self._angular.clear()
         self.linear = self.lateral = self.angular = 0.0

@@ -23,14 +23,14 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
 
 def prepare_interpreter() -> None:
-    """Keep other threads and the garbage collector from holding the loop up; call it when everything is set up."""
+    """Keeps other threads and the garbage collector from delaying the loop; to be called when everything is set up."""
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()
 
 
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:
-    """Run this process before ordinary ones, the calling thread before its others (SCHED_FIFO); keep its memory in RAM.
+    """Runs this process before ordinary ones, the calling thread first (SCHED_FIFO), and keeps its memory in RAM.
 
     The other threads get a real-time priority too, because the loop waits while one of them holds Python's interpreter:
     a process that takes the processor from that thread would delay the loop.
@@ -60,7 +60,7 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
 
 
 def keep_processors_awake() -> list[str]:
-    """Keep idle processors from sleep they take time to wake from, as long as this process lives (it costs power).
+    """Keeps idle processors from sleep states that take long to leave, while this process lives (it costs power).
 
     Returns:
         What was not permitted and why; nothing when all was.
@@ -75,7 +75,7 @@ def keep_processors_awake() -> list[str]:
 
 
 def _lock_memory() -> str:
-    """Keep the memory in use, now and later, in RAM; returns why that is not permitted, or ""."""
+    """Keeps the memory in use, now and later, in RAM; returns why that is not permitted, or ""."""
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         return f"at most {limit // 1024} kB may be locked"

@@ -47,11 +47,11 @@ class ControllerActionServer:
         self._server.start()
 
     def close(self) -> None:
-        """Stop serving."""
+        """Stops serving."""
         self._server.stop()
 
     def publish_feedback(self, goal_handle: RealtimeGoalHandle[Any], feedback: Any) -> None:
-        """Send feedback to the client of `goal_handle`; nothing happens when the goal has ended meanwhile."""
+        """Sends feedback to the client of `goal_handle`; nothing happens when the goal has ended meanwhile."""
         goal = self._goals.get(goal_handle)
         if goal is not None:
             goal.publish_feedback(feedback)

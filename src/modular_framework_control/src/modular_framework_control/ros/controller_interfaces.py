@@ -75,7 +75,7 @@ class JointStateRosInterface:
             self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s))
 
     def close(self) -> None:
-        """Close the topic."""
+        """Closes the topic."""
         self._publisher.unregister()
 
 
@@ -105,7 +105,7 @@ class JointTrajectoryRosInterface:
                                                                                     snapshot)
 
     def close(self) -> None:
-        """Close topics, action and service."""
+        """Closes topics, action and service."""
         self._opened.close()
 
     def _submit(self, message: FollowJointTrajectoryGoal, goal_handle: TrajectoryGoalHandle) -> None:
@@ -151,7 +151,7 @@ class GripperRosInterface:
         controller.on_feedback = lambda goal_handle, state: outbox.put_droppable(self._feedback, goal_handle, state)
 
     def close(self) -> None:
-        """Close the action."""
+        """Closes the action."""
         self._action.close()
 
     def _submit(self, message: GripperCommandGoal, goal_handle: GripperGoalHandle) -> None:
@@ -182,7 +182,7 @@ _ROS_INTERFACES: tuple[tuple[type[Controller], Any], ...] = (
 
 def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox,
                loop_time: LoopTime) -> Callable[[], None]:
-    """Open the topics, actions and services of a controller, and dynamic_reconfigure of its gains.
+    """Opens the topics, actions and services of a controller, and dynamic_reconfigure of its gains.
 
     Args:
         controller: an initialised controller; one of a class unknown here gets the latter only.

@@ -52,16 +52,16 @@ class ControllerManagerClient:
         return ControllerManagerClient(self.namespace, timeout_s=0.0)
 
     def load(self, name: str) -> None:
-        """Load a controller."""
+        """Loads a controller."""
         self._ask("load_controller", LoadController, f"controller '{name}' was not loaded", name)
 
     def unload(self, name: str) -> None:
-        """Unload a controller."""
+        """Unloads a controller."""
         self._ask("unload_controller", UnloadController, f"controller '{name}' was not unloaded", name)
 
     def switch(self, start: Sequence[str], stop: Sequence[str],
                strictness: int = SwitchControllerRequest.STRICT) -> None:
-        """Stop and start controllers."""
+        """Stops and starts controllers."""
         self._ask("switch_controller", SwitchController,
                   f"controllers were not switched (start {list(start)}, stop {list(stop)})",
                   list(start), list(stop), strictness, False, 0.0)
@@ -77,7 +77,7 @@ class ControllerManagerClient:
         return types
 
     def reload_libraries(self, force_kill: bool) -> None:
-        """Look again for controller classes."""
+        """Searches again for controller classes."""
         self._ask("reload_controller_libraries", ReloadControllerLibraries, "controller libraries were not reloaded",
                   force_kill)
 

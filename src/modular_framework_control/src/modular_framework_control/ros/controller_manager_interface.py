@@ -22,13 +22,13 @@ def _client_or_default(client: Client) -> ControllerManagerClient:
 
 
 def list_controller_types(client: Client = None) -> None:
-    """Print the known types of controllers, one a line."""
+    """Prints the known types of controllers, one a line."""
     for name in _client_or_default(client).list_controller_types():
         print(name)
 
 
 def list_controllers(client: Client = None) -> None:
-    """Print the loaded controllers, one a line."""
+    """Prints the loaded controllers, one a line."""
     states = _client_or_default(client).list_controllers()
     if not states:
         print("No controllers are loaded in mechanism control")
@@ -38,39 +38,39 @@ def list_controllers(client: Client = None) -> None:
 
 
 def load_controller(name: str, client: Client = None) -> bool:
-    """Load a controller."""
+    """Loads a controller."""
     return _answer(lambda: _client_or_default(client).load(name), f"Loaded '{name}'", f"Error when loading '{name}'")
 
 
 def unload_controller(name: str, client: Client = None) -> bool:
-    """Unload a controller."""
+    """Unloads a controller."""
     return _answer(lambda: _client_or_default(client).unload(name), f"Unloaded '{name}' successfully",
                    f"Error when unloading '{name}'")
 
 
 def start_controller(name: str, client: Client = None) -> bool:
-    """Start a controller."""
+    """Starts a controller."""
     return start_stop_controllers(start_controllers=[name], client=client)
 
 
 def start_controllers(names: Sequence[str], client: Client = None) -> bool:
-    """Start controllers, all of them or none."""
+    """Starts controllers, all of them or none."""
     return start_stop_controllers(start_controllers=names, client=client)
 
 
 def stop_controller(name: str, client: Client = None) -> bool:
-    """Stop a controller."""
+    """Stops a controller."""
     return start_stop_controllers(stop_controllers=[name], client=client)
 
 
 def stop_controllers(names: Sequence[str], client: Client = None) -> bool:
-    """Stop controllers, all of them or none."""
+    """Stops controllers, all of them or none."""
     return start_stop_controllers(stop_controllers=names, client=client)
 
 
 def start_stop_controllers(start_controllers: Sequence[str] = (), stop_controllers: Sequence[str] = (),
                            client: Client = None) -> bool:
-    """Start and stop controllers in one switch, all of them or none."""
+    """Starts and stops controllers in one switch, all of them or none."""
     start, stop = list(start_controllers), list(stop_controllers)
     done = [f"{word} {names} successfully" for word, names in (("Started", start), ("Stopped", stop)) if names]
     return _answer(lambda: _client_or_default(client).switch(start, stop), "\n".join(done),
@@ -78,7 +78,7 @@ def start_stop_controllers(start_controllers: Sequence[str] = (), stop_controlle
 
 
 def reload_libraries(force_kill: bool, restore: bool = False, client: Client = None) -> bool:
-    """Look again for controller classes.
+    """Searches again for controller classes.
 
     Args:
         force_kill: stop and unload the controllers that are loaded, which otherwise prevent it.

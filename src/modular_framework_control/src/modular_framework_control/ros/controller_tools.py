@@ -153,7 +153,7 @@ def _done(action: Callable[[], None], failure: str) -> bool:
 
 
 def _set_parameters(path: Path, namespace: str) -> None:
-    """Make what a file says of its controllers their parameters."""
+    """Makes what a file says of its controllers their parameters."""
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for name, parameters in content.items() if isinstance(content, dict) else ():
         if isinstance(parameters, dict) and parameters:
@@ -161,7 +161,7 @@ def _set_parameters(path: Path, namespace: str) -> None:
 
 
 def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
-    """Stop and unload what was loaded; a manager that has gone meanwhile needs no cleaning."""
+    """Stops and unloads the controllers; if the manager has ended meanwhile, nothing is left to do."""
     if not loaded:
         return
     rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")

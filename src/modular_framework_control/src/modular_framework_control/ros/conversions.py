@@ -62,7 +62,7 @@ def _point(state: Array) -> JointTrajectoryPoint:
 
 
 def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0) -> Any:
-    """Write a snapshot into a JointTrajectoryControllerState or a FollowJointTrajectoryFeedback; returns it."""
+    """Writes a snapshot into a JointTrajectoryControllerState or a FollowJointTrajectoryFeedback; returns it."""
     message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
     message.joint_names = list(joint_names)
     message.desired = _point(snapshot.desired)

@@ -79,7 +79,7 @@ class HardwareReadiness:
             event.set()
 
     def wait(self, timeout_s: float, ended: threading.Event) -> None:
-        """Return when every awaited hardware has said True, or the node is shut down.
+        """Waits until every awaited hardware has published True, or the node is shut down.
 
         Args:
             timeout_s: how long to wait for all of them together [s of real time].
@@ -99,13 +99,13 @@ class HardwareReadiness:
                                             "switched on and connected? (~ready_timeout gives it longer)")
 
     def announce(self) -> None:
-        """Say True, latched, on behalf of the hardware that does not say it itself."""
+        """Publishes True, latched, for the hardware that does not do so itself."""
         for topic in sorted(self._topics.announced):
             self._publishers.append(rospy.Publisher(topic, Bool, queue_size=1, latch=True))
             self._publishers[-1].publish(True)
 
     def close(self) -> None:
-        """Close all topics; may be called twice."""
+        """Closes all topics; may be called twice."""
         while self._subscribers:
             self._subscribers.pop().unregister()
         while self._publishers:

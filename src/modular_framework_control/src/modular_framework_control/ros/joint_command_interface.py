@@ -45,7 +45,7 @@ class JointCommandRosInterface:
             rospy.logwarn_throttle(1.0, f"{self._topic} ignored: {error}")
 
     def close(self) -> None:
-        """Close the topics."""
+        """Closes the topics."""
         self._opened.close()
 
 

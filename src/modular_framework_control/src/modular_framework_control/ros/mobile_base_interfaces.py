@@ -52,7 +52,7 @@ class MobileBaseRosInterface:
             self._opened = opened.pop_all()
 
     def close(self) -> None:
-        """Close the topics."""
+        """Closes the topics."""
         self._opened.close()
 
     def _open(self, opened: contextlib.ExitStack) -> None:
@@ -175,7 +175,7 @@ def velocity_to_msg(stamp_s: float, velocity: BaseVelocity) -> TwistStamped:
 
 
 def fill_steering(message: Any, snapshot: SteeringSnapshot, frame_id: str, ahead_s: float) -> Any:
-    """Write speed of the base and angles of its axles into a FourWheelSteeringStamped; returns it."""
+    """Writes speed of the base and angles of its axles into a FourWheelSteeringStamped; returns it."""
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     message.header.frame_id = frame_id
     data = message.data

@@ -86,7 +86,7 @@ class RobotHwNode:
         self._last_s = 0.0
 
     def connect(self) -> None:
-        """Initialise the hardware.
+        """Initialises the hardware.
 
         Raises:
             ParameterError: the hardware refused its parameters.
@@ -111,7 +111,7 @@ class RobotHwNode:
         return self._manager.manager.fault if self._manager is not None else ""
 
     def close(self) -> None:
-        """Close the hardware; may be called twice."""
+        """Closes the hardware; may be called twice."""
         self._robot_hw.close()
 
     def run(self) -> bool:
@@ -173,7 +173,7 @@ class RobotHwNode:
         return not (self._ended.is_set() or self._failure or rospy.is_shutdown())
 
     def _wait_for_simulated_clock(self) -> None:
-        """Wait until the simulated clock has gone on by a period, or has jumped back."""
+        """Waits until the simulated clock has advanced by a period, or has jumped back."""
         begun_s = rospy.get_time()
         tick = rospy.rostime.get_rostime_cond()
         while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
@@ -183,7 +183,7 @@ class RobotHwNode:
                 tick.wait(0.1)
 
     def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
-        """Stop the controllers, bring the robot to rest, close everything.
+        """Stops the controllers, brings the robot to rest, and closes everything.
 
         The robot comes first: to close is work on the network, which may take long, or fail.
         """
@@ -196,9 +196,8 @@ class RobotHwNode:
         _attempt("closing the report of the loop", self._report.close)
 
     def _bring_to_rest(self) -> None:
-        """Write what the controllers left as commands (velocities and efforts of 0) until nothing moves any more: what
-        brakes, be it the hardware or the limits of its commands, does so cycle by cycle. It goes by real time, as a
-        simulated clock may stand."""
+        """Writes the last commands of the controllers (velocities and efforts of 0) until no joint moves, because
+        hardware and limits brake cycle by cycle. It uses real time, because a simulated clock may be paused."""
         begun_s = due_s = time.monotonic()
         going = self._attempt_last("write")
         while going and time.monotonic() - begun_s < LONGEST_END_S:
@@ -215,7 +214,7 @@ class RobotHwNode:
                         lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s))
 
     def _get_ready(self, manager: RosControllerManager) -> None:
-        """Wait for the hardware and open the services, beside the loop, which the hardware may need to get ready."""
+        """Waits for the hardware and opens the services, beside the loop, which the hardware may need to get ready."""
         try:
             self._readiness.wait(self._ready_timeout_s, self._ended)
             if rospy.is_shutdown() or self._ended.is_set():
@@ -250,7 +249,7 @@ def _attempt(what: str, action: Callable[[], None]) -> bool:
 
 
 def main() -> int:
-    """Run the node; returns its exit code."""
+    """Runs the node; returns its exit code."""
     ended, running = threading.Event(), threading.Event()
 
     def on_signal(number: int, frame: object) -> None:

@@ -76,7 +76,7 @@ class RosControllerManager:
         return detach
 
     def connect(self) -> None:
-        """Advertise the services."""
+        """Advertises the services."""
         self._outbox.start()
         self._log.begin()
         self._statistics = rospy.Publisher(join_names(self._namespace, "controller_manager/statistics"),
@@ -107,7 +107,7 @@ class RosControllerManager:
         return message
 
     def close(self) -> None:
-        """End all goals, close all topics and services; the control loop must have ended. May be called twice."""
+        """Ends all goals, closes all topics and services; the control loop must have ended. May be called twice."""
         while self._services:
             self._services.pop().shutdown("controller manager closed")
         self.manager.stop_all()
@@ -145,7 +145,7 @@ class RosControllerManager:
 
 
 def _done(action: Callable[[], None]) -> bool:
-    """Do it; the services answer with a bare ok, so the reason of a failure goes to the log."""
+    """Calls an operation of the manager; the services only answer `ok`, so the reason of a failure is logged."""
     try:
         action()
     except ControllerError as error:

@@ -45,7 +45,7 @@ class SensorRosInterface:
         controller.on_reading = report
 
     def close(self) -> None:
-        """Close the topics."""
+        """Closes the topics."""
         for publisher in self._publishers.values():
             publisher.unregister()
 

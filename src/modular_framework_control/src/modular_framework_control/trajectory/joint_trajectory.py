@@ -177,7 +177,7 @@ class Track:
 
 def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array,
            continuous: Sequence[bool]) -> Track:
-    """Join a new trajectory to the motion so far: from `state` at `splice_s` to the first point after it, then on.
+    """Joins a new trajectory to the present motion: from `state` at `splice_s` to the first point after it, and on.
 
     When a point lies exactly at `splice_s` and agrees with `state` in position and velocity, the trajectory is followed
     as sent; otherwise a segment of the order of the next point leads over to it.

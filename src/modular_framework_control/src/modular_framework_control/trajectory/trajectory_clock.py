@@ -33,13 +33,13 @@ class TrajectoryClock:
         self.start(0.0)
 
     def start(self, loop_s: float) -> None:
-        """Set it to the loop's time [s]."""
+        """Sets it to the loop's time [s]."""
         self.now_s = self._loop_s = loop_s
         self._lag_s = 0.0
         self.rate = self._allowed()
 
     def advance(self, loop_s: float) -> None:
-        """Go on to the loop's time `loop_s` [s]."""
+        """Goes on to the loop's time `loop_s` [s]."""
         passed_s = loop_s - self._loop_s
         self._loop_s = loop_s
         self.rate = min(self._allowed(), self.rate + RISE_PER_S * passed_s)

@@ -47,12 +47,12 @@ class TrajectoryPlan:
         return stages[0].from_s if stages else None
 
     def hold(self, position: Array, time_s: float) -> None:
-        """Forget everything and rest at `position`, shape (joints,), from `time_s` [s] on."""
+        """Clears the plan and rests at `position`, shape (joints,), from `time_s` [s] on."""
         self._stages = (_Stage(time_s, (Track.hold(self._everything, position, time_s),)),)
         self.end_s = time_s
 
     def follow(self, tracks: Sequence[Track], from_s: float) -> None:
-        """Let the joints of `tracks`, of which no two have a joint in common, follow them from `from_s` [s] on; the
+        """Makes the joints of `tracks`, no two of which share a joint, follow them from `from_s` [s] on; the
         motion until then, and of the others, stays."""
         earlier = tuple(stage for stage in self._stages if stage.from_s < from_s) or self._stages[:1]
         moved = [joint for track in tracks for joint in track.joints]
@@ -62,7 +62,7 @@ class TrajectoryPlan:
         self.end_s = max(track.end_s for track in in_force)
 
     def forget_before(self, time_s: float) -> None:
-        """Drop the stages that are over at `time_s` [s]."""
+        """Drops the stages that are over at `time_s` [s]."""
         stages = self._stages
         if len(stages) > 1 and time_s >= stages[1].from_s:
             self._stages = tuple(stage for i, stage in enumerate(stages)

@@ -92,7 +92,7 @@ class CommandPort:
         return int(self._server.server_address[1]) if self._server is not None else self._wanted[1]
 
     def connect(self) -> None:
-        """Listen.
+        """Listens.
 
         Raises:
             OSError: the port is taken; the text names it.
@@ -117,7 +117,7 @@ class CommandPort:
         threading.Thread(target=self._server.serve_forever, args=(0.05,), name="command_port", daemon=True).start()
 
     def close(self) -> None:
-        """Stop listening. May be called twice."""
+        """Stops listening. May be called twice."""
         server, self._server = self._server, None
         if server is not None:
             server.shutdown()

@@ -80,7 +80,7 @@ class Finger:
         return self.angle - self.model.closed_ticks
 
     def advance(self, duration_s: float) -> None:
-        """Let time [s] pass, in steps that the stiff contacts need."""
+        """Simulates this time [s], in steps that the stiff contacts need."""
         self._left_s += duration_s
         while self._left_s >= STEP_S:
             self._left_s -= STEP_S

@@ -62,11 +62,11 @@ class PacketReader:
         self._buffer = bytearray()
 
     def clear(self) -> None:
-        """Forget what has come so far."""
+        """Discards the bytes received so far."""
         self._buffer.clear()
 
     def feed(self, data: bytes) -> Iterator[Instruction]:
-        """Take bytes; yields the packets that are complete."""
+        """Adds received bytes; yields the complete packets."""
         self._buffer += data
         while True:
             start = self._buffer.find(HEADER)
@@ -129,12 +129,12 @@ class DynamixelServo:
         return from_bytes(self._table[register.address:register.address + register.size])
 
     def set(self, register: Register, value: int) -> None:
-        """Set a register from inside; no rule applies."""
+        """Sets a register from inside; no rule applies."""
         data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
         self._table[register.address:register.address + register.size] = data
 
     def power_cycle(self) -> None:
-        """Power went and came: what is not in the EEPROM is as at first."""
+        """Sets everything that is not in the EEPROM to its initial value, as a loss of power does."""
         eeprom = bytes(self._table[:EEPROM_END])
         self._reset()
         self._table[:EEPROM_END] = eeprom
@@ -148,7 +148,7 @@ class DynamixelServo:
             self.set(mx64.TORQUE_LIMIT, 0)
 
     def handle(self, instruction: Instruction) -> bytes:
-        """Carry out an instruction addressed to this servo or to all; returns the status packet, b"" for none."""
+        """Carries out an instruction addressed to this servo or to all; returns the status packet, b"" for none."""
         if not instruction.intact:
             return self._status(ServoErrors.CHECKSUM)
         answer, errors = self._carry_out(instruction.kind, instruction.parameters)
@@ -179,7 +179,7 @@ class DynamixelServo:
         return b"", ServoErrors.INSTRUCTION
 
     def sync_write(self, parameters: bytes) -> None:
-        """Take this servo's part of a SYNC WRITE."""
+        """Takes this servo's part of a SYNC WRITE."""
         address, size = parameters[0], parameters[1]
         for start in range(2, len(parameters) - size, size + 1):
             if parameters[start] == self.servo_id:
@@ -193,7 +193,7 @@ class DynamixelServo:
         return packet(self.servo_id, int(errors | self.errors), data)
 
     def _write(self, parameters: bytes) -> ServoErrors:
-        """Write bytes, parameters[0] being the address; all or nothing."""
+        """Writes bytes, parameters[0] being the address; all or nothing."""
         address, data = parameters[0], parameters[1:]
         places = range(address, address + len(data))
         if places.stop > TABLE_SIZE or READ_ONLY & set(places):

@@ -62,7 +62,7 @@ class EzGripperEmulatorNode:
 
 
 def main() -> int:
-    """Run the node; returns its exit code."""
+    """Runs the node; returns its exit code."""
     rospy.init_node("ezgripper_emulator")
     try:
         node = EzGripperEmulatorNode()

@@ -175,7 +175,7 @@ class ProgramReceiver:
         self._text = ""
 
     def receive(self, data: bytes) -> None:
-        """Take what has arrived; a program ends with a line `end`, a single command with its line."""
+        """Adds received data; a program ends with a line `end`, a single command with its line."""
         self._text += data.decode("utf-8", errors="replace")
         while "\n" in self._text:
             if not self._text.startswith(("def ", "sec ")):

@@ -50,7 +50,7 @@ class Program(Protocol):
     name: str
 
     def cycle(self) -> bool:
-        """Run for one cycle; False when it has ended."""
+        """Runs for one cycle; False when it has ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +140,7 @@ class UrController:
         return int(powered) | int(self.runtime_state is RuntimeState.PLAYING) << 1
 
     def cycle(self) -> None:
-        """Run program and arm for one cycle."""
+        """Runs program and arm for one cycle."""
         self.time_s += self.period_s
         if self.program is not None and self.runtime_state is RuntimeState.PLAYING and not self.program.cycle():
             self.stop_program()
@@ -153,7 +153,7 @@ class UrController:
             self.on_cycle()
 
     def start_program(self, program: Program) -> bool:
-        """Run a program in place of what runs, whose motion ends; False when the arm is not ready for one."""
+        """Runs a program in place of what runs, whose motion ends; False when the arm is not ready for one."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety_mode is not SafetyMode.NORMAL:
             LOGGER.warning("program %s not started: robot mode %s, safety mode %s", program.name,
                            self.robot_mode.name, self.safety_mode.name)
@@ -164,7 +164,7 @@ class UrController:
         return True
 
     def stop_program(self) -> None:
-        """End the program; the arm comes to rest."""
+        """Ends the program; the arm comes to rest."""
         self.program = None
         self.runtime_state = RuntimeState.STOPPED
         self.motion.set_command(MotionCommand(Drive.STOP, acceleration=PROTECTIVE_STOP_DECELERATION))
@@ -177,14 +177,14 @@ class UrController:
         return True
 
     def play(self) -> bool:
-        """Go on with a paused program; False when none is."""
+        """Resumes a paused program; returns False if none is paused."""
         if self.runtime_state is not RuntimeState.PAUSED:
             return False
         self.runtime_state = RuntimeState.PLAYING
         return True
 
     def protective_stop(self) -> None:
-        """Stop as for a collision; the program ends."""
+        """Stops as for a collision; the program ends."""
         self.stop_program()
         if self.safety_mode is SafetyMode.NORMAL:
             self.safety_mode = SafetyMode.PROTECTIVE_STOP
@@ -210,17 +210,17 @@ class UrController:
             self.safety_mode = SafetyMode.NORMAL
 
     def power_on(self) -> None:
-        """Switch the arm on, with its brakes closed."""
+        """Switches the arm on, with its brakes closed."""
         if self.robot_mode is RobotMode.POWER_OFF and self.safety_mode is not SafetyMode.ROBOT_EMERGENCY_STOP:
             self.robot_mode = RobotMode.IDLE
 
     def power_off(self) -> None:
-        """Switch the arm off."""
+        """Switches the arm off."""
         self.stop_program()
         self.robot_mode = RobotMode.POWER_OFF
 
     def brake_release(self) -> None:
-        """Make the arm ready to move; switches it on if need be."""
+        """Makes the arm ready to move; switches it on if need be."""
         self.power_on()
         if self.robot_mode is RobotMode.IDLE:
             self.robot_mode = RobotMode.RUNNING

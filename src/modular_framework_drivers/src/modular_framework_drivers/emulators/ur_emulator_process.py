@@ -54,12 +54,12 @@ class EmulatedArm:
         return [float(value) for value in self.state()["q"].split(",")]
 
     def kill(self) -> None:
-        """End the process without notice."""
+        """Ends the process without notice."""
         self._process.kill()
         self._process.wait()
 
     def close(self) -> None:
-        """End the process; may be called twice."""
+        """Ends the process; may be called twice."""
         self._process.terminate()
         self._process.wait(10.0)
         if self._process.stdout is not None:

@@ -75,7 +75,7 @@ class Links:
         self._connections: list[_Connection] = []
 
     def connect(self) -> None:
-        """Listen at all ports; nothing happens when that is already so.
+        """Listens at all ports; nothing happens when that is already so.
 
         Raises:
             OSError: a port is taken; the text names it.
@@ -97,7 +97,7 @@ class Links:
             self._selector.register(listener, selectors.EVENT_READ, make_session)
 
     def close(self) -> None:
-        """Close all connections and ports; may be called twice."""
+        """Closes all connections and ports; may be called twice."""
         for connection in list(self._connections):
             self._drop(connection)
         while self._listeners:
@@ -111,7 +111,7 @@ class Links:
         return [key for key, _ in self._selector.select(max(0.0, timeout_s))]
 
     def serve(self, ready: list[selectors.SelectorKey], now_s: float) -> None:
-        """Take in what has arrived."""
+        """Handles received data."""
         if self.faults.frozen:
             return
         for key in ready:
@@ -121,7 +121,7 @@ class Links:
                 self._accept(key, now_s)
 
     def cycle(self, now_s: float) -> None:
-        """Send what each session has for this cycle, and what is due of what waits."""
+        """Sends the data of each session for this cycle, and delayed data that is due."""
         for connection in list(self._connections):
             if connection.session.cycle is not None:
                 package = connection.session.cycle()
@@ -133,7 +133,7 @@ class Links:
             self._flush(connection, now_s)
 
     def send_to_all(self, data: bytes, now_s: float) -> None:
-        """Send bytes on every connection that gets data packages."""
+        """Sends bytes on every connection that gets data packages."""
         for connection in list(self._connections):
             if connection.session.cycle is not None:
                 self._queue(connection, data, now_s)

@@ -82,7 +82,7 @@ class ArmMotion:
         return at_rest
 
     def step(self, dt_s: float, speed_fraction: float) -> None:
-        """Move on by `dt_s` [s]; `speed_fraction` in [0, 1] scales every speed, as the speed slider does."""
+        """Advances by `dt_s` [s]; `speed_fraction` in [0, 1] scales every speed, as the speed slider does."""
         command = self.command
         wanted = self._wanted_velocities(command, dt_s)
         limit = command.acceleration if command.drive in (Drive.SPEED, Drive.MOVE, Drive.STOP) else MAX_ACCELERATION

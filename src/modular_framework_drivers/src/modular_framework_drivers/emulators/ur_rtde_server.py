@@ -151,7 +151,7 @@ class Recipe:
         return self._header + self._codec.pack(*values)
 
     def take(self, payload: bytes) -> None:
-        """Set the variables to the values of a package (without its header and number).
+        """Sets the variables to the values of a package (without its header and number).
 
         Raises:
             RtdeProtocolError: it is of another length.
@@ -235,7 +235,7 @@ class RtdeSession:
         return self._output.package() if self._cycles % self._every == 0 else b""
 
     def close(self) -> None:
-        """Give back the inputs this client set."""
+        """Gives back the inputs this client set."""
         for name in [name for name, owner in self._server.owners.items() if owner is self]:
             del self._server.owners[name]
 

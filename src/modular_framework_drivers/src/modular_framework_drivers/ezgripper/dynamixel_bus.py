@@ -80,7 +80,7 @@ class DynamixelBus:
         self.retries = 0
 
     def open(self) -> None:
-        """Open the port.
+        """Opens the port.
 
         Raises:
             PortLostError: it is not there, not allowed, or taken.
@@ -95,7 +95,7 @@ class DynamixelBus:
         self._port = port
 
     def close(self) -> None:
-        """Close the port. May be called twice."""
+        """Closes the port. May be called twice."""
         port, self._port = self._port, None
         if port is not None:
             port.closePort()
@@ -105,7 +105,7 @@ class DynamixelBus:
         return from_bytes(self.read(servo_id, MODEL_NUMBER)[0])
 
     def read(self, servo_id: int, register: Register) -> tuple[bytes, ServoErrors]:
-        """Read a register.
+        """Reads a register.
 
         Returns:
             Its bytes, and the error bits that came with them.
@@ -116,7 +116,7 @@ class DynamixelBus:
         return self._transact(servo_id, READ, [register.address, register.size], register.size, register.name)
 
     def write(self, servo_id: int, register: Register, value: int) -> ServoErrors:
-        """Write a word to a register.
+        """Writes a word to a register.
 
         Args:
             servo_id: which servo.

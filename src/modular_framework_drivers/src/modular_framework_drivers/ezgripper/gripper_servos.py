@@ -186,7 +186,7 @@ class GripperServos:
             servo.written.clear()
 
     def read(self) -> GripperReading:
-        """Measure.
+        """Measures.
 
         Raises:
             BusError: a servo does not answer.

@@ -141,7 +141,7 @@ def gripper_group(joint: str) -> Group:
 
 
 def main() -> int:
-    """Run the node `ezgripper_grasp_action_server`; returns 1 when its parameters are wrong.
+    """Runs the node `ezgripper_grasp_action_server`; returns 1 when its parameters are wrong.
 
     A gripper that is not there, or has a fault, does not end the node: goals are aborted with the reason until it is
     back.

@@ -169,7 +169,7 @@ def command_line() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the two processes; returns the exit code."""
+    """Runs one of the two processes; returns the exit code."""
     options = command_line().parse_args(arguments)
     signal.signal(signal.SIGINT, signal.SIG_IGN)    # ctrl-c in the terminal is for the control loop, which ends us
     with socket.socket(fileno=options.channel) as channel:
