@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pipelines of move_group on the wire: chosen by name, a planner of the user's own, settings of planners, seeds."""
+"""Pipelines of move_group on the wire: chosen by name, a planner and a collision checker of the user's own,
+settings of planners, seeds.
+"""
 from __future__ import annotations
 
 import re
@@ -9,9 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, PlannerParams
-from moveit_msgs.srv import GetPlannerParams, QueryPlannerInterfaces, SetPlannerParams
-from planning_wire import ARM, GROUP, LAUNCH, OK, FakeArm, add, box, call, plan, report_of, request
+from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, PlannerParams, PositionIKRequest
+from moveit_msgs.srv import (
+    GetPlannerParams,
+    GetPositionIK,
+    GetStateValidity,
+    GetStateValidityRequest,
+    QueryPlannerInterfaces,
+    SetPlannerParams,
+)
+from planning_wire import ARM, GROUP, LAUNCH, OK, FakeArm, add, box, call, plan, report_of, request, tip_pose
 
 ROOT = Path(__file__).resolve().parents[3]
 POSITIONS = (0.2, -1.57, 1.2, -1.2, -1.57, 0.0)
@@ -21,12 +30,23 @@ ADAPTERS = " ".join(f"default_planner_request_adapters/{name}" for name in (
     "AddTimeOptimalParameterization", "FixStartStateBounds", "FixStartStateCollision"))
 PARAMETERS = f"""<launch>
   <env name="PYTHONPATH" value="{{package}}/src:$(env PYTHONPATH)"/>
+  <param name="move_group/collision_detector" value="my_checkers/Named"/>
   <rosparam ns="move_group/planning_pipelines">
     mine: {{{{planning_plugin: my_planners/OneStop}}}}
     chomp: {{{{planning_plugin: chomp_interface/CHOMPPlanner}}}}
     wrong: {{{{planning_plugin: ompl_interface/OMPLPlanner, request_adapters: Nonsense}}}}
     seeded: {{{{planning_plugin: ompl_interface/OMPLPlanner, request_adapters: {ADAPTERS}, seed: 5}}}}
   </rosparam>"""
+
+USED = "the checker of the user is made"
+CHECKER = f"""
+import logging
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+class Named(ExactCollisionChecker):
+    def __init__(self, scene, moving=None, tolerated=()):
+        super().__init__(scene, moving, tolerated)
+        logging.getLogger("rosout").warning("{USED}")
+"""
 
 
 def guide_planner() -> str:
@@ -42,6 +62,7 @@ def session(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFac
     package = tmp_path_factory.mktemp("my_robot_moveit_config")
     (package / "src").mkdir()
     (package / "src/my_planners.py").write_text(guide_planner())
+    (package / "src/my_checkers.py").write_text(CHECKER)
     session = ros_launch(LAUNCH.replace("<launch>", PARAMETERS.format(package=package)))
     session.wait_for_service("plan_kinematic_path", 120.0)
     session.arm = FakeArm()
@@ -58,6 +79,23 @@ def test_the_planner_of_the_guide_plans(session: Any) -> None:
     answer, report = report_of(lambda: plan(request(GOAL, pipeline_id="mine", allowed_planning_time=10.0)))
     assert answer.error_code.val == OK, report["reason"]
     assert motion(answer)[-1][1] == pytest.approx(list(POSITIONS), abs=1e-6)
+
+
+def reaches_tip_pose() -> bool:
+    message = PositionIKRequest(group_name=GROUP, avoid_collisions=True)
+    message.pose_stamped.header.frame_id, message.pose_stamped.pose = "world", tip_pose(POSITIONS)
+    return bool(call("compute_ik", GetPositionIK, message).error_code.val == OK)
+
+
+@pytest.mark.parametrize("ask", [
+    lambda: plan(request(GOAL, allowed_planning_time=10.0)).error_code.val == OK,
+    lambda: plan(request(GOAL, pipeline_id="seeded", allowed_planning_time=20.0)).error_code.val == OK,
+    lambda: call("check_state_validity", GetStateValidity, GetStateValidityRequest()).valid,
+    reaches_tip_pose], ids=["plan", "plan with a seed", "check_state_validity", "compute_ik"])
+def test_the_collision_checker_that_the_parameter_names_is_used(session: Any, ask: Callable[[], bool]) -> None:
+    made = session.log().count(USED)
+    assert ask()
+    assert session.log().count(USED) > made
 
 
 @pytest.mark.parametrize(("changes", "parts"), [
