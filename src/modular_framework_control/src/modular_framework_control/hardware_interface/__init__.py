@@ -1,2 +1,55 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a robot offers to controllers: handles, interfaces, limits, transmissions, and the hardware itself."""
+from modular_framework_control.hardware_interface.handles import (
+    ActuatorHandle,
+    ForceTorqueSensorHandle,
+    ImuSensorHandle,
+    JointHandle,
+    JointStateHandle,
+    PosVelAccJointHandle,
+    PosVelJointHandle,
+    SpeedScalingHandle,
+)
+from modular_framework_control.hardware_interface.interfaces import (
+    EffortJointInterface,
+    ForceTorqueSensorInterface,
+    HardwareInterface,
+    HardwareInterfaceError,
+    ImuSensorInterface,
+    JointStateInterface,
+    PositionJointInterface,
+    PosVelAccJointInterface,
+    PosVelJointInterface,
+    SpeedScalingInterface,
+    VelocityJointInterface,
+)
+from modular_framework_control.hardware_interface.robot_hw import (
+    HardwareFault,
+    RobotHW,
+    SwitchState,
+)
+
+__all__ = [
+    "ActuatorHandle",
+    "EffortJointInterface",
+    "ForceTorqueSensorHandle",
+    "ForceTorqueSensorInterface",
+    "HardwareFault",
+    "HardwareInterface",
+    "HardwareInterfaceError",
+    "ImuSensorHandle",
+    "ImuSensorInterface",
+    "JointHandle",
+    "JointStateHandle",
+    "JointStateInterface",
+    "PosVelAccJointHandle",
+    "PosVelAccJointInterface",
+    "PosVelJointHandle",
+    "PosVelJointInterface",
+    "PositionJointInterface",
+    "RobotHW",
+    "SpeedScalingHandle",
+    "SpeedScalingInterface",
+    "SwitchState",
+    "VelocityJointInterface",
+]
