@@ -41,5 +41,5 @@ def test_a_lost_connection_is_a_fault() -> None:
 
 
 def test_without_joints_it_cannot_be_used() -> None:
-    """The framework is told so, and the log names the parameter."""
+    """``init`` returns False, and the log names the parameter."""
     assert not MyArm().init(MappingNodeHandle({}), MappingNodeHandle({}))
