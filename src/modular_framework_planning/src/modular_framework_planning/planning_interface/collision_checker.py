@@ -19,8 +19,9 @@ class CollisionChecker(Protocol):
 
     Two bodies are checked unless the scene's allowed collision matrix allows them to touch, they hang on the same
     joint, or one is a link that the other, a held object, may touch (`touch_links`). Bodies of the robot keep the
-    scene's padding from the world: nearer than that counts as touching. Pairs whose relative pose the moving joints
-    cannot change are left out of all answers, unless a method says otherwise.
+    scene's padding from the world: nearer than that counts as touching. A body wholly inside a closed one, whose
+    surfaces do not touch, may count as touching at single states; the shipped checker does so. Pairs whose relative
+    pose the moving joints cannot change are left out of all answers, unless a method says otherwise.
 
     Positions are those of the whole robot, in the order of `model.joint_names`, mimic joints included [rad or m].
     `path_is_free` is called some thousand times a plan; the other methods rarely.
