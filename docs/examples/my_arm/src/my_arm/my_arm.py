@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 
-from modular_framework_control.hardware_interface.interfaces import (
+from modular_framework_control.hardware_interface import (
     JointHandle,
     JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
+    RobotHW,
 )
 from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard
-from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, read_names
 
 LOGGER = logging.getLogger("rosout.my_arm")  # below "rosout", so that it reaches ROS's log
