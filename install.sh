@@ -15,7 +15,7 @@ usage: ./install.sh [COMMAND]
 
   (none)               set the framework up: Debian packages, Python environment, build
   run [ARG:=VALUE..]   set up, then run the simulated pick; arguments are those of start_framework.launch
-  test [SUITE]         set up, then run the tests: lint, unit, rostest, system or all (the default)
+  test [SUITE]         set up, then run the tests: lint, unit, rostest, system, all (the default) or one suite of them
   shell                set up, then open a shell with everything sourced
   exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
   packages             only install the Debian packages and the Python environment

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlparse
 
 import rosgraph
 
@@ -36,6 +37,16 @@ def until(condition: Callable[[], Any], what: str, timeout_s: float = 30.0) -> N
         if time.monotonic() > end:
             raise AssertionError(f"not within {timeout_s:g} s: {what}")
         time.sleep(0.01)
+
+
+def processes_with(variable: str, value: str) -> list[int]:
+    """Answers the other processes that were started with a variable of the environment at a value."""
+    mark, found = f"{variable}={value}".encode(), []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):  # ended meanwhile, or another user's
+            if mark in (folder / "environ").read_bytes().split(b"\0") and int(folder.name) != os.getpid():
+                found.append(int(folder.name))
+    return found
 
 
 class Launch:
@@ -79,20 +90,20 @@ def _launch_arguments(args: Mapping[str, object]) -> list[str]:
 
 
 class RosSession:
-    """A private master; `launch` starts launch files on it.
+    """A master and the launches on it: the master that rostest brought, or one of the session's own.
 
     Attributes:
         port: TCP port of the master.
         env: environment for processes that belong to this session.
     """
 
-    def __init__(self, port: int | None = None) -> None:
-        self.port = port or free_port()
+    def __init__(self, master_uri: str | None = None) -> None:
+        self.port = (urlparse(master_uri).port if master_uri else None) or free_port()
         self._folder = tempfile.TemporaryDirectory(prefix="ros_session_")
         self.folder = Path(self._folder.name)
         self.env = {
             **os.environ,
-            "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}",
+            "ROS_MASTER_URI": master_uri or f"http://127.0.0.1:{self.port}",
             "ROS_IP": "127.0.0.1",
             "ROS_HOME": str(self.folder / "ros_home"),
             "ROS_LOG_DIR": str(self.folder / "log"),
@@ -168,13 +179,7 @@ class RosSession:
 
     def processes(self) -> list[int]:
         """The processes that run with this session's environment, whoever started them."""
-        mark = f"ROS_HOME={self.env['ROS_HOME']}".encode()
-        found = []
-        for folder in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):  # ended meanwhile, or another user's
-                if mark in (folder / "environ").read_bytes().split(b"\0") and int(folder.name) != os.getpid():
-                    found.append(int(folder.name))
-        return found
+        return processes_with("ROS_HOME", self.env["ROS_HOME"])
 
     def _master_answers(self) -> bool:
         return rosgraph.is_master_online(self.env["ROS_MASTER_URI"])

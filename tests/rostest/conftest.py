@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fixtures of the tests that need a ROS master: one master and one test node a module."""
+"""Fixtures of the suites of rostest: the master that it brought, and this process as the test node."""
 from __future__ import annotations
 
 import os
@@ -13,27 +13,24 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from ros_session import RosSession  # noqa: E402
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def ros_session() -> Iterator[RosSession]:
-    """A private master; this process is a node on it (rospy can be a node once a process: one module a process)."""
+    """The master of rostest; this process is a node on it (rospy can be a node once a process)."""
     import rospy
 
-    session = RosSession()
-    os.environ.update(
-        {name: session.env[name] for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME", "ROS_LOG_DIR")}
-    )
+    session = RosSession(os.environ["ROS_MASTER_URI"])
+    os.environ.update({name: session.env[name] for name in ("ROS_IP", "ROS_HOME", "ROS_LOG_DIR")})
     try:
-        session.start_master()
         rospy.init_node("test", anonymous=True, disable_signals=True)
         yield session
     finally:
-        rospy.signal_shutdown("end of the test module")
+        rospy.signal_shutdown("end of the suite")
         session.stop()
 
 
 @pytest.fixture(scope="module")
 def ros_launch(ros_session: RosSession) -> Callable[..., RosSession]:
-    """Starts launch files (a path, or the text of one) on the module's master; answers the session."""
+    """Starts launch files (a path, or the text of one) on the suite's master; answers the session."""
 
     def launch(launch_xml: str | Path, **args: object) -> RosSession:
         ros_session.launch(launch_xml, **args)

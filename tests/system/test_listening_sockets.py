@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlparse
 
 import rosgraph
-from ros_session import until
+import rospy
+from ros_session import RosSession, until
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 LISTENING = "0A"  # state of a socket in /proc/net/tcp
 LOOPBACK = ("7F", "00000000000000000000000001000000")  # 127.*, ::1, as /proc writes them (bytes swapped)
 CPP_NODES = {"/rosout", "/robot_state_publisher"}
@@ -49,9 +48,12 @@ def open_ports(pid: int) -> set[int]:
     return ports
 
 
-def test_only_the_xml_rpc_ports_of_cpp_nodes_are_open(ros_session: Any, ros_launch: Callable[..., Any]) -> None:
-    ros_launch(LAUNCH)
-    master = rosgraph.Master("/test_sockets", master_uri=ros_session.env["ROS_MASTER_URI"])
+def test_only_the_xml_rpc_ports_of_cpp_nodes_are_open(session: RosSession) -> None:
+    os.environ.update({name: session.env[name] for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME", "ROS_LOG_DIR")})
+    session.start_master()
+    session.launch(LAUNCH)
+    rospy.init_node("test", disable_signals=True)
+    master = rosgraph.Master("/test_sockets", master_uri=session.env["ROS_MASTER_URI"])
     wanted = CPP_NODES | {"/joint_state_publisher"}
 
     def publishing() -> set[str]:
@@ -62,7 +64,7 @@ def test_only_the_xml_rpc_ports_of_cpp_nodes_are_open(ros_session: Any, ros_laun
     assert {uri.hostname for uri in uris.values()} == {"127.0.0.1"}
     for node, uri in uris.items():
         assert open_ports(owner_of(uri.port)) == ({uri.port} if node in CPP_NODES else set()), node
-    assert open_ports(owner_of(ros_session.port)) == set(), "the master"
+    assert open_ports(owner_of(session.port)) == set(), "the master"
     assert open_ports(os.getpid()) == set(), "this node"
 
 
