@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -18,7 +17,7 @@ from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
-from modular_framework_drivers.ezgripper.grip import Goal, Grip, GripRules, Motion
+from modular_framework_drivers.ezgripper.grip import Motion
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
@@ -354,66 +353,63 @@ def test_a_warm_motor_is_reported_before_it_gives_up(line: DynamixelLine, grippe
     assert gripper.state().fault == ""
 
 
-class SlowGrip(Grip):
-    """Takes as long to take a goal as its thread is put aside."""
-
-    def __init__(self) -> None:
-        super().__init__(GripRules(), Goal(0, 0.0, 400))
-        self.begun, self.go_on = threading.Event(), threading.Event()
-
-    def retarget(self, goal: Goal, position: float, time_s: float) -> None:
-        self.begun.set()
-        assert self.go_on.wait(10.0)
-        super().retarget(goal, position, time_s)
-
-
 @pytest.fixture
-def idle() -> EzGripper:
-    """A gripper without a fault whose thread does not run."""
-    gripper = EzGripper(GripperSettings("/nowhere"))
-    gripper._publish(gripper.state().reading, time.monotonic(), "")
-    return gripper
+def slow(make_gripper: MakeGripper) -> tuple[DynamixelLine, EzGripper]:
+    """A gripper at 1.7 rad whose thread can be kept waiting for an answer for long without a fault."""
+    line, gripper = make_gripper(link_timeout_s=3.0)
+    gripper.start()
+    until(lambda: gripper.state().ready, 10.0)
+    return line, gripper
 
 
-def test_a_control_loop_need_not_wait_for_the_thread_of_the_gripper(idle: EzGripper) -> None:
-    grip = idle._grip = SlowGrip()
-    idle.command(1.0, 300)
+def keep_waiting(gripper: EzGripper) -> None:
+    """Waits until the gripper's thread is amid a cycle that has no answer, and no fault yet."""
+    until(lambda: time.monotonic() - gripper.state().stamp_s > 0.3)
+    assert gripper.state().fault == ""
+
+
+def test_a_control_loop_need_not_wait_for_the_thread_of_the_gripper(slow: tuple[DynamixelLine, EzGripper]) -> None:
+    line, gripper = slow
+    gripper.command(1.0, 300)
+    line.delay(1.0)
+    keep_waiting(gripper)
     with ThreadPoolExecutor() as threads:
-        taking = threads.submit(idle._handle_request, 0.0, 0.0)
-        assert grip.begun.wait(10.0)
-        try:
-            number = threads.submit(idle.command, 1.1, 300).result(1.0)
-            threads.submit(idle.stop).result(1.0)
-            threads.submit(idle.command, 1.1, 300).result(1.0)
-        finally:
-            grip.go_on.set()
-        taking.result(10.0)
-    assert grip.goal.position == 1.0
-    idle._handle_request(0.0, 0.1)
-    assert grip.goal.position == 1.1 and grip.goal.number > number
+        before = threads.submit(gripper.command, 1.1, 300).result(0.5)
+        threads.submit(gripper.stop).result(0.5)
+        number = threads.submit(gripper.command, 1.1, 300).result(0.5)
+    line.clear()
+    assert number > before
+    until(lambda: gripper.state().goal.number == number)
+    assert gripper.state().goal.position == 1.1
+    until(lambda: gripper.state().motion is Motion.REACHED)
+    assert gripper.state().reading.position == pytest.approx(1.1, abs=TOLERANCE)
 
 
-def test_the_same_goal_in_every_cycle_begins_nothing_anew(idle: EzGripper) -> None:
-    grip = idle._grip
-    for cycle in range(20):
-        number = idle.command(1.0, 300)
-        idle._handle_request(1.0, 0.1 * cycle)
-        grip.update(1.0, 0.1 * cycle)
-        assert grip.goal.number == number
-    assert grip.motion is Motion.REACHED
+def test_the_same_goal_in_every_cycle_begins_nothing_anew(gripper: EzGripper) -> None:
+    arrive(gripper, 1.0, 300)
+    for _ in range(20):
+        number = gripper.command(1.0, 300)
+        until(lambda number=number: gripper.state().goal.number == number)
+        assert gripper.state().motion is Motion.REACHED
 
 
-def test_a_goal_from_before_a_fault_is_void(idle: EzGripper) -> None:
-    idle.command(1.0, 300)
-    idle._report("the cable is out")
-    idle.command(1.1, 300)
-    idle._publish(idle.state().reading, time.monotonic(), "")
-    idle._handle_request(0.0, 0.0)
-    assert idle._grip.goal.position == 0.0
-    assert (idle.state().fault, idle.state().faults, idle.state().last_fault) == ("", 1, "EzGripper: the cable is out")
-    idle.command(1.2, 300)
-    idle._handle_request(0.0, 0.0)
-    assert idle._grip.goal.position == 1.2
+def test_a_goal_from_before_a_fault_is_void(slow: tuple[DynamixelLine, EzGripper]) -> None:
+    line, gripper = slow
+    before = gripper.state()
+    line.lose(1)
+    keep_waiting(gripper)
+    gripper.command(1.0, 300)
+    until(lambda: "does not answer" in gripper.state().fault, 10.0)
+    assert gripper.state().faults > before.faults
+    gripper.command(1.1, 300)
+    line.clear()
+    until(lambda: not gripper.state().fault, 10.0)
+    assert "does not answer" in gripper.state().last_fault
+    time.sleep(0.3)
+    assert gripper.state().goal.position == pytest.approx(1.7, abs=TOLERANCE)
+    assert gripper.state().reading.position == pytest.approx(1.7, abs=TOLERANCE)
+    assert arrive(gripper, 1.2, 300).motion is Motion.REACHED
+    assert gripper.state().reading.position == pytest.approx(1.2, abs=TOLERANCE)
 
 
 def test_a_gripper_that_comes_late_is_used(make_gripper: MakeGripper) -> None:
