@@ -13,8 +13,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlparse
+from xmlrpc.client import ServerProxy
 
 import rosgraph
+import rospkg
 
 STOP_TIMEOUT_S = 15.0
 
@@ -112,6 +114,7 @@ class RosSession:
         self.env.pop("ROS_HOSTNAME", None)
         self._launches: list[Launch] = []
         self._master: Launch | None = None
+        self._suite_logs = Path(rospkg.get_log_dir()) if master_uri else None
 
     def start_master(self, timeout_s: float = 20.0) -> None:
         """Starts roscore on the session's port.
@@ -160,9 +163,21 @@ class RosSession:
         """Whether every launch of this session still runs."""
         return all(launch.alive() for launch in self._launches)
 
+    def answers(self, node: str) -> bool:
+        """Whether a node answers at its own interface, whoever started it."""
+        with contextlib.suppress(rosgraph.MasterException, OSError):
+            uri = rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"]).lookupNode(node)
+            return bool(ServerProxy(uri).getPid("/test_session")[0] == 1)
+        return False
+
     def log(self) -> str:
-        """What all launches have printed so far."""
-        return "".join(launch.log() for launch in self._launches)
+        """What all launches have printed so far, and what the nodes of the suite's .test file have logged."""
+        logs = self._suite_logs / self._run_id() if self._suite_logs else self.folder / "none"
+        return "".join(launch.log() for launch in self._launches) + "".join(
+            path.read_text(errors="replace") for path in sorted(logs.glob("*.log")))
+
+    def _run_id(self) -> str:
+        return str(rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"]).getParam("/run_id"))
 
     def stop(self) -> None:
         """Stops launches, then the master, then whatever of them is left. May be called twice."""

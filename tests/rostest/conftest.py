@@ -30,7 +30,10 @@ def ros_session() -> Iterator[RosSession]:
 
 @pytest.fixture(scope="module")
 def ros_launch(ros_session: RosSession) -> Callable[..., RosSession]:
-    """Starts launch files (a path, or the text of one) on the suite's master; answers the session."""
+    """Starts launch files on the suite's master; answers the session.
+
+    For nodes that a .test file cannot start: with files that the test writes, with settings of its own, or to be ended.
+    """
 
     def launch(launch_xml: str | Path, **args: object) -> RosSession:
         ros_session.launch(launch_xml, **args)

@@ -11,25 +11,47 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 from ros_session import Launch, RosSession
+from roslaunch.config import load_config_default
+from roslaunch.rlutil import resolve_launch_arguments
 
 TASK_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 60.0
-NODES = (
+HEADLESS = {"gui": "false", "rviz": "false"}
+REQUIRED = (
     "gazebo",
+    "custom_controller_spawner",
     "robot_state_publisher",
     "move_group",
     "managers",
     "sensors_tf2_broadcaster",
     "launch_grasp_action_server",
-    "moveit_grasp_action_server",
     "top_down_grasp_generator",
     "task",
-    "rosout",
 )
+KILLED = ("move_group", "moveit_grasp_action_server", "rosout")
+"""A node that the launch file requires, one that another node starts, and the one that comes with the master."""
+
+
+@pytest.fixture(scope="module")
+def nodes() -> dict[str, bool]:
+    """The nodes of the launch, and whether it ends with each."""
+    path, = resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])
+    arguments = [f"{name}:={value}" for name, value in HEADLESS.items()]
+    config = load_config_default([(path, arguments)], None, verbose=False)
+    return {node.name: node.required for node in config.nodes}
+
+
+@pytest.mark.parametrize("node", REQUIRED)
+def test_the_launch_file_requires_the_node(nodes: dict[str, bool], node: str) -> None:
+    assert nodes[node]
+
+
+def test_there_are_no_other_nodes(nodes: dict[str, bool]) -> None:
+    assert set(nodes) == set(REQUIRED)
 
 
 def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosSession) -> None:
-    launch = session.run_framework(gui="false", rviz="false", world_file="ur5_table.world")
+    launch = session.run_framework(**HEADLESS, world_file="ur5_table.world")
     _wait_for_text(launch, "first state running", 120.0)
     subprocess.run(
         ["roslaunch", "modular_framework_api", "manage_object.launch", "object_type:=cube", "object_name:=far_cube",
@@ -51,9 +73,9 @@ def test_the_pick_benchmark_says_why_a_launch_died(session: RosSession) -> None:
     assert "0 of 1 episodes succeeded" in run.stdout
 
 
-@pytest.mark.parametrize("node", NODES)
+@pytest.mark.parametrize("node", KILLED)
 def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str) -> None:
-    launch = session.run_framework(gui="false", rviz="false")
+    launch = session.run_framework(**HEADLESS)
     _wait_for_text(launch, "first state running", 120.0)
     pid = _pid_of(session, node)
     subprocess.run(["kill", "-KILL", str(pid)], check=True)
@@ -64,7 +86,7 @@ def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str
 
 
 def test_manipulator_node_ends_with_the_spawner_that_started_it(session: RosSession) -> None:
-    launch = session.run_framework(gui="false", rviz="false")
+    launch = session.run_framework(**HEADLESS)
     _wait_for_text(launch, "first state running", 120.0)
     server, spawner = (_pid_of(session, node) for node in ("moveit_grasp_action_server", "launch_grasp_action_server"))
     subprocess.run(["kill", "-KILL", str(spawner)], check=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -17,26 +16,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-LAUNCH = """
-<launch>
-  <rosparam>
-    robot_hardware: [by_velocity, by_effort]
-    by_velocity: {type: modular_framework_control/MockRobotHW, joints: [rail, slide],
-                  command_interface: VelocityJointInterface}
-    by_effort: {type: modular_framework_control/MockRobotHW, joints: [finger, a, b],
-                command_interface: EffortJointInterface}
-    states: {type: joint_state_controller/JointStateController, publish_rate: 1000}
-    push: {type: velocity_controllers/JointPositionController, joint: slide,
-           pid: {p: 5.0, i: 1.0, i_clamp: 0.5}}
-    lift: {type: velocity_controllers/JointTrajectoryController, joints: [rail],
-           gains: {rail: {p: 5.0, i_clamp_min: -2.0, antiwindup: true}}}
-    grip: {type: effort_controllers/GripperActionController, joint: finger, gains: {finger: {p: 10.0}}}
-    pair: {type: effort_controllers/JointGroupPositionController, joints: [a, b],
-           a: {pid: {p: 10.0}}, b: {pid: {p: 20.0, d: 1.0}}}
-  </rosparam>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true"/>
-</launch>
-"""
 CONTROLLERS = ["states", "push", "lift", "grip", "pair"]
 
 
@@ -51,12 +30,11 @@ def gains_of(client: Client) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def robot(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
+def robot(ros_session: Any) -> Any:
     for name in CONTROLLERS:
         assert call("load_controller", LoadController, name).ok, name
     assert call("switch_controller", SwitchController, CONTROLLERS, [], 2, False, 0.0).ok
-    return session
+    return ros_session
 
 
 @pytest.mark.parametrize(("server", "gains"), [

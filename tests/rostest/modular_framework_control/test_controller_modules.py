@@ -2,7 +2,6 @@
 """The Python modules that graphical tools and user scripts import to find and to switch controllers."""
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,26 +11,11 @@ from controller_manager_msgs import utils
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 from controller_manager_msgs.srv import ListControllers, LoadController
 
-LAUNCH = """
-<launch>
-  <rosparam>
-    states: {type: joint_state_controller/JointStateController}
-    arm: {type: position_controllers/JointTrajectoryController, joints: [wrist, shoulder]}
-    jog: {type: position_controllers/JointPositionController, joint: shoulder}
-    not_one: {type: {name: other}}
-    deeper: {jog: {type: position_controllers/JointPositionController, joint: shoulder}}
-  </rosparam>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>{joints: [shoulder, elbow, wrist]}</rosparam>
-  </node>
-</launch>
-"""
 POSITION = "hardware_interface::PositionJointInterface"
 
 
 @pytest.fixture(scope="module")
-def manager(ros_launch: Callable[..., Any]) -> str:
-    ros_launch(LAUNCH)
+def manager(ros_session: Any) -> str:
     rospy.wait_for_service("/controller_manager/list_controllers", 60.0)
     return "/controller_manager"
 

@@ -17,24 +17,10 @@ from controller_manager_msgs.srv import ListControllers
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
-LAUNCH = """
-<launch>
-  <rosparam>
-    states: {type: joint_state_controller/JointStateController}
-    arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder]}
-    jog: {type: position_controllers/JointPositionController, joint: shoulder}
-    controller_groups: {follow: [states, arm], teach: [states, jog], clash: [jog, arm]}
-  </rosparam>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>{joints: [shoulder, elbow]}</rosparam>
-  </node>
-</launch>
-"""
-
 
 @pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any]) -> Any:
-    return ros_launch(LAUNCH)
+def session(ros_session: Any) -> Any:
+    return ros_session
 
 
 @pytest.fixture(scope="module")

@@ -33,27 +33,6 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 JOINTS = ["shoulder", "elbow"]
-LAUNCH = """
-<launch>
-  <rosparam>
-    joint_limits:
-      # its soft limits let the elbow move at about 1 rad/s, so that it falls behind
-      elbow: {has_soft_limits: true, soft_lower_limit: -20.0, soft_upper_limit: 20.0, k_position: 0.05, k_velocity: 0.0}
-      finger: {has_position_limits: true, min_position: 0.0, max_position: 0.5,
-               has_velocity_limits: true, max_velocity: 2.0}
-    joint_state_controller: {type: joint_state_controller/JointStateController, publish_rate: 50}
-    arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder, elbow],
-          stop_trajectory_duration: 0.1,
-          constraints: {goal_time: 0.3, elbow: {trajectory: 0.2, goal: 0.01}, shoulder: {goal: 0.01}}}
-    rival: {type: position_controllers/JointTrajectoryController, joints: [elbow]}
-    gripper: {type: position_controllers/GripperActionController, joint: finger, stall_timeout: 0.3}
-    broken: {type: nowhere/NoController}
-  </rosparam>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>{joints: [shoulder, elbow, finger], rate: 125}</rosparam>
-  </node>
-</launch>
-"""
 
 
 def call(name: str, kind: Any, *arguments: Any) -> Any:
@@ -70,12 +49,11 @@ def switch(start: list[str], stop: list[str], strictness: int = 2) -> bool:
 
 
 @pytest.fixture(scope="module")
-def robot(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
+def robot(ros_session: Any) -> Any:
     for name in ("joint_state_controller", "arm", "gripper"):
         assert call("load_controller", LoadController, name).ok
     assert switch(["joint_state_controller", "arm", "gripper"], [])
-    return session
+    return ros_session
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import math
 import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import pytest
 import rosgraph
@@ -24,40 +23,6 @@ from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 from ros_session import until
 from tf2_msgs.msg import TFMessage
-
-URDF = """<robot name="cart"><link name="base"/>
-  <link name="l"><collision><geometry><cylinder radius="0.1" length="0.05"/></geometry></collision></link>
-  <link name="r"/>
-  <joint name="left" type="continuous"><parent link="base"/><child link="l"/><origin xyz="0 0.25 0"/></joint>
-  <joint name="right" type="continuous"><parent link="base"/><child link="r"/><origin xyz="0 -0.25 0"/></joint>
-</robot>"""
-LAUNCH = f"""
-<launch>
-  <param name="robot_description" value={quoteattr(URDF)}/>
-  <rosparam>
-    drive:
-      type: diff_drive_controller/DiffDriveController
-      left_wheel: left
-      right_wheel: [right]
-      base_frame_id: base
-      odom_frame_id: map_of_wheels
-      pose_covariance_diagonal: [0.001, 0.002, 3.0, 4.0, 5.0, 0.06]
-      twist_covariance_diagonal: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
-      cmd_vel_timeout: 600.0
-      publish_cmd: true
-      publish_wheel_joint_controller_state: true
-      allow_multiple_cmd_vel_publishers: false
-      linear: {{x: {{has_velocity_limits: true, max_velocity: 0.5}}}}
-    broken: {{type: diff_drive_controller/DiffDriveController, left_wheel: left, right_wheel: right}}
-  </rosparam>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>
-      joints: [left, right]
-      command_interface: VelocityJointInterface
-    </rosparam>
-  </node>
-</launch>
-"""
 
 
 def call(name: str, kind: Any, *arguments: Any) -> Any:
@@ -84,11 +49,10 @@ class Heard:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def robot(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
+def robot(ros_session: Any) -> Any:
     assert call("load_controller", LoadController, "drive").ok
     assert call("switch_controller", SwitchController, ["drive"], [], 2, False, 0.0).ok
-    return session
+    return ros_session
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import actionlib
@@ -18,38 +17,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-LAUNCH = """
-<launch>
-  <param name="robot_description" value="&lt;robot name='nobody'/&gt;"/>
-  <group ns="left">
-    <rosparam>
-      robot_hardware: [arm_hw]
-      arm_hw: {type: modular_framework_control/MockRobotHW, joints: [left_joint], topic_to_wait_for: arm_ready}
-      joint_limits: {left_joint: {has_position_limits: true, min_position: -1.0, max_position: 0.1}}
-      states: {type: joint_state_controller/JointStateController, publish_rate: 50}
-      arm: {type: position_controllers/JointTrajectoryController, joints: [left_joint],
-            constraints: {goal_time: 10.0}}
-    </rosparam>
-    <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen"/>
-  </group>
-  <group ns="right">
-    <rosparam>
-      states: {type: joint_state_controller/JointStateController, publish_rate: 50}
-      arm: {type: position_controllers/JointTrajectoryController, joints: [right_joint],
-            constraints: {goal_time: 10.0}}
-    </rosparam>
-    <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen">
-      <rosparam>{joints: [right_joint]}</rosparam>
-    </node>
-  </group>
-</launch>
-"""
 ROBOTS = ["left", "right"]
 
 
 @pytest.fixture(scope="module")
-def robots(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
+def robots(ros_session: Any) -> Any:
     for robot in ROBOTS:
         manager = f"/{robot}/controller_manager"
         rospy.wait_for_service(f"{manager}/switch_controller", 60.0)
@@ -57,7 +29,7 @@ def robots(ros_launch: Callable[..., Any]) -> Any:
             assert rospy.ServiceProxy(f"{manager}/load_controller", LoadController)(name).ok
         switch = rospy.ServiceProxy(f"{manager}/switch_controller", SwitchController)
         assert switch(["states", "arm"], [], 2, False, 0.0).ok
-    return session
+    return ros_session
 
 
 def test_each_serves_its_own_namespace_and_none_the_root(robots: Any) -> None:

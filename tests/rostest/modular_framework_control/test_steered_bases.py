@@ -16,40 +16,6 @@ from ros_session import until
 from tf2_msgs.msg import TFMessage
 
 WHEELS = ["front_left", "front_right", "rear_left", "rear_right"]
-LAUNCH = """
-<launch>
-  <rosparam>
-    robot_hardware: [wheels, steering]
-    wheels: {type: modular_framework_control/MockRobotHW, command_interface: VelocityJointInterface,
-             joints: [rear_wheel_joint, front_left, front_right, rear_left, rear_right]}
-    steering: {type: modular_framework_control/MockRobotHW,
-               joints: [front_steer_joint, s_front_left, s_front_right, s_rear_left, s_rear_right]}
-    car:
-      type: ackermann_steering_controller/AckermannSteeringController
-      wheel_separation_h: 0.4
-      wheel_radius: 0.1
-      base_frame_id: car
-      pose_covariance_diagonal: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
-      twist_covariance_diagonal: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
-      cmd_vel_timeout: 600.0
-    rover:
-      type: four_wheel_steering_controller/FourWheelSteeringController
-      front_wheel: [front_left, front_right]
-      rear_wheel: [rear_left, rear_right]
-      front_steering: [s_front_left, s_front_right]
-      rear_steering: [s_rear_left, s_rear_right]
-      track: 1.2
-      wheel_base: 1.9
-      wheel_radius: 0.28
-      wheel_steering_y_offset: 0.1
-      base_frame_id: rover
-      pose_covariance_diagonal: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
-      twist_covariance_diagonal: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
-      cmd_vel_timeout: 600.0
-  </rosparam>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true"/>
-</launch>
-"""
 
 
 def call(name: str, kind: Any, *arguments: Any) -> Any:
@@ -58,12 +24,11 @@ def call(name: str, kind: Any, *arguments: Any) -> Any:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def robot(ros_launch: Callable[..., Any]) -> Any:
-    session = ros_launch(LAUNCH)
+def robot(ros_session: Any) -> Any:
     for name in ("car", "rover"):
         assert call("load_controller", LoadController, name).ok, name
     assert call("switch_controller", SwitchController, ["car", "rover"], [], 2, False, 0.0).ok
-    return session
+    return ros_session
 
 
 def publisher(topic: str, kind: Any) -> rospy.Publisher:

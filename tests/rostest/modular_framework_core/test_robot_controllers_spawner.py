@@ -15,13 +15,6 @@ from controller_manager_msgs.srv import ListControllers, LoadController, SwitchC
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-HARDWARE = """
-<launch>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>{joints: [shoulder, elbow], rate: 125}</rosparam>
-  </node>
-</launch>
-"""
 CONTROLLERS = """
 joint_state_controller: {type: joint_state_controller/JointStateController, publish_rate: 50}
 arm: {type: position_controllers/JointTrajectoryController, joints: [shoulder, elbow]}
@@ -45,9 +38,8 @@ def robot_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def spawn(ros_launch: Callable[..., Any], robot_package: Path) -> Iterator[Callable[..., Any]]:
-    session = ros_launch(HARDWARE)
-    env = {**session.env, "ROS_PACKAGE_PATH": f"{robot_package.parent}:{os.environ['ROS_PACKAGE_PATH']}"}
+def spawn(ros_session: Any, robot_package: Path) -> Iterator[Callable[..., Any]]:
+    env = {**ros_session.env, "ROS_PACKAGE_PATH": f"{robot_package.parent}:{os.environ['ROS_PACKAGE_PATH']}"}
     started: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str) -> subprocess.Popen[str]:

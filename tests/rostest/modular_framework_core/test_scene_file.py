@@ -12,8 +12,6 @@ from moveit_msgs.srv import GetPlanningScene
 from shape_msgs.msg import SolidPrimitive
 
 SCENE = Path(__file__).parents[3] / "src" / "modular_framework_description" / "scenes" / "ur5_setup.scene"
-LAUNCH = """<launch><include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
-  <arg name="load_robot_description" value="true"/></include></launch>"""
 
 
 def publish(session, *arguments: object, node: str = "moveit_publish_scene_from_text") -> tuple[int, str]:
@@ -23,10 +21,9 @@ def publish(session, *arguments: object, node: str = "moveit_publish_scene_from_
 
 
 @pytest.fixture(scope="module")
-def session(ros_launch):
-    started = ros_launch(LAUNCH)
-    started.wait_for_service("/apply_planning_scene", 150)
-    return started
+def session(ros_session):
+    ros_session.wait_for_service("/apply_planning_scene", 150)
+    return ros_session
 
 
 def test_the_planning_scene_has_the_objects_of_the_file(session) -> None:

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A move_group node with a robot that follows trajectories, for the tests of its endpoints.
+"""The move_group node of the suite's .test file with a robot that follows trajectories, for the tests of its endpoints.
 
-A module says what it needs by a mark: `pytest.mark.move_group(service=..., launch=..., gripper=...)`, all optional.
+A module says what it needs by a mark: `pytest.mark.move_group(service=..., gripper=...)`, both optional. Modules of one
+suite share node and robot.
 """
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from planning_wire import ARM, GRIPPER, LAUNCH, START, FakeArm, call, tip_pose  # noqa: E402
+from planning_wire import ARM, GRIPPER, START, FakeArm, call, tip_pose  # noqa: E402
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,17 +25,15 @@ class Needs:
 
     Attributes:
         service: the one that is there when the node is ready.
-        launch: text of the launch file.
         gripper: whether the robot's gripper has a controller.
     """
 
     service: str = "plan_kinematic_path"
-    launch: str = LAUNCH
     gripper: bool = False
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "move_group(service, launch, gripper): what the module's node and robot are")
+    config.addinivalue_line("markers", "move_group(service, gripper): what the module needs of node and robot")
 
 
 @pytest.fixture(scope="module")
@@ -43,20 +43,33 @@ def needs(request: pytest.FixtureRequest) -> Needs:
 
 
 @pytest.fixture(scope="module")
-def session(ros_launch: Callable[..., Any], needs: Needs) -> Any:
+def session(ros_session: Any, needs: Needs) -> Any:
     """The running node."""
-    session = ros_launch(needs.launch)
-    session.wait_for_service(needs.service, 120.0)
-    return session
+    ros_session.wait_for_service(needs.service, 120.0)
+    return ros_session
+
+
+@pytest.fixture(scope="session")
+def make_arm() -> Iterator[Callable[..., FakeArm]]:
+    """Makes the one robot of the suite."""
+    made: list[FakeArm] = []
+
+    @cache
+    def make(with_gripper: bool) -> FakeArm:
+        made.append(FakeArm(with_gripper))
+        return made[-1]
+
+    yield make
+    for arm in made:
+        arm.close()
 
 
 @pytest.fixture(scope="module")
-def arm(session: Any, needs: Needs) -> Iterator[FakeArm]:
+def arm(session: Any, needs: Needs, make_arm: Callable[..., FakeArm]) -> FakeArm:
     """The robot."""
-    arm = FakeArm(with_gripper=needs.gripper)
+    arm = make_arm(needs.gripper)
     arm.settle()
-    yield arm
-    arm.close()
+    return arm
 
 
 @pytest.fixture
@@ -72,7 +85,7 @@ def clean_scene(session: Any, arm: FakeArm) -> Iterator[None]:
     arm.settle()
     assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
     yield
-    assert session.alive(), session.log()
+    assert session.answers("/move_group"), session.log()
 
 
 @pytest.fixture(scope="module")

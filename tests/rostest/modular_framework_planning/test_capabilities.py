@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -15,21 +15,12 @@ from moveit_msgs.srv import ApplyPlanningScene
 from shape_msgs.msg import SolidPrimitive
 from tf2_msgs.msg import TFMessage
 
-LAUNCH = """<launch>
-  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
-    <arg name="load_robot_description" value="true"/>
-    <arg name="capabilities" value="move_group/TfPublisher nobody/Nothing"/>
-    <arg name="disable_capabilities" value="move_group/MoveGroupQueryPlannersService"/>
-  </include>
-</launch>"""
-
 
 @pytest.fixture(scope="module", autouse=True)
-def session(ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("compute_fk", 120.0)
-    yield session
-    assert session.alive(), session.log()
+def session(ros_session: Any) -> Iterator[Any]:
+    ros_session.wait_for_service("compute_fk", 120.0)
+    yield ros_session
+    assert ros_session.answers("/move_group"), ros_session.log()
 
 
 def test_defaults_are_offered_but_for_the_disabled_one(session: Any) -> None:

@@ -23,7 +23,6 @@ from planning_wire import (
     ARM,
     DOWN,
     GROUP,
-    LAUNCH,
     OK,
     START,
     TIP,
@@ -46,9 +45,7 @@ from std_msgs.msg import Header
 CODES = MoveItErrorCodes
 NAN = float("nan")
 UNTURNED = Quaternion(0, 0, 0, 1)
-POSITION_ONLY = LAUNCH.replace("</launch>", """  <param name="robot_description_kinematics/arm/position_only_ik"
-         value="true"/></launch>""")
-pytestmark = [pytest.mark.move_group(launch=POSITION_ONLY), pytest.mark.usefixtures("clean_scene")]
+pytestmark = [pytest.mark.usefixtures("clean_scene")]
 
 
 def in_box(x: float, y: float, z: float, size: tuple[float, float, float], **changes: Any) -> PositionConstraint:

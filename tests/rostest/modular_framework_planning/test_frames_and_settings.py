@@ -29,7 +29,6 @@ from planning_wire import (
     ARM,
     DOWN,
     GROUP,
-    LAUNCH,
     OK,
     START,
     TIP,
@@ -50,12 +49,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 UNTURNED = Quaternion(0, 0, 0, 1)
-SEEDED = LAUNCH.replace("</include>", '<arg name="info" value="true"/></include>').replace("</launch>", """
-  <param name="move_group/planning_pipelines/ompl/seed" value="4"/>
-  <param name="move_group/plan_execution/record_trajectory_state_frequency" value="50.0"/>
-  <param name="move_group/pick_place/max_attempted_states_per_pose" value="many"/>
-</launch>""")
-pytestmark = [pytest.mark.move_group(launch=SEEDED), pytest.mark.usefixtures("clean_scene")]
+pytestmark = [pytest.mark.usefixtures("clean_scene")]
 
 
 @pytest.fixture(scope="module")

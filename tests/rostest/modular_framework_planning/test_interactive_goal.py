@@ -13,7 +13,7 @@ import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes, PlanningScene, PositionIKRequest, RobotState
 from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK
-from planning_wire import ARM, DOWN, LAUNCH, OK, START, FakeArm, add, box, call, plan, report_of, request
+from planning_wire import ARM, DOWN, OK, START, FakeArm, add, box, call, plan, report_of, request
 from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
 
@@ -21,13 +21,6 @@ from modular_framework_planning.visualization.interactive_goal import Interactiv
 from modular_framework_planning.visualization.move_group_client import planners_of_group
 
 NODE = "/interactive_goal"
-LAUNCH_FILE = "$(find modular_framework_planning)/launch/interactive_goal.launch"
-WITH_MARKER = LAUNCH.replace("</launch>", f"""  <include file="{LAUNCH_FILE}">
-    <arg name="group" value="arm_and_manipulator"/>
-    <arg name="velocity_scaling" value="0.5"/>
-    <arg name="acceleration_scaling" value="0.5"/>
-  </include>
-</launch>""")
 WORDS_ABOVE_TIP_M = 0.45
 NEAR = (0.1, 0.5, 0.95)
 GREEN, RED = (0.2, 0.8, 0.3), (0.9, 0.15, 0.1)
@@ -107,16 +100,15 @@ class Rviz:
 
 
 @pytest.fixture(scope="module")
-def arm(ros_launch: Callable[..., Any]) -> Iterator[FakeArm]:
-    session = ros_launch(WITH_MARKER)
+def arm(ros_session: Any) -> Iterator[FakeArm]:
     arm = FakeArm()
-    session.wait_for_service("plan_kinematic_path", 120.0)
+    ros_session.wait_for_service("plan_kinematic_path", 120.0)
     assert plan(request()).error_code.val == OK  # what is made on first use is made now
     ask = PositionIKRequest(group_name="arm_and_manipulator", avoid_collisions=True)
     ask.pose_stamped.header.frame_id, ask.pose_stamped.pose = "world", Pose(Point(*NEAR), DOWN)
     assert call("compute_ik", GetPositionIK, ask).error_code.val == OK
     yield arm
-    assert session.alive(), session.log()
+    assert ros_session.answers("/move_group"), ros_session.log()
 
 
 @pytest.fixture(scope="module")

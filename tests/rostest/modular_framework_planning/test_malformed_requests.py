@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -39,7 +39,7 @@ from moveit_msgs.srv import (
     SetPlannerParams,
 )
 from nonsense import STYLES, nonsense
-from planning_wire import ARM, DOWN, GROUP, LAUNCH, OK, FakeArm, call, joint_goal, plan, report_of, request
+from planning_wire import ARM, DOWN, GROUP, OK, FakeArm, call, joint_goal, plan, report_of, request
 from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle
@@ -64,26 +64,22 @@ ALWAYS_ANSWERED = {"query_planner_interface", "get_planner_params", "set_planner
 MEANS_SOMETHING = {("apply_planning_scene", "nothing"), ("check_state_validity", "nothing"),  # clear; ask for all
                    ("execute_trajectory", "nothing"), ("sequence_move_group", "nothing"),  # nothing to do is done
                    ("plan_sequence_path", "nothing")}
-SEQUENCES = """  <param name="move_group/capabilities" value="pilz_industrial_motion_planner/MoveGroupSequenceAction
-    pilz_industrial_motion_planner/MoveGroupSequenceService"/>
-</launch>"""
 
 
 @pytest.fixture(scope="module", autouse=True)
-def session(ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(LAUNCH.replace("</launch>", SEQUENCES))
-    session.wait_for_service("plan_kinematic_path", 120.0)
+def session(ros_session: Any) -> Iterator[Any]:
+    ros_session.wait_for_service("plan_kinematic_path", 120.0)
     FakeArm()
     time.sleep(0.2)
     assert plan(request(joint_goal("shoulder_pan_joint", 1.0))).error_code.val == OK
-    yield session
-    assert session.alive(), session.log()
+    yield ros_session
+    assert ros_session.answers("/move_group"), ros_session.log()
 
 
 @pytest.fixture(autouse=True)
 def still_works(session: Any) -> Iterator[None]:
     yield
-    assert session.alive(), session.log()
+    assert session.answers("/move_group"), session.log()
     assert call("apply_planning_scene", ApplyPlanningScene, PlanningScene(is_diff=False)).success
     assert plan(request(joint_goal("shoulder_pan_joint", 1.0))).error_code.val == OK
 

@@ -25,34 +25,11 @@ from visualization_msgs.msg import MarkerArray
 from modular_framework_planning.octomap.encoding import read_file, read_stream
 from modular_framework_planning.octomap.voxel_map import VoxelMap
 
-LAUNCH = """<launch>
-  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
-    <arg name="load_robot_description" value="true"/>
-  </include>
-  <rosparam ns="move_group">
-    octomap_resolution: 0.05
-    octomap_frame: world
-    max_range: 4.0
-    sensors:
-      - sensor_plugin: occupancy_map_monitor/DepthImageOctomapUpdater
-        image_topic: /camera/depth/image_rect_raw
-        far_clipping_plane_distance: 4.0
-        shadow_threshold: 0.2
-        padding_scale: 4.0
-        padding_offset: 0.03
-        filtered_cloud_topic: filtered_depth
-        ns: camera
-      - sensor_plugin: occupancy_map_monitor/PointCloudOctomapUpdater
-        point_cloud_topic: /scanner/points
-        padding_offset: 0.05
-        filtered_cloud_topic: filtered_points
-  </rosparam>
-</launch>"""
 CAMERA_AT = np.array([-2.5, 0.0, 1.2])
 LOOK_ALONG_X = Quaternion(-0.5, 0.5, -0.5, 0.5)  # optical frame: z forward along the world's x, x right along -y
 FOCUS, CENTER = 525.0, (319.5, 239.5)
 WALL_X = 1.0  # world x of a wall behind the robot
-pytestmark = pytest.mark.move_group(launch=LAUNCH, service="get_planning_scene")
+pytestmark = pytest.mark.move_group(service="get_planning_scene")
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,6 @@ from planning_wire import (
     ARM,
     GRIPPER,
     GROUP,
-    LAUNCH,
     OK,
     START,
     FakeArm,
@@ -48,11 +47,7 @@ PALM_TO_BLOCK = 0.155  # from ee_link along its x, which points down in these gr
 BLOCK = (0.1, 0.5, 0.90)
 EE_DOWN = Quaternion(0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))  # x of ee_link points down
 CODES = MoveItErrorCodes
-SCALING = "robot_description_planning/default_{}_scaling_factor"
-QUICK = LAUNCH.replace("</launch>", f"""  <param name="{SCALING.format('velocity')}" value="0.4"/>
-  <param name="{SCALING.format('acceleration')}" value="0.4"/>
-</launch>""")
-pytestmark = pytest.mark.move_group(launch=QUICK, gripper=True)
+pytestmark = pytest.mark.move_group(gripper=True)
 
 
 @pytest.fixture(scope="module")

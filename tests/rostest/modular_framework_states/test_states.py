@@ -29,9 +29,6 @@ from modular_framework_states.states.plan import Plan
 from modular_framework_states.states.select import Select
 from modular_framework_states.states.wait_for_signal import WaitForSignal
 
-LAUNCH = """<launch><rosparam param="manipulator_links_indices">[1]</rosparam>
-<node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"/></launch>"""
-
 
 class FakeArm:
     """An arm with one joint whose angle equals the x of the tip; two solutions a turn apart for every pose."""
@@ -132,14 +129,13 @@ def call(name: str, service_type, **fields):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def managers(ros_launch):
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("/get_object_type", 60)
-    session.wait_for_service("/get_modified_acm", 60)
+def managers(ros_session):
+    ros_session.wait_for_service("/get_object_type", 60)
+    ros_session.wait_for_service("/get_modified_acm", 60)
     state = JointState(name=["j"], position=[1.0])
     call("add_joint_state", srv.AddJointState, joint_state=state, joint_state_name="one")
     call("add_grasp", srv.AddStandardisedGrasp, grasp_message=grasp_message(), grasp_name="g")
-    return session
+    return ros_session
 
 
 @pytest.fixture

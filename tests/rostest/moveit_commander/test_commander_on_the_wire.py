@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import moveit_commander
@@ -29,31 +29,17 @@ START = {"shoulder_pan_joint": 1.57, "shoulder_lift_joint": -1.57, "elbow_joint"
          "wrist_2_joint": -1.57, "wrist_3_joint": 0.0}
 FINGER = "ezgripper_knuckle_palm_L1_1"
 PALM = "ezgripper_palm_link"
-LAUNCH = f"""<launch>
-  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
-    <arg name="load_robot_description" value="true"/>
-  </include>
-  <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen" required="true">
-    <rosparam>
-      joints: [{", ".join(START)}, {FINGER}]
-      initial_positions: {START}
-    </rosparam>
-  </node>
-  <node pkg="modular_framework_core" type="robot_controllers_spawner" name="spawner" output="screen"
-        args="ur5_ezgripper_robot ur5_ezgripper_controller_simulation.yaml"/>
-</launch>"""
 DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
 GOAL = Pose(Point(0.1, 0.5, 0.95), DOWN)
 NEAR = [1.5, -1.5, 1.3, -1.3, -1.5, 0.1]
 
 
 @pytest.fixture(scope="module", autouse=True)
-def session(ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_kinematic_path", 120.0)
+def session(ros_session: Any) -> Iterator[Any]:
+    ros_session.wait_for_service("plan_kinematic_path", 120.0)
     moveit_commander.roscpp_initialize(["test", "__name:=ignored"])
-    yield session
-    assert session.alive(), session.log()
+    yield ros_session
+    assert ros_session.answers("/move_group"), ros_session.log()
     moveit_commander.roscpp_shutdown()
 
 

@@ -39,22 +39,16 @@ from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
 from ros_session import until
 from std_msgs.msg import Header
 
-LAUNCH = """<launch>
-  <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">
-    <arg name="load_robot_description" value="true"/>
-  </include>
-</launch>"""
 PALM = "ezgripper_palm_link"
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
 
 @pytest.fixture(scope="module")
-def scene(ros_launch: Callable[..., Any]) -> Iterator[PlanningSceneInterface]:
-    session = ros_launch(LAUNCH)
-    session.wait_for_service("apply_planning_scene", 120.0)
+def scene(ros_session: Any) -> Iterator[PlanningSceneInterface]:
+    ros_session.wait_for_service("apply_planning_scene", 120.0)
     roscpp_initialize([])
     yield PlanningSceneInterface()
-    assert session.alive(), session.log()
+    assert ros_session.answers("/move_group"), ros_session.log()
     roscpp_shutdown()
 
 
