@@ -175,7 +175,7 @@ class Arm:
     """What a client of one trajectory controller does, and everything it hears."""
 
     def __init__(self, robot: SteppedRobot, name: str, joints: list[str]) -> None:
-        self._robot = robot
+        self.robot = robot
         self.name = name
         self.joints = joints
         self.states: list[JointTrajectoryControllerState] = []
@@ -202,13 +202,13 @@ class Arm:
     def send_goal(self, goal: FollowJointTrajectoryGoal, feedback: Callable[..., None] | None = None) -> Any:
         """Send a goal as it is."""
         handle = self.action.send_goal(goal, feedback_cb=feedback)
-        self._robot.wait_until(lambda: handle.get_comm_state() not in (actionlib.CommState.WAITING_FOR_GOAL_ACK,
+        self.robot.wait_until(lambda: handle.get_comm_state() not in (actionlib.CommState.WAITING_FOR_GOAL_ACK,
                                                                         actionlib.CommState.PENDING))
         return handle
 
     def result(self, handle: Any) -> tuple[str, int, str]:
         """State, code and text of a goal that has ended."""
-        self._robot.wait_until(lambda: handle.get_comm_state() == actionlib.CommState.DONE)
+        self.robot.wait_until(lambda: handle.get_comm_state() == actionlib.CommState.DONE)
         result = handle.get_result()
         return (actionlib.TerminalState.to_string(handle.get_terminal_state()), result.error_code, result.error_string)
 
@@ -219,15 +219,15 @@ class Arm:
         """Publish on the topic `command`, and wait until the controller has taken or refused it."""
         before = len(self._taken)
         self._command.publish(message)
-        self._robot.wait_until(lambda: len(self._taken) > before)
-        self._robot.stand()
+        self.robot.wait_until(lambda: len(self._taken) > before)
+        self.robot.stand()
 
     def trace(self, duration_s: float) -> list[JointTrajectoryControllerState]:
         """Let time pass and answer the state of every cycle; the controller must publish that often."""
-        begun_s = self._robot.time_s
-        self._robot.flush()
+        begun_s = self.robot.time_s
+        self.robot.flush()
         for _ in range(round(duration_s / PERIOD_S)):
-            self._robot.step()
+            self.robot.step()
             self._robot_heard()
         return [state for state in self.states if state.header.stamp.to_sec() > begun_s + 1e-6]
 
@@ -237,6 +237,6 @@ class Arm:
 
     def _robot_heard(self) -> None:
         end = time.monotonic() + WAIT_S
-        while not self.states or self.states[-1].header.stamp.to_sec() < self._robot.time_s - 1e-6:
+        while not self.states or self.states[-1].header.stamp.to_sec() < self.robot.time_s - 1e-6:
             assert time.monotonic() < end, "no state was published"
             time.sleep(0.0005)

@@ -106,7 +106,7 @@ def test_ten_random_points_are_tracked_to_a_millionth_by_the_curve_that_what_the
     points = [(t, *(list(row) for row in state[:rows])) for t, state in zip(times[1:], states[1:], strict=True)]
     goal = arm.goal(*points, path_tolerance=[JointTolerance(name="shoulder", position=-1.0)])
     arm.send_goal(goal)
-    begun_s = arm._robot.time_s
+    begun_s = arm.robot.time_s
     curves = [independent_curve(order, times, states[:, :, joint]) for joint in range(3)]
     trace = arm.trace(times[-1] + 0.1)
     for state in trace:
@@ -121,7 +121,7 @@ def test_ten_random_points_are_tracked_to_a_millionth_by_the_curve_that_what_the
 def test_between_points_of_different_kind_the_curve_is_what_both_give(arm: Arm) -> None:
     arm.send_goal(arm.goal((0.5, [0.4, 0.0, 0.0], HOME, HOME), (1.0, [0.0, 0.2, 0.0], HOME), (1.5, [0.4, 0.0, 0.0]),
                            path_tolerance=[JointTolerance(name="shoulder", position=-1.0)]))
-    arm._robot.run(0.5)
+    arm.robot.run(0.5)
     shares = [state.desired.positions[0] / 0.4 for state in arm.trace(1.0)]
     assert shares[24] == pytest.approx(0.5) and shares[11] == pytest.approx(1.0 - 3 * 0.24**2 + 2 * 0.24**3)
     assert shares[74] == pytest.approx(0.5) and shares[61] == pytest.approx(0.24)

@@ -11,6 +11,7 @@ import actionlib
 import pytest
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestResult
+from actionlib_msgs.msg import GoalStatusArray
 
 import smach
 
@@ -206,13 +207,13 @@ def test_a_server_that_dies_with_its_goal_is_noticed(ros_session, monkeypatch):
     monkeypatch.setattr(simple_action_state, "SERVER_LOST_S", 0.5)
     process = subprocess.Popen([sys.executable, "-c", MORTAL], env=ros_session.env)
     try:
+        sent = threading.Event()
+        rospy.Subscriber("mortal/status", GoalStatusArray, lambda message: message.status_list and sent.set())
         state = SimpleActionState("mortal", TestAction, server_wait_timeout=rospy.Duration(60.0))
         outcomes: list[str] = []
         thread = threading.Thread(target=lambda: outcomes.append(run(state)[0]))
         thread.start()
-        end = time.monotonic() + 60.0
-        while not state._goal_is_out and time.monotonic() < end:
-            time.sleep(0.05)
+        assert sent.wait(60.0)
         time.sleep(0.3)
         process.kill()
         thread.join(30.0)
