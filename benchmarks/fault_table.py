@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes what a benchmark found out about faults as a table into a page of docs/reference, and renews it there."""
+
 from __future__ import annotations
 
 import re
@@ -36,11 +37,14 @@ def fault_table(rows: Iterable[FaultRow], moved_title: str) -> str:
         rows: the faults.
         moved_title: what `moved` is.
     """
+
     def number(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}f}"
 
-    lines = [f"| fault | what the user reads | told after [s]: median, worst | back after [s] | {moved_title} [rad] |",
-             "|---|---|---|---|---|"]
+    lines = [
+        f"| fault | what the user reads | told after [s]: median, worst | back after [s] | {moved_title} [rad] |",
+        "|---|---|---|---|---|",
+    ]
     for row in rows:
         told = ", ".join(filter(None, (number(row.told_s, 3), number(row.told_max_s, 3))))
         text = re.sub(r"127\.\d+\.\d+\.\d+", "ADDRESS", row.text).removeprefix("hardware fault: ")

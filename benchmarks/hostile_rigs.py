@@ -3,6 +3,7 @@
 
 The mock and PyBullet run in simulated time, as fast as the computer can; the emulated UR arm runs in real time.
 """
+
 from __future__ import annotations
 
 import threading
@@ -38,11 +39,15 @@ from modular_framework_simulation.physics.robot_body import RobotBody
 
 PERIOD_S = 0.008
 READY_S = 60.0
-LONGEST_STEP_S = 0.05    # as in the node robot_hw: a loop that was held up for longer goes on later
+LONGEST_STEP_S = 0.05  # as in the node robot_hw: a loop that was held up for longer goes on later
 START = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
-FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
-            "effort": "EffortJointInterface", "pos_vel": "PosVelJointInterface",
-            "pos_vel_acc": "PosVelAccJointInterface"}
+FAMILIES = {
+    "position": "PositionJointInterface",
+    "velocity": "VelocityJointInterface",
+    "effort": "EffortJointInterface",
+    "pos_vel": "PosVelJointInterface",
+    "pos_vel_acc": "PosVelAccJointInterface",
+}
 GAINS = {"velocity": {"p": 8.0}, "effort": {"p": 400.0, "d": 40.0}}
 RAMPS_S = {"hold": 0.0, "ramp": 0.5}
 """The two controllers of each robot, with their `stop_trajectory_duration` [s]."""
@@ -144,7 +149,7 @@ class Rig:
         def ask() -> None:
             try:
                 self.manager.switch_controller(start, stop)
-            except Exception as error:      # told to the caller
+            except Exception as error:  # told to the caller
                 failures.append(error)
 
         thread = threading.Thread(target=ask, daemon=True)
@@ -169,8 +174,9 @@ class RealTimeRig(Rig):
         self._due_s = time.monotonic()
         self._loop_time = LoopTime()
         self._loop_time.longest_step_s = LONGEST_STEP_S
-        super().__init__("ur_emulator", UrArmHardware(), _parameters({"robot_ip_address": arm.address}, "position"),
-                         0.06)
+        super().__init__(
+            "ur_emulator", UrArmHardware(), _parameters({"robot_ip_address": arm.address}, "position"), 0.06
+        )
         self.time_s = self._loop_time.now()
         run_in_real_time()
         deadline_s = time.monotonic() + READY_S
@@ -202,8 +208,9 @@ class PyBulletRig(Rig):
         self._world = PhysicsWorld(PhysicsSettings(), parts, (0.0, 0.0, -9.81))
         description = read_robot(urdf, packages.get_path, parts, False)
         body = RobotBody(self._world, description, "robot", Pose(), dict(zip(JOINT_NAMES, START, strict=True)))
-        super().__init__("pybullet", PyBulletRobotHW(body), {**_parameters({}, "position"), "robot_description": urdf},
-                         0.04)
+        super().__init__(
+            "pybullet", PyBulletRobotHW(body), {**_parameters({}, "position"), "robot_description": urdf}, 0.04
+        )
 
     def _next_cycle(self) -> float:
         self.time_s = self._world.time_ns * 1e-9
@@ -215,13 +222,22 @@ class PyBulletRig(Rig):
 
 def mock_rig(family: str) -> Rig:
     """Joints that do what they are told, commanded by one family of interfaces."""
-    own = {"joints": list(JOINT_NAMES), "command_interface": FAMILIES[family],
-           "initial_positions": dict(zip(JOINT_NAMES, START, strict=True))}
+    own = {
+        "joints": list(JOINT_NAMES),
+        "command_interface": FAMILIES[family],
+        "initial_positions": dict(zip(JOINT_NAMES, START, strict=True)),
+    }
     parameters = _parameters(own, family)
     for name in JOINT_NAMES:
         parameters["joint_limits"][name] |= {
-            "has_position_limits": True, "min_position": -6.28, "max_position": 6.28, "has_velocity_limits": True,
-            "max_velocity": 3.15, "has_effort_limits": True, "max_effort": 150.0}
+            "has_position_limits": True,
+            "min_position": -6.28,
+            "max_position": 6.28,
+            "has_velocity_limits": True,
+            "max_velocity": 3.15,
+            "has_effort_limits": True,
+            "max_effort": 150.0,
+        }
     return Rig(f"mock, {family}", MockRobotHW(), parameters, 0.15 if family in GAINS else 0.03)
 
 
@@ -229,7 +245,7 @@ def make_rigs(names: list[str]) -> list[Callable[[], Rig]]:
     """What makes the robots of these names: mock (one for each family), pybullet, ur_emulator."""
     made: list[Callable[[], Rig]] = []
     if "mock" in names:
-        made += [lambda family=family: mock_rig(family) for family in FAMILIES]    # type: ignore[misc]
+        made += [lambda family=family: mock_rig(family) for family in FAMILIES]  # type: ignore[misc]
     if "pybullet" in names:
         made.append(PyBulletRig)
     if "ur_emulator" in names:
@@ -240,12 +256,19 @@ def make_rigs(names: list[str]) -> list[Callable[[], Rig]]:
 def _parameters(own: dict[str, Any], family: str) -> dict[str, Any]:
     """Parameters of both controllers, as in the controller file of the arm."""
     tolerances = dict.fromkeys(JOINT_NAMES, {"trajectory": 0.1, "goal": 0.02})
-    controllers = {name: {
-        "type": f"{family}_controllers/JointTrajectoryController", "joints": list(JOINT_NAMES),
-        "stop_trajectory_duration": ramp_s, "gains": dict.fromkeys(JOINT_NAMES, GAINS.get(family)),
-        "velocity_ff": dict.fromkeys(JOINT_NAMES, 1.0 if family == "velocity" else 0.0),
-        "constraints": {"goal_time": 0.6, "stopped_velocity_tolerance": 0.05, **tolerances},
-    } for name, ramp_s in RAMPS_S.items()}
-    braking = {name: {"has_acceleration_limits": True, "max_acceleration": BRAKING[name.split("_", 1)[0]]}
-               for name in JOINT_NAMES}
+    controllers = {
+        name: {
+            "type": f"{family}_controllers/JointTrajectoryController",
+            "joints": list(JOINT_NAMES),
+            "stop_trajectory_duration": ramp_s,
+            "gains": dict.fromkeys(JOINT_NAMES, GAINS.get(family)),
+            "velocity_ff": dict.fromkeys(JOINT_NAMES, 1.0 if family == "velocity" else 0.0),
+            "constraints": {"goal_time": 0.6, "stopped_velocity_tolerance": 0.05, **tolerances},
+        }
+        for name, ramp_s in RAMPS_S.items()
+    }
+    braking = {
+        name: {"has_acceleration_limits": True, "max_acceleration": BRAKING[name.split("_", 1)[0]]}
+        for name in JOINT_NAMES
+    }
     return {"hw": own, "joint_limits": braking, **controllers}

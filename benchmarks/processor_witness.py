@@ -5,6 +5,7 @@ interrupt.
 On each processor that may be used a process sleeps a millisecond at a time, as the most urgent of all. What wakes it
 late was no other process: from when it was to wake until it did, its processor was away.
 """
+
 from __future__ import annotations
 
 import json
@@ -26,11 +27,13 @@ class Witnesses:
     """One witness a processor, from now until `taken` is asked for. It costs a percent or two of each."""
 
     def __init__(self) -> None:
-        self._processes = [subprocess.Popen([sys.executable, __file__, str(processor)], stdout=subprocess.PIPE)
-                           for processor in sorted(os.sched_getaffinity(0))]
+        self._processes = [
+            subprocess.Popen([sys.executable, __file__, str(processor)], stdout=subprocess.PIPE)
+            for processor in sorted(os.sched_getaffinity(0))
+        ]
         for process in self._processes:
             assert process.stdout is not None
-            process.stdout.readline()   # it watches
+            process.stdout.readline()  # it watches
 
     def taken(self) -> list[Spans] | None:
         """When each processor was away [s of the monotonic clock]; None where the system lets nobody be that urgent."""

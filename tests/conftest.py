@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What tests of every kind ask the machine."""
+
 from __future__ import annotations
 
 import os

@@ -6,6 +6,7 @@ line it prints is a JSON object: case, exit_code, lifted_m, held, log. The cases
 objects and `second_try`: a can whose first two grasps are bad. One cannot be lifted while it holds the can, and
 with the other the fingers touch the can before they close.
 """
+
 from __future__ import annotations
 
 import copy
@@ -29,8 +30,16 @@ from std_msgs.msg import Bool, String
 from modular_framework_core.srv import AddStandardisedGrasp, GetStandardisedGrasp
 
 # model -> height of its frame above the surface it stands on [m] (the frame is in the middle of the model)
-OBJECTS = {"cube": 0.025, "wood_block": 0.05, "can": 0.0575, "tube": 0.07, "ball": 0.032, "l_bracket": 0.04,
-           "tea_box": 0.06, "mug": 0.045}
+OBJECTS = {
+    "cube": 0.025,
+    "wood_block": 0.05,
+    "can": 0.0575,
+    "tube": 0.07,
+    "ball": 0.032,
+    "l_bracket": 0.04,
+    "tea_box": 0.06,
+    "mug": 0.045,
+}
 SECOND_TRY = "second_try"
 TABLE_TOP_M = 0.84
 PLACE_XY_M, YAW_RAD = (0.05, 0.5), 0.3
@@ -62,8 +71,9 @@ def spawn(name: str, model: str, xy: tuple[float, float], yaw: float) -> str:
     """Puts a model on the table of ur5_table.world; returns why that failed, or nothing."""
     place = service("/gazebo/spawn_sdf_model", SpawnModel)
     text = (Path(rospy.get_param("/gazebo_model_path")) / model / "model.sdf").read_text()
-    pose = Pose(Point(*xy, TABLE_TOP_M + OBJECTS[model] + 0.001),
-                Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
+    pose = Pose(
+        Point(*xy, TABLE_TOP_M + OBJECTS[model] + 0.001), Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    )
     answer = place(name, text, "", pose, "world")
     return "" if answer.success else f"could not spawn {model}: {answer.status_message}"
 
@@ -103,8 +113,13 @@ class Picker:
             run = subprocess.run(command, capture_output=True, text=True, timeout=TASK_S, check=False)
             exit_code, log = run.returncode, run.stdout + run.stderr
         held = rospy.wait_for_message("/gazebo/grasped_object", String, WAIT_S).data
-        return {"case": case, "exit_code": exit_code, "lifted_m": height(name) - before, "held": held == name,
-                "log": log[-30000:]}
+        return {
+            "case": case,
+            "exit_code": exit_code,
+            "lifted_m": height(name) - before,
+            "held": held == name,
+            "log": log[-30000:],
+        }
 
     def clear(self, case: str) -> None:
         """Takes the object away, and waits until the planning scene has forgotten it."""
@@ -117,7 +132,8 @@ def scene_objects() -> list[str]:
     wanted = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
     scene = service("get_planning_scene", GetPlanningScene)(PlanningSceneComponents(components=wanted)).scene
     return [item.id for item in scene.world.collision_objects] + [
-        item.object.id for item in scene.robot_state.attached_collision_objects]
+        item.object.id for item in scene.robot_state.attached_collision_objects
+    ]
 
 
 def spoil_first_grasps() -> None:

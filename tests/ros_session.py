@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A ROS master of its own and the launches that run on it, for tests beside each other and beside a user's master."""
+
 from __future__ import annotations
 
 import contextlib
@@ -174,7 +175,8 @@ class RosSession:
         """What all launches have printed so far, and what the nodes of the suite's .test file have logged."""
         logs = self._suite_logs / self._run_id() if self._suite_logs else self.folder / "none"
         return "".join(launch.log() for launch in self._launches) + "".join(
-            path.read_text(errors="replace") for path in sorted(logs.glob("*.log")))
+            path.read_text(errors="replace") for path in sorted(logs.glob("*.log"))
+        )
 
     def _run_id(self) -> str:
         return str(rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"]).getParam("/run_id"))

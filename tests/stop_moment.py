@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One Ctrl-C in the middle of a simulated pick: when the task said its last word, when the arm stood, who was left."""
+
 from __future__ import annotations
 
 import contextlib
@@ -69,13 +70,18 @@ class Stop:
 
     def faults(self) -> list[str]:
         """Says what is not as it should be; nothing when all is."""
-        return [text for wrong, text in (
-            (self.last_word_s > STOPPED_WITHIN_S, f"the last line came after {self.last_word_s:.2f} s"),
-            ("'preempted'" not in self.outcome, f"it says '{self.outcome}'"),
-            (self.last_speed > AT_REST_RAD_S, f"the arm was last seen moving at {self.last_speed:.3f} rad/s"),
-            (self.rest_s > STOPPED_WITHIN_S, f"the arm stood after {self.rest_s:.2f} s"),
-            (bool(self.slow), f"nodes had to be ended by force: {', '.join(self.slow)}"),
-            (bool(self.left), f"these processes were left: {', '.join(self.left)}")) if wrong]
+        return [
+            text
+            for wrong, text in (
+                (self.last_word_s > STOPPED_WITHIN_S, f"the last line came after {self.last_word_s:.2f} s"),
+                ("'preempted'" not in self.outcome, f"it says '{self.outcome}'"),
+                (self.last_speed > AT_REST_RAD_S, f"the arm was last seen moving at {self.last_speed:.3f} rad/s"),
+                (self.rest_s > STOPPED_WITHIN_S, f"the arm stood after {self.rest_s:.2f} s"),
+                (bool(self.slow), f"nodes had to be ended by force: {', '.join(self.slow)}"),
+                (bool(self.left), f"these processes were left: {', '.join(self.left)}"),
+            )
+            if wrong
+        ]
 
     def figures(self) -> dict[str, Any]:
         """Returns all as a mapping, for JSON."""
@@ -97,8 +103,9 @@ def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motio
     session.env.pop("DISPLAY", None)
     speeds = session.folder / "speeds.txt"
     with speeds.open("w") as output:
-        watcher = subprocess.Popen([sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE,
-                                   stdout=output)
+        watcher = subprocess.Popen(
+            [sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE, stdout=output
+        )
     try:
         launch = session.run_framework(gui="false", rviz="false")
         _until(launch, after, START_TIMEOUT_S)
@@ -129,16 +136,29 @@ def _tell_failure(log: str) -> None:
         print("a pick failed by itself:", *reasons, sep="\n", file=sys.stderr, flush=True)
 
 
-def _stop(moment_s: float, log: str, pressed: float, last_word_s: float, launch_s: float, speeds: Path,
-          left: tuple[str, ...]) -> Stop:
-    samples = [(float(line.split()[0]) - pressed, float(line.split()[1])) for line in speeds.read_text().splitlines()
-               if len(line.split()) == 2]
+def _stop(
+    moment_s: float, log: str, pressed: float, last_word_s: float, launch_s: float, speeds: Path, left: tuple[str, ...]
+) -> Stop:
+    samples = [
+        (float(line.split()[0]) - pressed, float(line.split()[1]))
+        for line in speeds.read_text().splitlines()
+        if len(line.split()) == 2
+    ]
     moving = [time_s for time_s, speed in samples if speed > AT_REST_RAD_S and time_s > 0.0]
     last_word = next(line for line in log.splitlines() if LAST_WORD in line)
     running = [line.split("'")[5] for line in log.splitlines() if "state machine goes from" in line]
-    return Stop(round(moment_s, 3), running[-1] if running else "the first", _speed_at(samples, 0.0),
-                round(last_word_s, 3), last_word.strip(), round(moving[-1] if moving else 0.0, 3), samples[-1][1],
-                round(launch_s, 3), tuple(line.strip() for line in log.splitlines() if "escalating to" in line), left)
+    return Stop(
+        round(moment_s, 3),
+        running[-1] if running else "the first",
+        _speed_at(samples, 0.0),
+        round(last_word_s, 3),
+        last_word.strip(),
+        round(moving[-1] if moving else 0.0, 3),
+        samples[-1][1],
+        round(launch_s, 3),
+        tuple(line.strip() for line in log.splitlines() if "escalating to" in line),
+        left,
+    )
 
 
 def _speed_at(samples: list[tuple[float, float]], time_s: float) -> float:
@@ -158,8 +178,11 @@ def _until(launch: Launch, text: str, timeout_s: float) -> float:
 def _until_it_moves(launch: Launch, speeds: Path) -> None:
     """Waits until the arm was last seen moving."""
     end = time.monotonic() + START_TIMEOUT_S
-    while not [line for line in speeds.read_text().splitlines()[-2:]
-               if len(line.split()) == 2 and float(line.split()[1]) > AT_REST_RAD_S]:
+    while not [
+        line
+        for line in speeds.read_text().splitlines()[-2:]
+        if len(line.split()) == 2 and float(line.split()[1]) > AT_REST_RAD_S
+    ]:
         assert time.monotonic() < end and launch.alive(), f"the arm did not move:\n{launch.log()}"
         time.sleep(0.02)
 

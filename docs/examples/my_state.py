@@ -4,6 +4,7 @@
 A task finds it by ``states_directory:=<its folder>`` and ``source: my_state``. Its test, test_my_state.py, is beside
 it.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -25,9 +26,15 @@ class MyState(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, side: Literal["left", "right"], timeout: Positive = 5.0,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        side: Literal["left", "right"],
+        timeout: Positive = 5.0,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._side, self._timeout_s = side, float(timeout)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The test of a state, to begin with: run it with ``./install.sh exec python3 -m pytest <this file>``."""
+
 from __future__ import annotations
 
 import sys

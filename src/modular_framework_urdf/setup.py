@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tells catkin where the Python library of this package lives."""
+
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import find_packages, setup
 

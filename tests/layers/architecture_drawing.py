@@ -4,6 +4,7 @@
 An arrow that follows from others is left out. The drawing carries a digest of what it was drawn from: a test compares
 that instead of drawing it again, because another version of dot may place the boxes differently.
 """
+
 from __future__ import annotations
 
 import hashlib

@@ -40,8 +40,12 @@ def find_faults(tree: SourceTree, table: LayerTable) -> list[str]:
         *(text for each, text in broken if each not in exempt),
         *circles(tree, exempt),
         *(
-            fault(_TABLE, f"the exemption of {entry.importer} -> {entry.imported} is no longer needed",
-                  "exemptions of imports that break a rule", "delete it")
+            fault(
+                _TABLE,
+                f"the exemption of {entry.importer} -> {entry.imported} is no longer needed",
+                "exemptions of imports that break a rule",
+                "delete it",
+            )
             for entry in table.exemptions
             if not any(entry.covers(each) for each in needed)
         ),
@@ -52,8 +56,12 @@ def unlisted_packages(tree: SourceTree, table: LayerTable) -> Iterator[str]:
     """Finds packages that the table does not know."""
     for package, folder in sorted(tree.folders.items()):
         if table.allowed_packages(package, folder) is None:
-            yield fault(f"src/{folder}", f"the table has no entry for package '{package}'", "packages of the table",
-                        f"say in {_TABLE}, [packages], what it may import")
+            yield fault(
+                f"src/{folder}",
+                f"the table has no entry for package '{package}'",
+                "packages of the table",
+                f"say in {_TABLE}, [packages], what it may import",
+            )
 
 
 def unlisted_rooms(tree: SourceTree, table: LayerTable) -> Iterator[str]:
@@ -68,11 +76,14 @@ def unlisted_rooms(tree: SourceTree, table: LayerTable) -> Iterator[str]:
             where, found = f"{folder}/{room}", f"'{room}' is not one of the rooms of {owner}"
             if room == ".":
                 where, found = folder, "modules lie outside every room"
-            yield fault(where, found, ", ".join(sorted(listed)) or "no rooms",
-                        f"move its modules into a room, or add it to {_TABLE}, [rooms]")
+            yield fault(
+                where,
+                found,
+                ", ".join(sorted(listed)) or "no rooms",
+                f"move its modules into a room, or add it to {_TABLE}, [rooms]",
+            )
         for room in sorted(listed - present):
-            yield fault(_TABLE, f"{owner} has no room '{room}'", ", ".join(sorted(present)),
-                        "delete it from [rooms]")
+            yield fault(_TABLE, f"{owner} has no room '{room}'", ", ".join(sorted(present)), "delete it from [rooms]")
 
 
 def full_folders(tree: SourceTree, table: LayerTable) -> Iterator[str]:
@@ -80,8 +91,12 @@ def full_folders(tree: SourceTree, table: LayerTable) -> Iterator[str]:
     modules = (PurePosixPath(file) for file in tree.files.values())
     for folder, count in sorted(Counter(str(file.parent) for file in modules if file.name != "__init__.py").items()):
         if count > table.max_modules_in_a_folder:
-            yield fault(folder, f"{count} modules in one folder", f"at most {table.max_modules_in_a_folder}",
-                        "divide it into rooms named after the field's nouns")
+            yield fault(
+                folder,
+                f"{count} modules in one folder",
+                f"at most {table.max_modules_in_a_folder}",
+                "divide it into rooms named after the field's nouns",
+            )
 
 
 def missing_modules(tree: SourceTree, table: LayerTable) -> Iterator[str]:
@@ -89,8 +104,12 @@ def missing_modules(tree: SourceTree, table: LayerTable) -> Iterator[str]:
     for each in tree.imports:
         package = package_of(each.imported)
         if package in tree.folders and each.imported not in tree.files and not table.is_ros(each.imported):
-            yield fault(_where(tree, each), f"imports {each.imported}, which does not exist",
-                        f"modules of {package}", "correct the name, or add the module")
+            yield fault(
+                _where(tree, each),
+                f"imports {each.imported}, which does not exist",
+                f"modules of {package}",
+                "correct the name, or add the module",
+            )
 
 
 def package_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, str]]:
@@ -99,9 +118,15 @@ def package_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import
         importer, imported = package_of(each.importer), package_of(each.imported)
         allowed = table.allowed_packages(importer, tree.folders[importer])
         if importer != imported and allowed is not None and imported not in allowed:
-            yield each, fault(_where(tree, each), f"{importer} imports {each.imported}",
-                              ", ".join(allowed) or "no package",
-                              "move what is shared into a package below both, or pass it in")
+            yield (
+                each,
+                fault(
+                    _where(tree, each),
+                    f"{importer} imports {each.imported}",
+                    ", ".join(allowed) or "no package",
+                    "move what is shared into a package below both, or pass it in",
+                ),
+            )
 
 
 def room_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, str]]:
@@ -114,8 +139,15 @@ def room_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, s
             if upper == lower or upper not in height or lower not in height or height[lower] < height[upper]:
                 continue
             below = ", ".join(room for level in levels[: height[upper]] for room in level)
-            yield each, fault(_where(tree, each), f"{owner}'s room '{upper}' imports {each.imported}",
-                              below or "no other room", "move what is shared down, or pass it in")
+            yield (
+                each,
+                fault(
+                    _where(tree, each),
+                    f"{owner}'s room '{upper}' imports {each.imported}",
+                    below or "no other room",
+                    "move what is shared down, or pass it in",
+                ),
+            )
 
 
 def ros_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, str]]:
@@ -125,8 +157,15 @@ def ros_faults(tree: SourceTree, table: LayerTable) -> Iterator[tuple[Import, st
         reaches_ros = table.may_use_ros(each.imported) if inside else table.is_ros(each.imported)
         if reaches_ros and not table.may_use_ros(each.importer):
             allowed = ", ".join(["ros_*", *table.ros_interface.get(package_of(each.importer), [])])
-            yield each, fault(_where(tree, each), f"{each.importer} imports {each.imported} below the ROS interface",
-                              f"in {allowed} of the package", "move it to the ROS interface, or pass in what it needs")
+            yield (
+                each,
+                fault(
+                    _where(tree, each),
+                    f"{each.importer} imports {each.imported} below the ROS interface",
+                    f"in {allowed} of the package",
+                    "move it to the ROS interface, or pass in what it needs",
+                ),
+            )
 
 
 def circles(tree: SourceTree, exempt: set[Import]) -> Iterator[str]:
@@ -134,8 +173,12 @@ def circles(tree: SourceTree, exempt: set[Import]) -> Iterator[str]:
     imports = {(each.importer, each.imported): each for each in tree.internal_imports() if each not in exempt}
     while names := _find_circle(imports):
         circle = [imports.pop(step) for step in zip(names, names[1:], strict=False)]
-        yield fault(_where(tree, circle[0]), f"the circle {' -> '.join(names)}", "no circle of files",
-                    "move what they share into a module below both, or pass it in")
+        yield fault(
+            _where(tree, circle[0]),
+            f"the circle {' -> '.join(names)}",
+            "no circle of files",
+            "move what they share into a module below both, or pass it in",
+        )
 
 
 def _find_circle(imports: Iterable[tuple[str, str]]) -> list[str]:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fixtures of the suites of rostest: the master that it brought, and this process as the test node."""
+
 from __future__ import annotations
 
 import os

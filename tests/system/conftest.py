@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fixtures of the tests that start the whole framework, each on a master of its own."""
+
 from __future__ import annotations
 
 import sys

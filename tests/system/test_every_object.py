@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shipped task picks every shipped object, and recovers from grasps that fail at the object."""
+
 from __future__ import annotations
 
 import json
@@ -27,10 +28,22 @@ def picks() -> Iterator[dict[str, Any]]:
     session = RosSession()
     session.env.pop("DISPLAY", None)
     try:
-        launch = session.launch_package("modular_framework_api", "start_framework.launch", gui="false", rviz="false",
-                                        world_file="ur5_table.world", end_with_task="false")
-        run = subprocess.run([sys.executable, str(TESTS / "pick_objects.py"), str(SCRIPT)], env=session.env,
-                             capture_output=True, text=True, timeout=ALL_S, check=False)
+        launch = session.launch_package(
+            "modular_framework_api",
+            "start_framework.launch",
+            gui="false",
+            rviz="false",
+            world_file="ur5_table.world",
+            end_with_task="false",
+        )
+        run = subprocess.run(
+            [sys.executable, str(TESTS / "pick_objects.py"), str(SCRIPT)],
+            env=session.env,
+            capture_output=True,
+            text=True,
+            timeout=ALL_S,
+            check=False,
+        )
         found = [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
         yield {"all": run.stderr[-3000:] + launch.log()[-6000:]} | {each["case"]: each for each in found}
     finally:

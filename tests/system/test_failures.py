@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A task that cannot succeed says so and why; a node that dies ends the launch and is named."""
+
 from __future__ import annotations
 
 import re
@@ -35,7 +36,7 @@ KILLED = ("move_group", "moveit_grasp_action_server", "rosout")
 @pytest.fixture(scope="module")
 def nodes() -> dict[str, bool]:
     """The nodes of the launch, and whether it ends with each."""
-    path, = resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])
+    (path,) = resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])
     arguments = [f"{name}:={value}" for name, value in HEADLESS.items()]
     config = load_config_default([(path, arguments)], None, verbose=False)
     return {node.name: node.required for node in config.nodes}
@@ -54,9 +55,18 @@ def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosS
     launch = session.run_framework(**HEADLESS, world_file="ur5_table.world")
     _wait_for_text(launch, "first state running", 120.0)
     subprocess.run(
-        ["roslaunch", "modular_framework_api", "manage_object.launch", "object_type:=cube", "object_name:=far_cube",
-         "object_position:=0.2 0.88 0.865"],
-        env=session.env, check=True, timeout=120, stdout=subprocess.DEVNULL,
+        [
+            "roslaunch",
+            "modular_framework_api",
+            "manage_object.launch",
+            "object_type:=cube",
+            "object_name:=far_cube",
+            "object_position:=0.2 0.88 0.865",
+        ],
+        env=session.env,
+        check=True,
+        timeout=120,
+        stdout=subprocess.DEVNULL,
     )
     assert launch.wait(TASK_TIMEOUT_S) == 1, launch.log()
     log = launch.log()
@@ -67,8 +77,14 @@ def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosS
 
 def test_the_pick_benchmark_says_why_a_launch_died(session: RosSession) -> None:
     benchmark = Path(__file__).parents[2] / "benchmarks" / "pick_success"
-    run = subprocess.run([benchmark, "--quick", "--launch", "world_file:=no.world"], env=session.env,
-                         capture_output=True, text=True, timeout=TASK_TIMEOUT_S, check=True)
+    run = subprocess.run(
+        [benchmark, "--quick", "--launch", "world_file:=no.world"],
+        env=session.env,
+        capture_output=True,
+        text=True,
+        timeout=TASK_TIMEOUT_S,
+        check=True,
+    )
     assert re.search(r"FAILURE: the launch died: .*no\.world: cannot be read", run.stdout), run.stdout + run.stderr
     assert "0 of 1 episodes succeeded" in run.stdout
 

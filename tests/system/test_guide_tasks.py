@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tasks of the guide and one of the other states move the simulated robot: one launch, task after task."""
+
 from __future__ import annotations
 
 import json
@@ -56,14 +57,22 @@ def framework(session: RosSession) -> Launch:
 
 def run_task(session: RosSession, script: Path) -> subprocess.CompletedProcess[str]:
     """Runs one more task on the running framework."""
-    return subprocess.run(["rosrun", "modular_framework_core", "run_task", str(script)], env=session.env, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TASK_TIMEOUT_S, check=False)
+    return subprocess.run(
+        ["rosrun", "modular_framework_core", "run_task", str(script)],
+        env=session.env,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=TASK_TIMEOUT_S,
+        check=False,
+    )
 
 
 def assert_arm_at(session: RosSession, pose: str) -> None:
     """Looks where the simulated arm is."""
-    look = subprocess.run([sys.executable, "-c", JOINTS], env=session.env, capture_output=True, text=True, timeout=120,
-                          check=True)
+    look = subprocess.run(
+        [sys.executable, "-c", JOINTS], env=session.env, capture_output=True, text=True, timeout=120, check=True
+    )
     joints = json.loads(look.stdout.splitlines()[-1])
     away = {joint: abs(joints[joint] - value) for joint, value in NAMED[pose].items()}
     assert max(away.values()) < AT_POSE_RAD, away
@@ -73,16 +82,21 @@ def test_the_first_task_of_the_guide_plans(framework: Launch) -> None:
     assert "Task 'just_planning' ended with outcome 'sm_successful': SUCCEEDED" in framework.log()
 
 
-@pytest.mark.parametrize(("script", "outcome", "pose"), [
-    (GUIDE_TASKS / "just_planning_params.yaml", "sm_successful", ""),
-    (GUIDE_TASKS / "mock_trajectory.yaml", "sm_successful", "stability_pose"),
-    (GUIDE_TASKS / "nested_initial_pose.yaml", "success", "initial_pose"),
-    (OWN_TASKS / "motion_and_more.yaml", "done", "stability_pose"),
-    (OWN_TASKS / "as_the_original_generated.py", "sm_successful", "initial_pose"),
-    (API / "task_constructor_scripts" / "pick_and_hold.yaml", "successful_pipeline", "stability_pose"),
-], ids=lambda value: value.stem if isinstance(value, Path) else "")
-def test_the_task_runs_and_the_arm_is_where_it_leads(session: RosSession, framework: Launch, script: Path,
-                                                     outcome: str, pose: str) -> None:
+@pytest.mark.parametrize(
+    ("script", "outcome", "pose"),
+    [
+        (GUIDE_TASKS / "just_planning_params.yaml", "sm_successful", ""),
+        (GUIDE_TASKS / "mock_trajectory.yaml", "sm_successful", "stability_pose"),
+        (GUIDE_TASKS / "nested_initial_pose.yaml", "success", "initial_pose"),
+        (OWN_TASKS / "motion_and_more.yaml", "done", "stability_pose"),
+        (OWN_TASKS / "as_the_original_generated.py", "sm_successful", "initial_pose"),
+        (API / "task_constructor_scripts" / "pick_and_hold.yaml", "successful_pipeline", "stability_pose"),
+    ],
+    ids=lambda value: value.stem if isinstance(value, Path) else "",
+)
+def test_the_task_runs_and_the_arm_is_where_it_leads(
+    session: RosSession, framework: Launch, script: Path, outcome: str, pose: str
+) -> None:
     done = run_task(session, script)
     assert done.returncode == 0, done.stdout
     assert f"Task '{script.stem}' ended with outcome '{outcome}': SUCCEEDED" in done.stdout.splitlines()[-1]

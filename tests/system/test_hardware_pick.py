@@ -4,6 +4,7 @@
 Both ways to drive the gripper: as hardware of a controller beside the arm, and by its own server of the action Grasp,
 which the framework's spawner starts, with the arm alone in the list of hardware.
 """
+
 from __future__ import annotations
 
 import csv
@@ -72,12 +73,19 @@ def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tm
     draw = random.Random(os.urandom(8))
     address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
     port, path_log = tmp_path / "gripper", tmp_path / "path.csv"
-    watcher = subprocess.Popen([sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE,
-                               stdout=subprocess.PIPE, text=True)
+    watcher = subprocess.Popen(
+        [sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     try:
-        emulators = session.launch_package("modular_framework_drivers", "emulators.launch", arm_address=address,
-                                           arm_log=path_log, gripper_port=port, gripper_object=1.3,
-                                           gripper_command_port=free_port())
+        emulators = session.launch_package(
+            "modular_framework_drivers",
+            "emulators.launch",
+            arm_address=address,
+            arm_log=path_log,
+            gripper_port=port,
+            gripper_object=1.3,
+            gripper_command_port=free_port(),
+        )
         framework = session.launch(WRAPPER, arm_address=address, port=port, own_server=str(own_server).lower())
         framework.wait(TASK_TIMEOUT_S)
         plans = json.loads(watcher.communicate(timeout=60)[0].splitlines()[-1])
@@ -91,11 +99,11 @@ def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tm
     commanded, actual = read_path(path_log)
     assert len(plans) >= 4, "to the pregrasp, to the grasp, up, to where the object is held"
     for plan in plans:
-        assert max(distance_to_path(np.array(point), commanded) for point in plan) < 5e-3    # chords of late cycles
+        assert max(distance_to_path(np.array(point), commanded) for point in plan) < 5e-3  # chords of late cycles
     planned = np.concatenate([np.array(plan) for plan in plans])
     moved = commanded[np.r_[True, np.any(np.diff(commanded, axis=0) != 0.0, axis=1)]]
-    assert max(distance_to_path(point, planned) for point in moved[::5]) < 0.02      # curves between a plan's points
-    assert np.max(np.abs(actual - commanded)) < 0.15                                 # the arm's lag
+    assert max(distance_to_path(point, planned) for point in moved[::5]) < 0.02  # curves between a plan's points
+    assert np.max(np.abs(actual - commanded)) < 0.15  # the arm's lag
 
 
 def read_path(log: Path) -> tuple[np.ndarray, np.ndarray]:

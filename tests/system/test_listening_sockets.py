@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """With the environment of install.sh nodes listen on the loopback interface; the exception is known and counted."""
+
 from __future__ import annotations
 
 import os
@@ -32,7 +33,7 @@ def test_the_environment_of_install_sh_binds_nodes_to_this_computer() -> None:
 def sockets_of(pid: int) -> set[str]:
     """Inodes of a process's sockets."""
     links = (os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink())
-    return {link[len("socket:["):-1] for link in links if link.startswith("socket:[")}
+    return {link[len("socket:[") : -1] for link in links if link.startswith("socket:[")}
 
 
 def open_ports(pid: int) -> set[int]:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The end of a test session leaves no process behind, also when roslaunch itself was killed."""
+
 from __future__ import annotations
 
 import os
@@ -9,8 +10,9 @@ from ros_session import RosSession, until
 
 
 def test_a_session_whose_roslaunch_was_killed_leaves_no_master_behind(session: RosSession) -> None:
-    launch = session.launch_package("modular_framework_core", "manage_object.launch", object_type="cube",
-                                    object_name="a", object_position="0 0 0")
+    launch = session.launch_package(
+        "modular_framework_core", "manage_object.launch", object_type="cube", object_name="a", object_position="0 0 0"
+    )
     until(lambda: len(session.processes()) >= 3, "roslaunch, its master and a node run", 60.0)
     os.kill(launch.process.pid, signal.SIGKILL)
     launch.process.wait(30.0)

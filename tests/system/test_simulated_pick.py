@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The main job: one command, a simulated robot, a picked object."""
+
 from __future__ import annotations
 
 import json
@@ -56,12 +57,17 @@ def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None
     assert "unknown argument 'robot_packag'; did you mean 'robot_package'" in launch.log()
 
 
-@pytest.mark.parametrize(("name", "value", "code", "cause"), [
-    ("simulation", "flase", 2, "argument 'simulation' is 'flase', allowed are true and false"),
-    ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: there is no such file"),
-    ("world_file", "no.world", 3, "node 'gazebo' died .*no.world: cannot be read")])
+@pytest.mark.parametrize(
+    ("name", "value", "code", "cause"),
+    [
+        ("simulation", "flase", 2, "argument 'simulation' is 'flase', allowed are true and false"),
+        ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: there is no such file"),
+        ("world_file", "no.world", 3, "node 'gazebo' died .*no.world: cannot be read"),
+    ],
+)
 def test_the_last_lines_say_what_is_wrong_and_no_interrupted_node_prints_a_traceback(
-        session: RosSession, name: str, value: str, code: int, cause: str) -> None:
+    session: RosSession, name: str, value: str, code: int, cause: str
+) -> None:
     launch = session.run_framework(gui="false", rviz="false", **{name: value})
     assert launch.wait(TASK_TIMEOUT_S) == code, launch.log()
     assert re.search(cause, "\n".join(launch.log().splitlines()[-2:])), launch.log()

@@ -3,6 +3,7 @@
 
 Other examples: `HYPOTHESIS_PROFILE=default tests/run unit -m hypothesis --hypothesis-seed=NUMBER`.
 """
+
 from __future__ import annotations
 
 import os

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Starter of the manipulator's own node."""
+
 from modular_framework_ros.node_start import run_node
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The window that launch files start for use_gui:=true publishes joint states."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

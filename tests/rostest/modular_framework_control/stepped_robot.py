@@ -4,6 +4,7 @@
 Time passes only in `step` and `trace`. While the test waits for ROS, the loop goes on at the time it has: what a client
 sends then is taken up exactly at that time, however long its message took.
 """
+
 from __future__ import annotations
 
 import threading
@@ -166,8 +167,9 @@ def trajectory_of(names: list[str], *points: Any, stamp_s: float = 0.0) -> Joint
     message.header.stamp = rospy.Time.from_sec(stamp_s)
     for time_s, positions, *more in points:
         rows = [[0.0] * len(positions)] * 2 if more == [None] else more
-        message.points.append(JointTrajectoryPoint(positions, *rows, *[[]] * (2 - len(rows)), [],
-                                                   rospy.Duration.from_sec(time_s)))
+        message.points.append(
+            JointTrajectoryPoint(positions, *rows, *[[]] * (2 - len(rows)), [], rospy.Duration.from_sec(time_s))
+        )
     return message
 
 
@@ -194,16 +196,20 @@ class Arm:
         """Send a goal that comes to rest at each point, and wait until it runs or is refused; answers its handle."""
         return self.send_goal(self.goal(*((*point, None) if len(point) == 2 else point for point in points), **more))
 
-    def goal(self, *points: Any, stamp_s: float = 0.0, names: list[str] | None = None,
-             **more: Any) -> FollowJointTrajectoryGoal:
+    def goal(
+        self, *points: Any, stamp_s: float = 0.0, names: list[str] | None = None, **more: Any
+    ) -> FollowJointTrajectoryGoal:
         """A goal message."""
         return FollowJointTrajectoryGoal(trajectory=self.trajectory(*points, stamp_s=stamp_s, names=names), **more)
 
     def send_goal(self, goal: FollowJointTrajectoryGoal, feedback: Callable[..., None] | None = None) -> Any:
         """Send a goal as it is."""
         handle = self.action.send_goal(goal, feedback_cb=feedback)
-        self.robot.wait_until(lambda: handle.get_comm_state() not in (actionlib.CommState.WAITING_FOR_GOAL_ACK,
-                                                                        actionlib.CommState.PENDING))
+        self.robot.wait_until(
+            lambda: (
+                handle.get_comm_state() not in (actionlib.CommState.WAITING_FOR_GOAL_ACK, actionlib.CommState.PENDING)
+            )
+        )
         return handle
 
     def result(self, handle: Any) -> tuple[str, int, str]:

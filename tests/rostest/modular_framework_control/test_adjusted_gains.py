@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gains of running controllers, adjusted by dynamic_reconfigure as rqt_reconfigure does it."""
+
 from __future__ import annotations
 
 import math
@@ -37,12 +38,19 @@ def robot(ros_session: Any) -> Any:
     return ros_session
 
 
-@pytest.mark.parametrize(("server", "gains"), [
-    ("push/pid", (5.0, 1.0, 0.0, -0.5, 0.5, False)), ("lift/gains/rail", (5.0, 0.0, 0.0, -2.0, 0.0, True)),
-    ("grip/gains/finger", (10.0, 0.0, 0.0, 0.0, 0.0, False)), ("pair/a/pid", (10.0, 0.0, 0.0, 0.0, 0.0, False)),
-    ("pair/b/pid", (20.0, 0.0, 1.0, 0.0, 0.0, False))])
-def test_each_joint_with_gains_has_a_server_that_begins_with_its_parameters(server: str,
-                                                                           gains: tuple[Any, ...]) -> None:
+@pytest.mark.parametrize(
+    ("server", "gains"),
+    [
+        ("push/pid", (5.0, 1.0, 0.0, -0.5, 0.5, False)),
+        ("lift/gains/rail", (5.0, 0.0, 0.0, -2.0, 0.0, True)),
+        ("grip/gains/finger", (10.0, 0.0, 0.0, 0.0, 0.0, False)),
+        ("pair/a/pid", (10.0, 0.0, 0.0, 0.0, 0.0, False)),
+        ("pair/b/pid", (20.0, 0.0, 1.0, 0.0, 0.0, False)),
+    ],
+)
+def test_each_joint_with_gains_has_a_server_that_begins_with_its_parameters(
+    server: str, gains: tuple[Any, ...]
+) -> None:
     names = ("p", "i", "d", "i_clamp_min", "i_clamp_max", "antiwindup")
     assert gains_of(Client(server, timeout=30.0)) == dict(zip(names, gains, strict=True))
 
@@ -67,8 +75,10 @@ def test_a_gain_that_is_no_number_is_refused_and_named(robot: Any) -> None:
     client = Client("lift/gains/rail", timeout=30.0)
     for number in (math.nan, math.inf):
         assert client.update_configuration({"p": number})["p"] == 5.0
-    until(lambda: "/lift/gains/rail/p: got nan; allowed is -100000.0 to 100000.0; 5.0 stays" in robot.log(),
-          "the reason in the log")
+    until(
+        lambda: "/lift/gains/rail/p: got nan; allowed is -100000.0 to 100000.0; 5.0 stays" in robot.log(),
+        "the reason in the log",
+    )
 
 
 def test_a_trajectory_stops_being_followed_when_its_gain_is_taken_away_and_goes_on_with_it() -> None:
@@ -80,8 +90,9 @@ def test_a_trajectory_stops_being_followed_when_its_gain_is_taken_away_and_goes_
     until(command.get_num_connections, "lift/command has a subscriber")
     command.publish(message)
     positions: list[float] = []
-    subscriber = rospy.Subscriber("joint_states", JointState,
-                                  lambda heard: positions.append(heard.position[heard.name.index("rail")]))
+    subscriber = rospy.Subscriber(
+        "joint_states", JointState, lambda heard: positions.append(heard.position[heard.name.index("rail")])
+    )
     until(lambda: len(positions) > 50, "fifty cycles")
     assert set(positions) == {0.0}
     client.update_configuration({"p": 20.0})

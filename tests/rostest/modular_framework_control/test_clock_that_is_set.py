@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node robot_hw while somebody sets the clock of the system: motions go on, stamps of messages follow the clock."""
+
 from __future__ import annotations
 
 import threading
@@ -40,8 +41,14 @@ def clock(ros_session: Any) -> Iterator[SetClock]:
     for name, value in {"joints": ["shoulder"], "rate": 100, "real_time": False}.items():
         rospy.set_param(f"~{name}", value)
     rospy.set_param("/states", {"type": "joint_state_controller/JointStateController"})
-    rospy.set_param("/arm", {"type": "position_controllers/JointTrajectoryController", "joints": ["shoulder"],
-                             "constraints": {"goal_time": 10.0}})
+    rospy.set_param(
+        "/arm",
+        {
+            "type": "position_controllers/JointTrajectoryController",
+            "joints": ["shoulder"],
+            "constraints": {"goal_time": 10.0},
+        },
+    )
     system, ended = SetClock(), threading.Event()
     node = RobotHwNode(ended, system.loop_time)
     node.connect()
@@ -68,14 +75,18 @@ def arm(clock: SetClock) -> actionlib.SimpleActionClient:
 def move(client: actionlib.SimpleActionClient, position: float, duration_s: float, stamp_s: float = 0.0) -> None:
     trajectory = JointTrajectory(joint_names=["shoulder"])
     trajectory.header.stamp = rospy.Time.from_sec(stamp_s)
-    trajectory.points.append(JointTrajectoryPoint(positions=[position], velocities=[0.0],
-                                                  time_from_start=rospy.Duration.from_sec(duration_s)))
+    trajectory.points.append(
+        JointTrajectoryPoint(
+            positions=[position], velocities=[0.0], time_from_start=rospy.Duration.from_sec(duration_s)
+        )
+    )
     client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
 
 
 @pytest.mark.parametrize("step_s", [-HOUR_S, HOUR_S, -0.5])
 def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_clock_that_was_set(
-        clock: SetClock, arm: actionlib.SimpleActionClient, step_s: float) -> None:
+    clock: SetClock, arm: actionlib.SimpleActionClient, step_s: float
+) -> None:
     told: list[tuple[JointState, float]] = []
     here = rospy.wait_for_message("joint_states", JointState, 30.0).position[0]
     subscriber = rospy.Subscriber("joint_states", JointState, lambda message: told.append((message, clock())))

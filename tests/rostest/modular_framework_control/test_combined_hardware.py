@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A list of hardware, one of a package that a user wrote, run as one robot by the node robot_hw."""
+
 from __future__ import annotations
 
 import threading
@@ -78,11 +79,13 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> str:
     (folder / "package.xml").write_text(
         '<package format="3"><name>lab_gripper</name><version>0.0.0</version><description>d</description>'
         '<maintainer email="a@b.cd">a</maintainer><license>BSD-3-Clause</license>'
-        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>')
+        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>'
+    )
     (folder / "plugins.xml").write_text(
         '<library path="lab_gripper_hw"><class name="lab_gripper/LabGripper" type="LabGripper" '
         'base_class_type="hardware_interface::RobotHW"/><class name="lab_gripper/LabSnail" type="LabSnail" '
-        'base_class_type="hardware_interface::RobotHW"/></library>')
+        'base_class_type="hardware_interface::RobotHW"/></library>'
+    )
     return ENVIRONMENT.format(folder=Path(folder))
 
 
@@ -94,8 +97,9 @@ def says(topic: str, timeout_s: float) -> bool:
     return answer
 
 
-def test_controllers_can_be_loaded_once_every_listed_hardware_is_ready(ros_launch: Callable[..., Any],
-                                                                       environment: str) -> None:
+def test_controllers_can_be_loaded_once_every_listed_hardware_is_ready(
+    ros_launch: Callable[..., Any], environment: str
+) -> None:
     ros_launch(LAUNCH.format(environment=environment))
     switch_on = rospy.Publisher("switch_on", Bool, queue_size=1, latch=True)
     deadline = time.monotonic() + 60.0
@@ -122,10 +126,13 @@ def test_a_controller_sees_the_joints_of_all_hardware() -> None:
 
 def test_hardware_that_is_not_ready_unknown_or_late_is_told(ros_launch: Callable[..., Any], environment: str) -> None:
     session = ros_launch(FAILING.format(environment=environment))
-    expected = ("waited 1 s in vain for True on topic /never_said of hardware '/slow_hw'",
-                "unknown hardware type 'lab_gripper/LabLeg'",
-                "known: lab_gripper/LabGripper, lab_gripper/LabSnail, modular_framework_control/",
-                "cycles took too long", "its period is 20.0 ms")
+    expected = (
+        "waited 1 s in vain for True on topic /never_said of hardware '/slow_hw'",
+        "unknown hardware type 'lab_gripper/LabLeg'",
+        "known: lab_gripper/LabGripper, lab_gripper/LabSnail, modular_framework_control/",
+        "cycles took too long",
+        "its period is 20.0 ms",
+    )
     deadline = time.monotonic() + 60.0
     while not all(words in session.log() for words in expected):
         assert time.monotonic() < deadline, session.log()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers commanded by a topic, and one of a package that a user wrote, as clients see them."""
+
 from __future__ import annotations
 
 import time
@@ -64,10 +65,12 @@ def robot(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFacto
     (folder / "package.xml").write_text(
         '<package format="3"><name>lab_nodder</name><version>0.0.0</version><description>d</description>'
         '<maintainer email="a@b.cd">a</maintainer><license>BSD-3-Clause</license>'
-        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>')
+        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>'
+    )
     (folder / "plugins.xml").write_text(
         '<library path="lab_nodder_controllers"><class name="lab_nodder/Nodder" type="Nodder" '
-        'base_class_type="controller_interface::ControllerBase"/></library>')
+        'base_class_type="controller_interface::ControllerBase"/></library>'
+    )
     session = ros_launch(LAUNCH.format(folder=folder))
     for name in CONTROLLERS:
         assert call("load_controller", LoadController, name).ok, name
@@ -96,8 +99,11 @@ def publisher(topic: str, kind: Any) -> rospy.Publisher:
 
 def test_a_group_goes_where_its_topic_says_and_ignores_what_does_not_fit() -> None:
     seen: set[tuple[float, float]] = set()
-    subscriber = rospy.Subscriber("joint_states", JointState, lambda message: seen.add(
-        tuple(message.position[message.name.index(name)] for name in ("shoulder", "elbow"))))
+    subscriber = rospy.Subscriber(
+        "joint_states",
+        JointState,
+        lambda message: seen.add(tuple(message.position[message.name.index(name)] for name in ("shoulder", "elbow"))),
+    )
     command = publisher("arm/command", Float64MultiArray)
     command.publish(Float64MultiArray(data=[0.1, -0.2]))
     wait_until(lambda positions: positions["shoulder"] == 0.1 and positions["elbow"] == -0.2)

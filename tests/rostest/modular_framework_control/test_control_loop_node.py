@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node robot_hw as an operator sees it: its figures, its faults, how it waits for its hardware and how it ends."""
+
 from __future__ import annotations
 
 import os
@@ -113,12 +114,17 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> str:
     (folder / "package.xml").write_text(
         '<package format="3"><name>lab_arm</name><version>0.0.0</version><description>d</description>'
         '<maintainer email="a@b.cd">a</maintainer><license>BSD-3-Clause</license>'
-        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>')
-    classes = "".join(f'<class name="lab_arm/{name}" type="{name}" base_class_type="hardware_interface::RobotHW"/>'
-                      for name in ("LabArm", "LabWheel"))
+        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>'
+    )
+    classes = "".join(
+        f'<class name="lab_arm/{name}" type="{name}" base_class_type="hardware_interface::RobotHW"/>'
+        for name in ("LabArm", "LabWheel")
+    )
     (folder / "plugins.xml").write_text(f'<library path="lab_arm_hw">{classes}</library>')
-    return (f'<env name="ROS_PACKAGE_PATH" value="{folder}:$(env ROS_PACKAGE_PATH)"/>'
-            f'<env name="PYTHONPATH" value="{folder}:$(env PYTHONPATH)"/>')
+    return (
+        f'<env name="ROS_PACKAGE_PATH" value="{folder}:$(env ROS_PACKAGE_PATH)"/>'
+        f'<env name="PYTHONPATH" value="{folder}:$(env PYTHONPATH)"/>'
+    )
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +183,8 @@ while time.monotonic() < end_s:
 
 
 def test_a_processor_that_something_more_urgent_takes_away_costs_hardly_a_cycle(
-        robot: Any, real_time_permitted: bool) -> None:
+    robot: Any, real_time_permitted: bool
+) -> None:
     processors = sorted(os.sched_getaffinity(0))[-2:]
     if len(processors) < 2 or not real_time_permitted:
         pytest.skip("needs two processors and the right to real-time scheduling")
@@ -191,13 +198,19 @@ def test_a_processor_that_something_more_urgent_takes_away_costs_hardly_a_cycle(
 
 
 def test_what_every_controller_claims_is_listed_on_the_wire(robot: Any) -> None:
-    listed = {entry.name: entry for entry in
-              rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller}
-    claims = {name: [(claim.hardware_interface, claim.resources) for claim in entry.claimed_resources]
-              for name, entry in listed.items()}
-    assert claims == {"arm": [("hardware_interface::PositionJointInterface", ["shoulder", "elbow"])],
-                      "wheel": [("hardware_interface::VelocityJointInterface", ["wheel"])],
-                      "wrench": [("hardware_interface::ForceTorqueSensorInterface", [])]}
+    listed = {
+        entry.name: entry
+        for entry in rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller
+    }
+    claims = {
+        name: [(claim.hardware_interface, claim.resources) for claim in entry.claimed_resources]
+        for name, entry in listed.items()
+    }
+    assert claims == {
+        "arm": [("hardware_interface::PositionJointInterface", ["shoulder", "elbow"])],
+        "wheel": [("hardware_interface::VelocityJointInterface", ["wheel"])],
+        "wrench": [("hardware_interface::ForceTorqueSensorInterface", [])],
+    }
 
 
 def test_a_sensor_is_published_under_its_name(robot: Any) -> None:
@@ -250,15 +263,17 @@ def test_rosnode_kill_ends_goals_like_a_signal(ros_launch: Callable[..., Any]) -
     rospy.wait_for_service("second/controller_manager/load_controller", 60.0)
     assert rospy.ServiceProxy("second/controller_manager/load_controller", LoadController)("arm").ok
     assert rospy.ServiceProxy("second/controller_manager/switch_controller", SwitchController)(
-        ["arm"], [], 2, False, 0.0).ok
+        ["arm"], [], 2, False, 0.0
+    ).ok
     arm = follow("second/arm", ["shoulder"], [1.0], 60.0)
     subprocess.run(["rosnode", "kill", "/second/robot_hw"], env=session.env, check=True, timeout=60.0)
     assert arm.wait_for_result(rospy.Duration(30.0)), "the end of the goal is not lost with the node"
     assert arm.get_state() == GoalStatus.PREEMPTED and "stopped" in arm.get_goal_status_text()
 
 
-def test_every_listed_hardware_that_is_not_ready_in_time_is_named(ros_launch: Callable[..., Any],
-                                                                 environment: str) -> None:
+def test_every_listed_hardware_that_is_not_ready_in_time_is_named(
+    ros_launch: Callable[..., Any], environment: str
+) -> None:
     session = ros_launch(WAITING.format(environment=environment))
     expected = "waited 1 s in vain for True on topic /a_ready of hardware 'a', topic /b_ready of hardware 'b';"
     deadline = time.monotonic() + 60.0

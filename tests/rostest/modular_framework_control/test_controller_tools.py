@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command-line tools for controllers, run as a user runs them."""
+
 from __future__ import annotations
 
 import re
@@ -29,8 +30,9 @@ def tool(session: Any) -> Iterator[Callable[..., Any]]:
 
     def start(name: str, *arguments: str) -> subprocess.Popen[str]:
         command = ["rosrun", "controller_manager", name, *arguments]
-        started.append(subprocess.Popen(command, env=session.env, text=True, stdout=subprocess.PIPE,
-                                        stderr=subprocess.STDOUT))
+        started.append(
+            subprocess.Popen(command, env=session.env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        )
         return started[-1]
 
     yield start
@@ -75,8 +77,9 @@ def kill_node(session: Any, name: str) -> None:
 
 
 @pytest.mark.parametrize("how", ["SIGTERM", "rosnode kill"])
-def test_spawner_and_unspawner_clean_up_however_they_are_ended(tool: Callable[..., Any], session: Any,
-                                                               how: str) -> None:
+def test_spawner_and_unspawner_clean_up_however_they_are_ended(
+    tool: Callable[..., Any], session: Any, how: str
+) -> None:
     def end(process: subprocess.Popen[str], name: str) -> str:
         if how == "SIGTERM":
             process.send_signal(signal.SIGTERM)
@@ -123,34 +126,49 @@ def test_a_spawner_starts_what_it_can_and_tells_what_it_cannot(tool: Callable[..
     process.send_signal(signal.SIGINT)
     code, output = run(process)
     assert code == 1 and states() == {}
-    for text in ("Loading controller: states", "Failed to load absent", "Controller Spawner: Loaded controllers: "
-                 "states, arm", "Started controllers: states, arm", "not spawned: absent"):
+    for text in (
+        "Loading controller: states",
+        "Failed to load absent",
+        "Controller Spawner: Loaded controllers: states, arm",
+        "Started controllers: states, arm",
+        "not spawned: absent",
+    ):
         assert text in output, output
 
 
 def test_the_manager_tool_does_and_lists(tool: Callable[..., Any]) -> None:
     assert run(tool("controller_manager", "list")) == (0, "No controllers are loaded in mechanism control\n")
     assert run(tool("controller_manager", "spawn", "states")) == (
-        0, "Loaded 'states'\nStarted ['states'] successfully\n")
+        0,
+        "Loaded 'states'\nStarted ['states'] successfully\n",
+    )
     code, output = run(tool("controller_manager", "list"))
     assert (code, output) == (0, "'states' - 'hardware_interface::JointStateInterface' ( running )\n")
     assert "position_controllers/JointTrajectoryController" in run(tool("controller_manager", "list-types"))[1]
     assert run(tool("controller_manager", "reload-libraries", "--restore"))[0] == 0
     assert states() == {"states": "running"}
-    assert run(tool("controller_manager", "kl", "states")) == (0, "Stopped ['states'] successfully\n"
-                                                               "Unloaded 'states' successfully\n")
+    assert run(tool("controller_manager", "kl", "states")) == (
+        0,
+        "Stopped ['states'] successfully\nUnloaded 'states' successfully\n",
+    )
     assert states() == {}
 
 
 def test_groups_are_listed_started_and_exchanged(tool: Callable[..., Any]) -> None:
     assert run(tool("controller_group", "list")) == (
-        0, "Number of groups: 3\n  clash\n      jog\n      arm\n  follow\n      states\n      arm\n"
-           "  teach\n      states\n      jog\n")
+        0,
+        "Number of groups: 3\n  clash\n      jog\n      arm\n  follow\n      states\n      arm\n"
+        "  teach\n      states\n      jog\n",
+    )
     assert run(tool("controller_group", "spawn", "follow")) == (
-        0, "Loaded 'states'\nLoaded 'arm'\nStarted ['states'] successfully\nStarted ['arm'] successfully\n")
+        0,
+        "Loaded 'states'\nLoaded 'arm'\nStarted ['states'] successfully\nStarted ['arm'] successfully\n",
+    )
     assert states() == {"states": "running", "arm": "running"}
-    assert run(tool("controller_group", "switch", "teach")) == (0, "Loaded 'jog'\nStarted ['jog'] successfully\n"
-                                                                "Stopped ['arm'] successfully\n")
+    assert run(tool("controller_group", "switch", "teach")) == (
+        0,
+        "Loaded 'jog'\nStarted ['jog'] successfully\nStopped ['arm'] successfully\n",
+    )
     assert states() == {"states": "running", "arm": "stopped", "jog": "running"}
     code, output = run(tool("controller_group", "switch", "clash"))
     assert code == 0 and "Error when starting ['arm'] and stopping ['states']\n" in output
@@ -203,10 +221,13 @@ def test_a_spawner_has_patience_with_a_simulation_whose_clock_has_not_begun(tool
 
 
 def test_what_fails_is_named_and_is_the_exit_code(tool: Callable[..., Any]) -> None:
-    processes = {"controller 'absent' was not loaded": tool("controller_manager", "load", "absent"),
-                 "name at least one controller": tool("controller_manager", "start"),
-                 "waited 1 s for service /elsewhere/controller_manager/list_controllers":
-                     tool("spawner", "--timeout", "1", "--namespace", "/elsewhere", "arm")}
+    processes = {
+        "controller 'absent' was not loaded": tool("controller_manager", "load", "absent"),
+        "name at least one controller": tool("controller_manager", "start"),
+        "waited 1 s for service /elsewhere/controller_manager/list_controllers": tool(
+            "spawner", "--timeout", "1", "--namespace", "/elsewhere", "arm"
+        ),
+    }
     for words, process in processes.items():
         code, output = run(process)
         assert code == 1

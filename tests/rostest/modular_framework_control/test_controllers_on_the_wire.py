@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The controllers as clients see them: actions, topics and services of a running control loop with fake hardware."""
+
 from __future__ import annotations
 
 import math
@@ -74,8 +75,14 @@ def trajectory(*points: tuple[float, list[float]], names: list[str] | None = Non
     message = JointTrajectory(joint_names=JOINTS if names is None else names)
     for time_s, positions in points:
         zeros = [0.0] * len(positions)
-        message.points.append(JointTrajectoryPoint(positions=positions, velocities=zeros, accelerations=zeros,
-                                                   time_from_start=rospy.Duration.from_sec(time_s)))
+        message.points.append(
+            JointTrajectoryPoint(
+                positions=positions,
+                velocities=zeros,
+                accelerations=zeros,
+                time_from_start=rospy.Duration.from_sec(time_s),
+            )
+        )
     return message
 
 
@@ -137,16 +144,20 @@ def test_a_goal_violation_is_aborted_after_goal_time(arm: actionlib.SimpleAction
     assert "'elbow'" in result.error_string and "goal_time" in result.error_string
 
 
-@pytest.mark.parametrize(("message", "code", "words"), [
-    (goal((0.5, [0.0, 0.0]), names=["shoulder", "wrist"]), -2, "unknown joint 'wrist'"),
-    (goal((0.5, [0.0]), names=["shoulder"]), -2, "joints missing: elbow"),
-    (goal((0.5, [0.0, math.nan])), -1, "position of joint 'elbow' (index 1) is nan; expected a finite number"),
-    (goal((0.5, [0.0])), -1, "has 1 positions; expected 2"),
-    (goal((0.5, [0.0, 0.0]), (0.4, [0.0, 0.0])), -1, "must increase strictly"),
-    (goal((0.0, [0.0, 0.0])), -1, "past"),
-])
+@pytest.mark.parametrize(
+    ("message", "code", "words"),
+    [
+        (goal((0.5, [0.0, 0.0]), names=["shoulder", "wrist"]), -2, "unknown joint 'wrist'"),
+        (goal((0.5, [0.0]), names=["shoulder"]), -2, "joints missing: elbow"),
+        (goal((0.5, [0.0, math.nan])), -1, "position of joint 'elbow' (index 1) is nan; expected a finite number"),
+        (goal((0.5, [0.0])), -1, "has 1 positions; expected 2"),
+        (goal((0.5, [0.0, 0.0]), (0.4, [0.0, 0.0])), -1, "must increase strictly"),
+        (goal((0.0, [0.0, 0.0])), -1, "past"),
+    ],
+)
 def test_a_malformed_goal_is_rejected_with_code_and_reason(
-        arm: actionlib.SimpleActionClient, message: FollowJointTrajectoryGoal, code: int, words: str) -> None:
+    arm: actionlib.SimpleActionClient, message: FollowJointTrajectoryGoal, code: int, words: str
+) -> None:
     arm.send_goal(message)
     result = finish(arm)
     assert arm.get_state() == GoalStatus.REJECTED
@@ -265,7 +276,8 @@ def test_types_and_claimed_joints_are_listed(robot: Any) -> None:
 
 
 def test_stopping_a_controller_ends_its_goal_and_reloading_unloads_everything(
-        arm: actionlib.SimpleActionClient) -> None:
+    arm: actionlib.SimpleActionClient,
+) -> None:
     here = positions()
     arm.send_goal(goal((30.0, [here["shoulder"] + 3.0, here["elbow"]])))
     wait_until_shoulder(lambda position: position > here["shoulder"])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rules of ros_controllers' gripper controller, one by one, as a client meets them, in simulated time."""
+
 from __future__ import annotations
 
 import sys
@@ -22,10 +23,21 @@ PARAMETERS: dict[str, Any] = {
     "joint_limits": {"knuckle": {"has_velocity_limits": True, "max_velocity": 1.0}},
     "by_position": {"type": "by_position", "joints": ["knuckle"]},
     "by_effort": {"type": "by_effort", "joints": ["jaw"], "command_interface": "EffortJointInterface"},
-    "soft": {"type": "position_controllers/GripperActionController", "joint": "knuckle", "stall_timeout": 0.3,
-             "goal_tolerance": 0.02, "action_monitor_rate": 10.0},
-    "strong": {"type": "effort_controllers/GripperActionController", "joint": "jaw", "stall_timeout": 0.3,
-               "goal_tolerance": 0.02, "max_effort": 4.0, "gains": {"jaw": {"p": 100.0, "d": 20.0}}},
+    "soft": {
+        "type": "position_controllers/GripperActionController",
+        "joint": "knuckle",
+        "stall_timeout": 0.3,
+        "goal_tolerance": 0.02,
+        "action_monitor_rate": 10.0,
+    },
+    "strong": {
+        "type": "effort_controllers/GripperActionController",
+        "joint": "jaw",
+        "stall_timeout": 0.3,
+        "goal_tolerance": 0.02,
+        "max_effort": 4.0,
+        "gains": {"jaw": {"p": 100.0, "d": 20.0}},
+    },
 }
 
 
@@ -47,15 +59,21 @@ class Gripper:
     def send(self, position: float, max_effort: float = 0.0, feedback: Any = None) -> Any:
         """Send a goal and wait until it runs or is refused."""
         handle = self._action.send_goal(GripperCommandGoal(GripperCommand(position, max_effort)), feedback_cb=feedback)
-        self._robot.wait_until(lambda: handle.get_comm_state() not in (actionlib.CommState.WAITING_FOR_GOAL_ACK,
-                                                                        actionlib.CommState.PENDING))
+        self._robot.wait_until(
+            lambda: (
+                handle.get_comm_state() not in (actionlib.CommState.WAITING_FOR_GOAL_ACK, actionlib.CommState.PENDING)
+            )
+        )
         return handle
 
     def result(self, handle: Any) -> tuple[str, Any, str]:
         """State, result and text of a goal that has ended."""
         self._robot.wait_until(lambda: handle.get_comm_state() == actionlib.CommState.DONE)
-        return (actionlib.TerminalState.to_string(handle.get_terminal_state()), handle.get_result(),
-                handle.get_goal_status_text())
+        return (
+            actionlib.TerminalState.to_string(handle.get_terminal_state()),
+            handle.get_result(),
+            handle.get_goal_status_text(),
+        )
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +124,9 @@ def test_a_goal_without_effort_has_that_of_the_parameter(robot: SteppedRobot, gr
         assert gripper.commanded.max_effort == 0.0
 
 
-def test_a_new_goal_preempts_and_a_cancelled_one_leaves_the_joint_where_it_is(robot: SteppedRobot,
-                                                                              gripper: Gripper) -> None:
+def test_a_new_goal_preempts_and_a_cancelled_one_leaves_the_joint_where_it_is(
+    robot: SteppedRobot, gripper: Gripper
+) -> None:
     first = gripper.send(0.9)
     second = gripper.send(0.8)
     assert gripper.result(first)[0] == "PREEMPTED"
@@ -119,8 +138,9 @@ def test_a_new_goal_preempts_and_a_cancelled_one_leaves_the_joint_where_it_is(ro
 
 
 @pytest.mark.parametrize(("position", "effort"), [(float("nan"), 0.0), (float("inf"), 0.0), (0.1, float("nan"))])
-def test_a_goal_that_makes_no_sense_is_refused_with_what_was_got_and_is_allowed(gripper: Gripper, position: float,
-                                                                                effort: float) -> None:
+def test_a_goal_that_makes_no_sense_is_refused_with_what_was_got_and_is_allowed(
+    gripper: Gripper, position: float, effort: float
+) -> None:
     state, _, text = gripper.result(gripper.send(position, effort))
     assert state == "REJECTED"
     assert f"got position {position}, max_effort {effort}; expected finite numbers" in text
@@ -141,8 +161,9 @@ def test_feedback_comes_at_its_rate(robot: SteppedRobot) -> None:
     soft.hardware.blocked = {}
 
 
-def test_a_hardware_fault_aborts_with_its_reason_and_refuses_goals_until_it_is_over(robot: SteppedRobot,
-                                                                                   gripper: Gripper) -> None:
+def test_a_hardware_fault_aborts_with_its_reason_and_refuses_goals_until_it_is_over(
+    robot: SteppedRobot, gripper: Gripper
+) -> None:
     gripper.hardware.blocked = {gripper.joint: 0.4}
     handle = gripper.send(0.9)
     robot.step(2)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of mobile bases as navigation sees them: topics, frames, adjustable settings."""
+
 from __future__ import annotations
 
 import math
@@ -90,11 +91,12 @@ def test_the_base_drives_a_circle_of_the_radius_that_is_asked_for(odom: Heard, c
     cmd_vel.publish(twist(0.4, 0.8))
     moving = odom.when(lambda m: m.twist.twist.angular.z > 0.799, "it turns")
     assert moving.twist.twist.linear.x == pytest.approx(0.4, abs=1e-3)
-    for _ in range(2):      # the centre of the circle is where it was, wherever on it the base is
+    for _ in range(2):  # the centre of the circle is where it was, wherever on it the base is
         pose = odom.when(lambda m: m.header.stamp > moving.header.stamp, "a later one").pose.pose
         heading = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
         assert (pose.position.x, pose.position.y) == pytest.approx(
-            (0.5 * math.sin(heading), 0.5 * (1.0 - math.cos(heading))), abs=1e-6)
+            (0.5 * math.sin(heading), 0.5 * (1.0 - math.cos(heading))), abs=1e-6
+        )
     cmd_vel.publish(twist(0.0, 0.0))
     odom.when(lambda m: m.twist.twist.angular.z == 0.0, "it stands")
 
@@ -124,8 +126,9 @@ def test_a_second_publisher_brings_the_base_to_rest(cmd_vel: rospy.Publisher, ro
     out = Heard("drive/cmd_vel_out", TwistStamped)
     cmd_vel.publish(twist(0.3, 0.0))
     out.when(lambda m: m.twist.linear.x == 0.3, "it drives")
-    other = subprocess.Popen(["rostopic", "pub", "-r", "10", "/drive/cmd_vel", "geometry_msgs/Twist",
-                              "{linear: {x: 0.1}}"], env=robot.env)
+    other = subprocess.Popen(
+        ["rostopic", "pub", "-r", "10", "/drive/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.1}}"], env=robot.env
+    )
     try:
         out.when(lambda m: m.twist.linear.x == 0.0, "it stands")
         assert {m.twist.linear.x for m in out.messages} <= {0.0, 0.3}, "the other never drove it"
@@ -147,10 +150,15 @@ def test_a_second_publisher_brings_the_base_to_rest(cmd_vel: rospy.Publisher, ro
 def test_factors_and_rate_can_be_adjusted_while_it_runs(odom: Heard, cmd_vel: rospy.Publisher) -> None:
     client = Client("drive", timeout=30.0)
     assert {key: value for key, value in client.get_configuration().items() if key != "groups"} == {
-        "left_wheel_radius_multiplier": 1.0, "right_wheel_radius_multiplier": 1.0, "wheel_separation_multiplier": 1.0,
-        "publish_rate": 50.0, "enable_odom_tf": True}
-    applied = client.update_configuration({"left_wheel_radius_multiplier": 0.8, "right_wheel_radius_multiplier": 9.0,
-                                           "enable_odom_tf": False})
+        "left_wheel_radius_multiplier": 1.0,
+        "right_wheel_radius_multiplier": 1.0,
+        "wheel_separation_multiplier": 1.0,
+        "publish_rate": 50.0,
+        "enable_odom_tf": True,
+    }
+    applied = client.update_configuration(
+        {"left_wheel_radius_multiplier": 0.8, "right_wheel_radius_multiplier": 9.0, "enable_odom_tf": False}
+    )
     assert (applied["left_wheel_radius_multiplier"], applied["right_wheel_radius_multiplier"]) == (0.8, 1.5)
     wheels = Heard("drive/wheel_joint_controller_state", JointTrajectoryControllerState)
     cmd_vel.publish(twist(0.12, 0.0))
@@ -170,7 +178,8 @@ def test_factors_and_rate_can_be_adjusted_while_it_runs(odom: Heard, cmd_vel: ro
 
 def test_parameters_that_lack_are_an_error_of_the_log(robot: Any) -> None:
     assert not rospy.ServiceProxy("controller_manager/load_controller", LoadController)(
-        LoadControllerRequest("broken")).ok
+        LoadControllerRequest("broken")
+    ).ok
     until(lambda: "/broken/pose_covariance_diagonal: got None; expected six numbers" in robot.log(), "the reason")
 
 
@@ -179,7 +188,11 @@ def test_nothing_is_left_of_a_controller_that_was_unloaded(robot: Any) -> None:
     assert call("unload_controller", UnloadController, "drive").ok
     assert not call("list_controllers", ListControllers).controller
     publishers, subscribers, services = rosgraph.Master("/test").getSystemState()
-    left = [name for names in (publishers, subscribers, services) for name, nodes in names
-            if name.startswith("/drive/") and any("robot_hw" in node for node in nodes)]
+    left = [
+        name
+        for names in (publishers, subscribers, services)
+        for name, nodes in names
+        if name.startswith("/drive/") and any("robot_hw" in node for node in nodes)
+    ]
     assert not left
     assert call("load_controller", LoadController, "drive").ok, "it can be loaded again"

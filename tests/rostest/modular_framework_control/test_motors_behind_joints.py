@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Hardware of a user's package that knows motors, with the transmissions of the robot description in between."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-MODULE = '''
+MODULE = """
 import math
 from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
@@ -35,7 +36,7 @@ class Motors(RobotHW):
         for motor in self._transmissions.actuators.values():
             if math.isfinite(motor.command_position):
                 motor.position = motor.command_position
-'''
+"""
 INTERFACE = "<hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface>"
 WRIST = f"""  <transmission name="wrist"><type>transmission_interface/DifferentialTransmission</type>
     <joint name="pitch"><role>joint1</role>{INTERFACE}</joint>
@@ -84,10 +85,12 @@ def robot(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFacto
     (folder / "package.xml").write_text(
         '<package format="3"><name>lab_motors</name><version>0.0.0</version><description>d</description>'
         '<maintainer email="a@b.cd">a</maintainer><license>BSD-3-Clause</license>'
-        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>')
+        '<export><modular_framework_control plugin="${prefix}/plugins.xml"/></export></package>'
+    )
     (folder / "plugins.xml").write_text(
         '<library path="lab_motors_hw"><class name="lab_motors/Motors" type="Motors" '
-        'base_class_type="hardware_interface::RobotHW"/></library>')
+        'base_class_type="hardware_interface::RobotHW"/></library>'
+    )
     faulty = ROBOT.replace("actuator2", "actuator1").replace(">100<", ">0<")
     session = ros_launch(LAUNCH.format(folder=folder, good=quoteattr(ROBOT), faulty=quoteattr(faulty)))
     for name in ("states", "arm"):
@@ -98,22 +101,25 @@ def robot(ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFacto
 
 def test_joints_go_where_they_are_commanded_through_their_motors() -> None:
     seen: list[dict[str, float]] = []
-    subscriber = rospy.Subscriber("joint_states", JointState, lambda heard: seen.append(
-        dict(zip(heard.name, heard.position, strict=True))))
+    subscriber = rospy.Subscriber(
+        "joint_states", JointState, lambda heard: seen.append(dict(zip(heard.name, heard.position, strict=True)))
+    )
     until(lambda: seen, "a joint state")
     assert seen[0] == pytest.approx({"pitch": 0.0, "roll": 0.0, "elbow": 0.3}), "where the motors stand"
     command = rospy.Publisher("arm/command", Float64MultiArray, queue_size=1)
     until(command.get_num_connections, "arm/command has a subscriber")
     command.publish(Float64MultiArray(data=[5.0, 0.4, -0.2]))
-    wanted = {"pitch": 1.0, "roll": 0.4, "elbow": -0.2}     # the pitch as far as its limit
+    wanted = {"pitch": 1.0, "roll": 0.4, "elbow": -0.2}  # the pitch as far as its limit
     until(lambda: seen[-1] == pytest.approx(wanted, abs=1e-9), "the joints where they are commanded")
     subscriber.unregister()
 
 
 def test_a_description_with_faulty_transmissions_ends_the_node_with_each_fault_and_its_line(robot: Any) -> None:
-    reason = ("robot_description:6: transmission 'wrist': the roles of its <actuator> are 'actuator1', 'actuator1'; "
-              "expected <role>actuator1</role> in one and <role>actuator2</role> in the other; "
-              "robot_description:11: transmission 'elbow': <mechanicalReduction> of actuator 'm3' is '0'; expected a "
-              "number other than 0")
+    reason = (
+        "robot_description:6: transmission 'wrist': the roles of its <actuator> are 'actuator1', 'actuator1'; "
+        "expected <role>actuator1</role> in one and <role>actuator2</role> in the other; "
+        "robot_description:11: transmission 'elbow': <mechanicalReduction> of actuator 'm3' is '0'; expected a "
+        "number other than 0"
+    )
     until(lambda: reason in robot.log(), "the reason in the log")
     assert "Traceback" not in robot.log()

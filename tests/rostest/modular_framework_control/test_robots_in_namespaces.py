@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Two nodes robot_hw in the namespaces of two robots: each serves its own, and takes nothing of the other."""
+
 from __future__ import annotations
 
 import time
@@ -53,8 +54,9 @@ def test_each_moves_its_own_joint_within_its_own_limits(robots: Any, robot: str)
 
     def move(position: float) -> int:
         point = JointTrajectoryPoint(positions=[position], time_from_start=rospy.Duration.from_sec(0.3))
-        client.send_goal(FollowJointTrajectoryGoal(
-            trajectory=JointTrajectory(joint_names=[f"{robot}_joint"], points=[point])))
+        client.send_goal(
+            FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=[f"{robot}_joint"], points=[point]))
+        )
         assert client.wait_for_result(rospy.Duration(30.0))
         return client.get_state()
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The controllers under a simulated clock: it sets their pace, may stand still, and may jump back."""
+
 from __future__ import annotations
 
 import contextlib
@@ -101,7 +102,8 @@ def test_while_the_clock_stands_still_so_does_the_goal(clock: ClockSource, arm: 
 
 
 def test_after_the_clock_jumps_back_goals_end_and_new_ones_are_followed(
-        clock: ClockSource, arm: actionlib.SimpleActionClient) -> None:
+    clock: ClockSource, arm: actionlib.SimpleActionClient
+) -> None:
     move(arm, 3.0, 20.0)
     time.sleep(0.3)
     clock.time_s = 1.0
@@ -111,8 +113,11 @@ def test_after_the_clock_jumps_back_goals_end_and_new_ones_are_followed(
     assert arm.wait_for_result(rospy.Duration(30.0))
     assert arm.get_state() == GoalStatus.SUCCEEDED
     statuses: list[float] = []
-    subscriber = rospy.Subscriber("arm/follow_joint_trajectory/status", GoalStatusArray,
-                                  lambda message: statuses.append(message.header.stamp.to_sec()))
+    subscriber = rospy.Subscriber(
+        "arm/follow_joint_trajectory/status",
+        GoalStatusArray,
+        lambda message: statuses.append(message.header.stamp.to_sec()),
+    )
     end = time.monotonic() + 30.0
     while len(statuses) < 4:
         assert time.monotonic() < end, "the status topic must survive the jump"

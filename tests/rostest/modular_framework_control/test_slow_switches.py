@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Switching controllers of hardware that takes its time, by the service, in simulated time: start_asap and timeout."""
+
 from __future__ import annotations
 
 import sys
@@ -74,8 +75,9 @@ def states(robot: SteppedRobot) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(("start_asap", "meanwhile"), [(True, "running"), (False, "waiting")])
-def test_start_asap_starts_what_is_ready_and_without_it_all_start_together(robot: SteppedRobot, start_asap: bool,
-                                                                          meanwhile: str) -> None:
+def test_start_asap_starts_what_is_ready_and_without_it_all_start_together(
+    robot: SteppedRobot, start_asap: bool, meanwhile: str
+) -> None:
     switch = Switch(robot, start_asap, 0.0)
     robot.run(60.0)
     assert states(robot) == {"arm": meanwhile, "gripper": "waiting"}
@@ -87,7 +89,8 @@ def test_start_asap_starts_what_is_ready_and_without_it_all_start_together(robot
 
 @pytest.mark.parametrize(("start_asap", "arm"), [(True, "running"), (False, "aborted")])
 def test_when_the_time_is_up_the_rest_is_not_started_and_the_answer_is_no(
-        robot: SteppedRobot, start_asap: bool, arm: str, caplog: pytest.LogCaptureFixture) -> None:
+    robot: SteppedRobot, start_asap: bool, arm: str, caplog: pytest.LogCaptureFixture
+) -> None:
     switch = Switch(robot, start_asap, 5.0)
     robot.run(4.9)
     assert not switch.answered

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of bases that steer, as navigation sees them: a car, and a rover with four steered wheels."""
+
 from __future__ import annotations
 
 import math
@@ -66,12 +67,14 @@ def test_a_rover_walks_like_a_crab_and_publishes_its_angles() -> None:
     command = publisher("rover/cmd_four_wheel_steering", FourWheelSteering)
     angle = math.pi / 8.0
     command.publish(FourWheelSteering(speed=0.2, front_steering_angle=angle, rear_steering_angle=angle))
-    message = heard_until("rover/odom", Odometry, lambda m: abs(m.twist.twist.linear.y - 0.2 * math.sin(angle)) < 1e-3,
-                          "it walks")
+    message = heard_until(
+        "rover/odom", Odometry, lambda m: abs(m.twist.twist.linear.y - 0.2 * math.sin(angle)) < 1e-3, "it walks"
+    )
     assert message.twist.twist.linear.x == pytest.approx(0.2 * math.cos(angle), abs=1e-3)
     assert message.twist.twist.angular.z == pytest.approx(0.0, abs=1e-6)
-    state = heard_until("rover/odom_steer", FourWheelSteeringStamped, lambda m: abs(m.data.speed - 0.2) < 1e-3,
-                        "0.2 m/s")
+    state = heard_until(
+        "rover/odom_steer", FourWheelSteeringStamped, lambda m: abs(m.data.speed - 0.2) < 1e-3, "0.2 m/s"
+    )
     assert (state.data.front_steering_angle, state.data.rear_steering_angle) == pytest.approx((angle, angle), abs=1e-5)
     assert state.header.frame_id == "odom"
     command.publish(FourWheelSteering(speed=math.nan))
@@ -83,8 +86,9 @@ def test_a_rover_turns_with_both_axles() -> None:
     command = publisher("rover/cmd_vel", Twist)
     command.publish(twist(0.5, 0.25))
     heard_until("rover/odom", Odometry, lambda m: abs(m.twist.twist.angular.z - 0.25) < 1e-3, "it turns")
-    state = heard_until("rover/odom_steer", FourWheelSteeringStamped, lambda m: m.data.front_steering_angle > 0.4,
-                        "it steers")
+    state = heard_until(
+        "rover/odom_steer", FourWheelSteeringStamped, lambda m: m.data.front_steering_angle > 0.4, "it steers"
+    )
     assert state.data.rear_steering_angle == pytest.approx(-state.data.front_steering_angle, abs=1e-5)
     assert math.tan(state.data.front_steering_angle) == pytest.approx(0.25 * 1.9 / 2.0 / 0.5, rel=1e-3)
     command.publish(twist(0.0, 0.0))
@@ -94,9 +98,15 @@ def test_a_rover_turns_with_both_axles() -> None:
 def test_frames_and_claims_of_both_are_there() -> None:
     for name in ("car", "rover"):
         heard_until("/tf", TFMessage, lambda m, name=name: m.transforms[0].child_frame_id == name, f"the frame {name}")
-    claims = {entry.name: {claim.hardware_interface: set(claim.resources) for claim in entry.claimed_resources}
-              for entry in call("list_controllers", ListControllers).controller}
-    assert claims["car"] == {"hardware_interface::VelocityJointInterface": {"rear_wheel_joint"},
-                             "hardware_interface::PositionJointInterface": {"front_steer_joint"}}
-    assert claims["rover"] == {"hardware_interface::VelocityJointInterface": set(WHEELS),
-                               "hardware_interface::PositionJointInterface": {f"s_{name}" for name in WHEELS}}
+    claims = {
+        entry.name: {claim.hardware_interface: set(claim.resources) for claim in entry.claimed_resources}
+        for entry in call("list_controllers", ListControllers).controller
+    }
+    assert claims["car"] == {
+        "hardware_interface::VelocityJointInterface": {"rear_wheel_joint"},
+        "hardware_interface::PositionJointInterface": {"front_steer_joint"},
+    }
+    assert claims["rover"] == {
+        "hardware_interface::VelocityJointInterface": set(WHEELS),
+        "hardware_interface::PositionJointInterface": {f"s_{name}" for name in WHEELS},
+    }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rules of ros_controllers' trajectory controller, one by one, as a client of actions and topics meets them, in
 simulated time."""
+
 from __future__ import annotations
 
 import math
@@ -21,10 +22,22 @@ from trajectory_msgs.msg import JointTrajectory
 sys.path.insert(0, str(Path(__file__).parent))
 from stepped_robot import PERIOD_S, Arm, SteppedRobot, trajectory_of  # noqa: E402
 
-URDF = "<robot name='r'>" + "".join(
-    f"<joint name='{name}' type='{kind}'><limit lower='-50' upper='50' velocity='90' effort='900'/></joint>"
-    for name, kind in (("shoulder", "revolute"), ("elbow", "revolute"), ("wrist", "continuous"), ("pan", "revolute"),
-                       ("tilt", "revolute"), ("rail", "prismatic"), ("hoist", "prismatic"))) + "</robot>"
+URDF = (
+    "<robot name='r'>"
+    + "".join(
+        f"<joint name='{name}' type='{kind}'><limit lower='-50' upper='50' velocity='90' effort='900'/></joint>"
+        for name, kind in (
+            ("shoulder", "revolute"),
+            ("elbow", "revolute"),
+            ("wrist", "continuous"),
+            ("pan", "revolute"),
+            ("tilt", "revolute"),
+            ("rail", "prismatic"),
+            ("hoist", "prismatic"),
+        )
+    )
+    + "</robot>"
+)
 ARM, HEAD = ["shoulder", "elbow", "wrist"], ["pan", "tilt"]
 PARAMETERS: dict[str, Any] = {
     "robot_description": URDF,
@@ -32,18 +45,41 @@ PARAMETERS: dict[str, Any] = {
     "by_position": {"type": "by_position", "joints": [*ARM, *HEAD]},
     "by_velocity": {"type": "by_velocity", "joints": ["rail"], "command_interface": "VelocityJointInterface"},
     "by_effort": {"type": "by_effort", "joints": ["hoist"], "command_interface": "EffortJointInterface"},
-    "arm": {"type": "position_controllers/JointTrajectoryController", "joints": ARM, "state_publish_rate": 1000.0,
-            "action_monitor_rate": 10.0, "stop_trajectory_duration": 0.2,
-            "constraints": {"goal_time": 0.3, "stopped_velocity_tolerance": 0.05,
-                            "shoulder": {"trajectory": 0.1, "goal": 0.01}, "elbow": {"goal": 0.02}}},
-    "head": {"type": "position_controllers/JointTrajectoryController", "joints": HEAD, "state_publish_rate": 1000.0,
-             "allow_partial_joints_goal": True, "constraints": {"goal_time": 0.1}},
-    "lift": {"type": "velocity_controllers/JointTrajectoryController", "joints": ["rail"], "state_publish_rate": 25.0,
-             "gains": {"rail": {"p": 20.0}}, "velocity_ff": {"rail": 1.0},
-             "constraints": {"goal_time": 0.5, "rail": {"trajectory": 0.05, "goal": 0.001}}},
-    "crane": {"type": "effort_controllers/JointTrajectoryController", "joints": ["hoist"], "state_publish_rate": 25.0,
-              "gains": {"hoist": {"p": 400.0, "d": 40.0, "i": 1.0, "i_clamp": 1.0}},
-              "constraints": {"goal_time": 1.0, "stopped_velocity_tolerance": 0.01, "hoist": {"goal": 0.001}}},
+    "arm": {
+        "type": "position_controllers/JointTrajectoryController",
+        "joints": ARM,
+        "state_publish_rate": 1000.0,
+        "action_monitor_rate": 10.0,
+        "stop_trajectory_duration": 0.2,
+        "constraints": {
+            "goal_time": 0.3,
+            "stopped_velocity_tolerance": 0.05,
+            "shoulder": {"trajectory": 0.1, "goal": 0.01},
+            "elbow": {"goal": 0.02},
+        },
+    },
+    "head": {
+        "type": "position_controllers/JointTrajectoryController",
+        "joints": HEAD,
+        "state_publish_rate": 1000.0,
+        "allow_partial_joints_goal": True,
+        "constraints": {"goal_time": 0.1},
+    },
+    "lift": {
+        "type": "velocity_controllers/JointTrajectoryController",
+        "joints": ["rail"],
+        "state_publish_rate": 25.0,
+        "gains": {"rail": {"p": 20.0}},
+        "velocity_ff": {"rail": 1.0},
+        "constraints": {"goal_time": 0.5, "rail": {"trajectory": 0.05, "goal": 0.001}},
+    },
+    "crane": {
+        "type": "effort_controllers/JointTrajectoryController",
+        "joints": ["hoist"],
+        "state_publish_rate": 25.0,
+        "gains": {"hoist": {"p": 400.0, "d": 40.0, "i": 1.0, "i_clamp": 1.0}},
+        "constraints": {"goal_time": 1.0, "stopped_velocity_tolerance": 0.01, "hoist": {"goal": 0.001}},
+    },
 }
 OK, INVALID_GOAL, INVALID_JOINTS, PATH, GOAL = 0, -1, -2, -4, -5
 HOME = [0.0, 0.0, 0.0]
@@ -68,8 +104,11 @@ def arm(robot: SteppedRobot, clients: dict[str, Arm]) -> Arm:
     hardware.blocked, hardware.reason, hardware.scaling.factor = {}, "", 1.0
     client = clients["arm"]
     if any(client.state().actual.positions):
-        home = client.send((0.5, HOME), goal_time_tolerance=rospy.Duration(2.0),
-                           path_tolerance=[JointTolerance(name="shoulder", position=-1.0)])
+        home = client.send(
+            (0.5, HOME),
+            goal_time_tolerance=rospy.Duration(2.0),
+            path_tolerance=[JointTolerance(name="shoulder", position=-1.0)],
+        )
         robot.run(0.7)
         assert client.result(home)[:2] == ("SUCCEEDED", OK)
     return client
@@ -97,7 +136,8 @@ def independent_curve(order: int, times: np.ndarray, states: np.ndarray) -> Any:
 
 @pytest.mark.parametrize("order", [1, 3, 5])
 def test_ten_random_points_are_tracked_to_a_millionth_by_the_curve_that_what_they_give_asks_for(
-        arm: Arm, order: int) -> None:
+    arm: Arm, order: int
+) -> None:
     rng = np.random.default_rng(order)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 0.5, 10))])
     states = rng.uniform(-0.3, 0.3, (11, 3, 3))
@@ -119,8 +159,14 @@ def test_ten_random_points_are_tracked_to_a_millionth_by_the_curve_that_what_the
 
 
 def test_between_points_of_different_kind_the_curve_is_what_both_give(arm: Arm) -> None:
-    arm.send_goal(arm.goal((0.5, [0.4, 0.0, 0.0], HOME, HOME), (1.0, [0.0, 0.2, 0.0], HOME), (1.5, [0.4, 0.0, 0.0]),
-                           path_tolerance=[JointTolerance(name="shoulder", position=-1.0)]))
+    arm.send_goal(
+        arm.goal(
+            (0.5, [0.4, 0.0, 0.0], HOME, HOME),
+            (1.0, [0.0, 0.2, 0.0], HOME),
+            (1.5, [0.4, 0.0, 0.0]),
+            path_tolerance=[JointTolerance(name="shoulder", position=-1.0)],
+        )
+    )
     arm.robot.run(0.5)
     shares = [state.desired.positions[0] / 0.4 for state in arm.trace(1.0)]
     assert shares[24] == pytest.approx(0.5) and shares[11] == pytest.approx(1.0 - 3 * 0.24**2 + 2 * 0.24**3)
@@ -130,7 +176,8 @@ def test_between_points_of_different_kind_the_curve_is_what_both_give(arm: Arm) 
 def test_accelerations_without_velocities_are_as_good_as_none(arm: Arm) -> None:
     arm.send_goal(arm.goal((1.0, [0.4, 0.0, 0.0], [], [1.0, 1.0, 1.0])))
     assert [state.desired.positions[0] for state in arm.trace(0.5)] == pytest.approx(
-        [0.4 * (i + 1) * PERIOD_S for i in range(50)])
+        [0.4 * (i + 1) * PERIOD_S for i in range(50)]
+    )
 
 
 def test_a_first_point_at_time_0_is_where_the_arm_is_and_left_out(robot: SteppedRobot, arm: Arm) -> None:
@@ -149,7 +196,8 @@ def test_of_a_stamp_in_the_past_the_points_still_to_come_are_followed(robot: Ste
 
 @pytest.mark.parametrize(("ago_s", "points"), [(3.0, [(1.0, HOME), (2.0, HOME)]), (0.0, [(0.0, HOME)])])
 def test_a_goal_wholly_in_the_past_is_refused_and_the_motion_under_way_goes_on(
-        robot: SteppedRobot, arm: Arm, ago_s: float, points: list[Any]) -> None:
+    robot: SteppedRobot, arm: Arm, ago_s: float, points: list[Any]
+) -> None:
     running = arm.send((1.0, [0.3, 0.0, 0.0]))
     robot.run(0.3)
     late = arm.send(*points, stamp_s=robot.time_s - ago_s if ago_s else 0.0)
@@ -167,11 +215,13 @@ def test_a_stamp_in_the_future_waits_and_until_then_the_motion_before_goes_on(ro
     trace = arm.trace(0.4)
     old = BPoly.from_derivatives([0.0, 1.0], [[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
     assert [state.desired.positions[0] for state in trace] == pytest.approx(
-        [float(old(0.2 + PERIOD_S * (i + 1))) for i in range(40)], abs=1e-7)
+        [float(old(0.2 + PERIOD_S * (i + 1))) for i in range(40)], abs=1e-7
+    )
     at_switch = [float(old.derivative(n)(0.6)) for n in (1, 2)]
     new = BPoly.from_derivatives([0.0, 0.5], [[float(old(0.6)), *at_switch], [0.0, 0.0, 0.0]])
     assert [state.desired.positions[0] for state in arm.trace(0.5)] == pytest.approx(
-        [float(new(PERIOD_S * (i + 1))) for i in range(50)], abs=1e-6)
+        [float(new(PERIOD_S * (i + 1))) for i in range(50)], abs=1e-6
+    )
     robot.run(0.1)
     assert arm.result(handle)[1] == OK
 
@@ -180,10 +230,12 @@ def test_a_new_goal_takes_over_from_the_state_wanted_then_and_preempts(robot: St
     first = arm.send((1.0, [0.8, 0.0, 0.0]))
     before = arm.trace(0.5)[-1].desired
     second = arm.send((1.0, [0.0, 0.0, 0.0]))
-    new = BPoly.from_derivatives([0.0, 1.0], [[before.positions[0], before.velocities[0], before.accelerations[0]],
-                                              [0.0, 0.0, 0.0]])
+    new = BPoly.from_derivatives(
+        [0.0, 1.0], [[before.positions[0], before.velocities[0], before.accelerations[0]], [0.0, 0.0, 0.0]]
+    )
     assert [state.desired.positions[0] for state in arm.trace(0.9)] == pytest.approx(
-        [float(new(PERIOD_S * (i + 1))) for i in range(90)], abs=1e-6)
+        [float(new(PERIOD_S * (i + 1))) for i in range(90)], abs=1e-6
+    )
     assert arm.result(first) == ("PREEMPTED", INVALID_GOAL, "preempted by a new goal")
     robot.run(0.2)
     assert arm.result(second)[:2] == ("SUCCEEDED", OK)
@@ -292,8 +344,9 @@ def test_a_goal_replaces_keeps_and_erases_tolerances(robot: SteppedRobot, arm: A
 
 
 @pytest.mark.parametrize(("seconds", "until_s"), [(0.6, 1.6), (0.0, 1.3), (-1.0, 1.0)])
-def test_a_goal_sets_keeps_and_takes_away_goal_time(robot: SteppedRobot, arm: Arm, seconds: float,
-                                                    until_s: float) -> None:
+def test_a_goal_sets_keeps_and_takes_away_goal_time(
+    robot: SteppedRobot, arm: Arm, seconds: float, until_s: float
+) -> None:
     robot.hardware["by_position"].blocked["elbow"] = 0.05
     handle = arm.send((1.0, [0.0, 0.1, 0.0]), goal_time_tolerance=rospy.Duration.from_sec(seconds))
     robot.run(until_s - PERIOD_S)
@@ -308,7 +361,8 @@ def test_joints_may_come_in_any_order(robot: SteppedRobot, arm: Arm) -> None:
 
 
 def test_where_it_is_allowed_a_goal_moves_some_joints_and_the_others_finish_what_they_were_at(
-        robot: SteppedRobot, head: Arm) -> None:
+    robot: SteppedRobot, head: Arm
+) -> None:
     head.command(head.trajectory((2.0, [0.5, 0.5], None)))
     robot.run(0.5)
     assert move(robot, head, (0.5, [-0.2]), names=["pan"])[1] == OK
@@ -316,11 +370,18 @@ def test_where_it_is_allowed_a_goal_moves_some_joints_and_the_others_finish_what
     assert head.state().actual.positions == pytest.approx((-0.2, 0.5))
 
 
-@pytest.mark.parametrize(("begin", "target", "turn"), [
-    (0.0, 2.0 * math.pi + 0.1, 0.1), (3.0, -3.0, 2.0 * math.pi - 6.0), (0.1, 0.2 - 6.0 * math.pi, 0.1),
-    (0.0, -math.pi + 0.01, -math.pi + 0.01)])
-def test_a_joint_without_end_goes_the_short_way(robot: SteppedRobot, arm: Arm, begin: float, target: float,
-                                                turn: float) -> None:
+@pytest.mark.parametrize(
+    ("begin", "target", "turn"),
+    [
+        (0.0, 2.0 * math.pi + 0.1, 0.1),
+        (3.0, -3.0, 2.0 * math.pi - 6.0),
+        (0.1, 0.2 - 6.0 * math.pi, 0.1),
+        (0.0, -math.pi + 0.01, -math.pi + 0.01),
+    ],
+)
+def test_a_joint_without_end_goes_the_short_way(
+    robot: SteppedRobot, arm: Arm, begin: float, target: float, turn: float
+) -> None:
     assert move(robot, arm, (1.0, [0.0, 0.0, begin]))[1] == OK
     before = arm.state().actual.positions[2]
     assert math.remainder(before - begin, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
@@ -342,7 +403,8 @@ def shortest_gap_s(messages: list[Any]) -> float:
 
 
 def test_states_and_feedback_come_at_their_rates_and_tell_how_far_the_trajectory_is(
-        robot: SteppedRobot, arm: Arm, clients: dict[str, Arm]) -> None:
+    robot: SteppedRobot, arm: Arm, clients: dict[str, Arm]
+) -> None:
     feedback: list[Any] = []
     handle = arm.send_goal(arm.goal((1.0, [0.4, 0.0, 0.0], None)), lambda _, message: feedback.append(message))
     clients["crane"].states.clear()
@@ -373,7 +435,8 @@ def test_query_state_tells_what_is_desired_when(robot: SteppedRobot, arm: Arm) -
         answer = query(rospy.Time.from_sec(begun_s + since_s))
         assert list(answer.name) == ARM
         assert [answer.position[0], answer.velocity[0], answer.acceleration[0]] == pytest.approx(
-            [float(curve(since_s)), *(float(curve.derivative(n)(since_s)) for n in (1, 2))], abs=1e-5)
+            [float(curve(since_s)), *(float(curve.derivative(n)(since_s)) for n in (1, 2))], abs=1e-5
+        )
     after = query(rospy.Time.from_sec(begun_s + 5.0))
     assert list(after.position[:2]) == pytest.approx([0.4, 0.0]) and not any(after.velocity)
     with pytest.raises(rospy.ServiceException, match="before the motion under way began"):
@@ -389,41 +452,78 @@ def faulty(**changes: Any) -> FollowJointTrajectoryGoal:
 INF, NAN = math.inf, math.nan
 
 
-@pytest.mark.parametrize(("goal", "code", "words"), [
-    (faulty(points=[(1.0, [0.0, NAN, 0.0], None)]), INVALID_GOAL,
-     "point 0: position of joint 'elbow' (index 1) is nan; expected a finite number"),
-    (faulty(points=[(1.0, HOME, None), (2.0, [INF, 0.0, 0.0], None)]), INVALID_GOAL,
-     "point 1: position of joint 'shoulder' (index 0) is inf"),
-    (faulty(points=[(1.0, HOME, [0.0, 0.0, -INF])]), INVALID_GOAL, "velocity of joint 'wrist' (index 2) is -inf"),
-    (faulty(points=[(1.0, HOME, HOME, [NAN, 0.0, 0.0])]), INVALID_GOAL, "acceleration of joint 'shoulder'"),
-    (faulty(points=[(1.0, [1e300, 0.0, 0.0], None)]), INVALID_GOAL, "of at most 1e+09 in size"),
-    (faulty(points=[(1.0, HOME, None), (1.0, HOME, None)]), INVALID_GOAL,
-     "point 1: time_from_start 1 s does not come after 1 s of point 0; times must increase strictly"),
-    (faulty(points=[(2.0, HOME, None), (1.0, HOME, None)]), INVALID_GOAL, "does not come after 2 s"),
-    (faulty(points=[(-1.0, HOME, None)]), INVALID_GOAL, "all 1 points lie in the past"),
-    (faulty(points=[(1.0, [51.0, 0.0, 0.0], None)]), INVALID_GOAL,
-     "point 0: position of joint 'shoulder' is 51; its limits are -50 to 50; give a position within them"),
-    (faulty(points=[(1.0, HOME, [0.0, -95.0, 0.0])]), INVALID_GOAL,
-     "point 0: velocity of joint 'elbow' is -95; its limit is 90; give a lower velocity"),
-    (faulty(points=[(1.0, HOME, None), (1.1, [0.0, 20.0, 0.0], None)]), INVALID_GOAL,
-     "on the way to point 1 joint 'elbow' reaches the velocity 375; its limit is 90; give the point a later"),
-    (faulty(points=[(1.0, [0.0], None)]), INVALID_GOAL, "point 0: has 1 positions; expected 3"),
-    (faulty(points=[(1.0, [0.0] * 4, None)]), INVALID_GOAL, "point 0: has 4 positions; expected 3"),
-    (faulty(points=[(1.0, HOME, [0.0])]), INVALID_GOAL, "point 0: has 1 velocities; expected 3 or none"),
-    (faulty(points=[(1.0, HOME, HOME, [0.0, 0.0])]), INVALID_GOAL, "has 2 accelerations; expected 3 or none"),
-    (faulty(points=[(1.0, [], HOME)]), INVALID_GOAL, "point 0: has 0 positions; expected 3"),
-    (faulty(names=["shoulder", "elbow", "knee"]), INVALID_JOINTS, "unknown joint 'knee' (index 2)"),
-    (faulty(names=["shoulder", "elbow", "elbow"]), INVALID_JOINTS, "joint 'elbow' is named twice (indices 1 and 2)"),
-    (faulty(names=["shoulder", "elbow", ""]), INVALID_JOINTS, "the joint name at index 2 is empty"),
-    (faulty(names=["shoulder", "elbow"], points=[(1.0, [0.0, 0.0], None)]), INVALID_JOINTS,
-     "joints missing: wrist (allow_partial_joints_goal is false); joints of the controller: shoulder, elbow, wrist"),
-    (faulty(names=[], points=[]), INVALID_JOINTS, "joints missing: shoulder, elbow, wrist"),
-    (faulty(names=["shoulder", "elbow", "wrist", "knee"], points=[(1.0, [0.0] * 4, None)]), INVALID_JOINTS, "'knee'"),
-    (faulty(goal_tolerance=[JointTolerance(name="elbow", position=NAN)]), INVALID_GOAL,
-     "goal_tolerance of joint 'elbow' is not a number: position nan"),
-])
+@pytest.mark.parametrize(
+    ("goal", "code", "words"),
+    [
+        (
+            faulty(points=[(1.0, [0.0, NAN, 0.0], None)]),
+            INVALID_GOAL,
+            "point 0: position of joint 'elbow' (index 1) is nan; expected a finite number",
+        ),
+        (
+            faulty(points=[(1.0, HOME, None), (2.0, [INF, 0.0, 0.0], None)]),
+            INVALID_GOAL,
+            "point 1: position of joint 'shoulder' (index 0) is inf",
+        ),
+        (faulty(points=[(1.0, HOME, [0.0, 0.0, -INF])]), INVALID_GOAL, "velocity of joint 'wrist' (index 2) is -inf"),
+        (faulty(points=[(1.0, HOME, HOME, [NAN, 0.0, 0.0])]), INVALID_GOAL, "acceleration of joint 'shoulder'"),
+        (faulty(points=[(1.0, [1e300, 0.0, 0.0], None)]), INVALID_GOAL, "of at most 1e+09 in size"),
+        (
+            faulty(points=[(1.0, HOME, None), (1.0, HOME, None)]),
+            INVALID_GOAL,
+            "point 1: time_from_start 1 s does not come after 1 s of point 0; times must increase strictly",
+        ),
+        (faulty(points=[(2.0, HOME, None), (1.0, HOME, None)]), INVALID_GOAL, "does not come after 2 s"),
+        (faulty(points=[(-1.0, HOME, None)]), INVALID_GOAL, "all 1 points lie in the past"),
+        (
+            faulty(points=[(1.0, [51.0, 0.0, 0.0], None)]),
+            INVALID_GOAL,
+            "point 0: position of joint 'shoulder' is 51; its limits are -50 to 50; give a position within them",
+        ),
+        (
+            faulty(points=[(1.0, HOME, [0.0, -95.0, 0.0])]),
+            INVALID_GOAL,
+            "point 0: velocity of joint 'elbow' is -95; its limit is 90; give a lower velocity",
+        ),
+        (
+            faulty(points=[(1.0, HOME, None), (1.1, [0.0, 20.0, 0.0], None)]),
+            INVALID_GOAL,
+            "on the way to point 1 joint 'elbow' reaches the velocity 375; its limit is 90; give the point a later",
+        ),
+        (faulty(points=[(1.0, [0.0], None)]), INVALID_GOAL, "point 0: has 1 positions; expected 3"),
+        (faulty(points=[(1.0, [0.0] * 4, None)]), INVALID_GOAL, "point 0: has 4 positions; expected 3"),
+        (faulty(points=[(1.0, HOME, [0.0])]), INVALID_GOAL, "point 0: has 1 velocities; expected 3 or none"),
+        (faulty(points=[(1.0, HOME, HOME, [0.0, 0.0])]), INVALID_GOAL, "has 2 accelerations; expected 3 or none"),
+        (faulty(points=[(1.0, [], HOME)]), INVALID_GOAL, "point 0: has 0 positions; expected 3"),
+        (faulty(names=["shoulder", "elbow", "knee"]), INVALID_JOINTS, "unknown joint 'knee' (index 2)"),
+        (
+            faulty(names=["shoulder", "elbow", "elbow"]),
+            INVALID_JOINTS,
+            "joint 'elbow' is named twice (indices 1 and 2)",
+        ),
+        (faulty(names=["shoulder", "elbow", ""]), INVALID_JOINTS, "the joint name at index 2 is empty"),
+        (
+            faulty(names=["shoulder", "elbow"], points=[(1.0, [0.0, 0.0], None)]),
+            INVALID_JOINTS,
+            "joints missing: wrist (allow_partial_joints_goal is false); "
+            "joints of the controller: shoulder, elbow, wrist",
+        ),
+        (faulty(names=[], points=[]), INVALID_JOINTS, "joints missing: shoulder, elbow, wrist"),
+        (
+            faulty(names=["shoulder", "elbow", "wrist", "knee"], points=[(1.0, [0.0] * 4, None)]),
+            INVALID_JOINTS,
+            "'knee'",
+        ),
+        (
+            faulty(goal_tolerance=[JointTolerance(name="elbow", position=NAN)]),
+            INVALID_GOAL,
+            "goal_tolerance of joint 'elbow' is not a number: position nan",
+        ),
+    ],
+)
 def test_a_bad_goal_is_refused_with_what_is_wrong_where_and_nothing_else_happens(
-        robot: SteppedRobot, clients: dict[str, Arm], goal: FollowJointTrajectoryGoal, code: int, words: str) -> None:
+    robot: SteppedRobot, clients: dict[str, Arm], goal: FollowJointTrajectoryGoal, code: int, words: str
+) -> None:
     arm = clients["arm"]
     running = arm.send((0.2, arm.state().desired.positions))
     state, got, text = arm.result(arm.send_goal(goal))
@@ -434,17 +534,20 @@ def test_a_bad_goal_is_refused_with_what_is_wrong_where_and_nothing_else_happens
     assert {entry.state for entry in listed} == {"running"}
 
 
-def test_a_first_point_before_the_beginning_and_tolerances_of_other_joints_are_left_out(robot: SteppedRobot,
-                                                                                       arm: Arm) -> None:
+def test_a_first_point_before_the_beginning_and_tolerances_of_other_joints_are_left_out(
+    robot: SteppedRobot, arm: Arm
+) -> None:
     foreign = [JointTolerance(name="knee", position=1e-9)]
-    assert move(robot, arm, (-0.1, [9.0, 9.0, 9.0]), (1.0, [0.2, 0.1, 0.0]), path_tolerance=foreign,
-                goal_tolerance=foreign)[:2] == ("SUCCEEDED", OK)
+    assert move(
+        robot, arm, (-0.1, [9.0, 9.0, 9.0]), (1.0, [0.2, 0.1, 0.0]), path_tolerance=foreign, goal_tolerance=foreign
+    )[:2] == ("SUCCEEDED", OK)
     assert arm.state().actual.positions[:2] == pytest.approx((0.2, 0.1))
 
 
 @pytest.mark.parametrize(("name", "joint"), [("lift", "rail"), ("crane", "hoist")])
 def test_gains_and_feed_forward_make_joints_follow_that_take_velocities_or_efforts(
-        robot: SteppedRobot, clients: dict[str, Arm], name: str, joint: str) -> None:
+    robot: SteppedRobot, clients: dict[str, Arm], name: str, joint: str
+) -> None:
     client = clients[name]
     assert move(robot, client, (1.0, [0.5]), (2.0, [0.2]))[:2] == ("SUCCEEDED", OK)
     robot.run(0.1)
@@ -454,7 +557,8 @@ def test_gains_and_feed_forward_make_joints_follow_that_take_velocities_or_effor
 
 
 def test_a_hardware_fault_ends_the_goal_with_its_reason_and_recovery_takes_new_ones(
-        robot: SteppedRobot, arm: Arm, clients: dict[str, Arm]) -> None:
+    robot: SteppedRobot, arm: Arm, clients: dict[str, Arm]
+) -> None:
     other = clients["lift"].send((1.0, [0.0]))
     handle = arm.send((1.0, [0.4, 0.0, 0.0]))
     robot.run(0.5)
@@ -477,7 +581,8 @@ def test_a_hardware_fault_ends_the_goal_with_its_reason_and_recovery_takes_new_o
 
 
 def test_at_half_speed_a_trajectory_takes_twice_as_long_and_a_pause_violates_nothing(
-        robot: SteppedRobot, arm: Arm) -> None:
+    robot: SteppedRobot, arm: Arm
+) -> None:
     speed = robot.hardware["by_position"].scaling
     handle = arm.send((1.0, [0.8, 0.0, 0.0]))
     robot.run(0.2)

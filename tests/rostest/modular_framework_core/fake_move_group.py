@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A move_group of a robot with two sliding axes and a gripper, for tests of its clients."""
+
 from __future__ import annotations
 
 import contextlib
@@ -79,10 +80,12 @@ class FakeMoveGroup:
         rospy.set_param("robot_description_semantic", SRDF)
         self._joints = rospy.Publisher("joint_states", JointState, queue_size=1)
         self._report = rospy.Publisher("move_group/planning_report", String, queue_size=10)
-        self._services = [rospy.Service("plan_kinematic_path", GetMotionPlan, self._plan),
-                          rospy.Service("compute_ik", GetPositionIK, self._ik),
-                          rospy.Service("check_state_validity", GetStateValidity, self._validity),
-                          rospy.Service("get_planning_scene", GetPlanningScene, self._scene)]
+        self._services = [
+            rospy.Service("plan_kinematic_path", GetMotionPlan, self._plan),
+            rospy.Service("compute_ik", GetPositionIK, self._ik),
+            rospy.Service("check_state_validity", GetStateValidity, self._validity),
+            rospy.Service("get_planning_scene", GetPlanningScene, self._scene),
+        ]
         self._server = actionlib.SimpleActionServer("execute_trajectory", ExecuteTrajectoryAction, self._execute, False)
         self._server.start()
         threading.Thread(target=self._publish, daemon=True).start()
@@ -141,8 +144,9 @@ class FakeMoveGroup:
         fingers_collide = "f" not in at and at["jx"] > self.blocked_for_current_fingers
         if at["jy"] <= self.blocked and not fingers_collide:
             return GetStateValidityResponse(valid=True)
-        return GetStateValidityResponse(valid=False, contacts=[
-            ContactInformation(contact_body_1="palm", contact_body_2="wall")])
+        return GetStateValidityResponse(
+            valid=False, contacts=[ContactInformation(contact_body_1="palm", contact_body_2="wall")]
+        )
 
     def _scene(self, request):
         self.looks += 1

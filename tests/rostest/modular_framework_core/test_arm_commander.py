@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The arm commander: every call stands alone, and every failure has a reason."""
+
 from __future__ import annotations
 
 import sys
@@ -57,7 +58,9 @@ def test_settings_and_targets_arrive_in_the_request(commander) -> None:
     assert (request.allowed_planning_time, request.max_velocity_scaling_factor) == (2.5, 0.5)
     assert request.start_state.is_diff
     assert dict(zip(request.start_state.joint_state.name, request.start_state.joint_state.position, strict=True)) == {
-        "jx": 0.1, "f": 0.03}
+        "jx": 0.1,
+        "f": 0.03,
+    }
     assert [(c.joint_name, c.position) for c in request.goal_constraints[0].joint_constraints] == [("jx", 0.4)]
 
 
@@ -153,9 +156,15 @@ def test_a_stop_cancels_the_motion(commander) -> None:
     assert commander.fake.canceled
 
 
-@pytest.mark.parametrize(("method", "value"), [
-    ("set_max_velocity_scaling_factor", 0.0), ("set_max_velocity_scaling_factor", 1.1),
-    ("set_num_planning_attempts", 0), ("set_planning_time", 0.0)])
+@pytest.mark.parametrize(
+    ("method", "value"),
+    [
+        ("set_max_velocity_scaling_factor", 0.0),
+        ("set_max_velocity_scaling_factor", 1.1),
+        ("set_num_planning_attempts", 0),
+        ("set_planning_time", 0.0),
+    ],
+)
 def test_settings_out_of_range_are_refused(commander, method: str, value: float) -> None:
     with pytest.raises(CommanderError, match="allowed"):
         getattr(commander, method)(value)

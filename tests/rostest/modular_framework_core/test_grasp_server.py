@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The grasp action drives the gripper's own controller, and its answers can be believed."""
+
 from __future__ import annotations
 
 import threading
@@ -47,8 +48,9 @@ class FakeGripper:
         self.published = 0
         self.moving, self.canceled = threading.Event(), threading.Event()
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
-        self._server = actionlib.SimpleActionServer("hand_controller/gripper_cmd", GripperCommandAction, self._move,
-                                                    False)
+        self._server = actionlib.SimpleActionServer(
+            "hand_controller/gripper_cmd", GripperCommandAction, self._move, False
+        )
         self._server.start()
         threading.Thread(target=self._publish, daemon=True).start()
 
@@ -126,7 +128,8 @@ def test_a_pregrasp_is_reached_and_watched(gripper: FakeGripper, client) -> None
 
 @pytest.mark.parametrize(("torques", "effort"), [((), 400 / 800 * 2.0), ((0.0,), 0.0)])
 def test_a_pregrasp_without_intensities_has_full_effort_and_with_none_the_controllers_own(
-        gripper: FakeGripper, client, torques: tuple[float, ...], effort: float) -> None:
+    gripper: FakeGripper, client, torques: tuple[float, ...], effort: float
+) -> None:
     gripper.position, gripper.obstacle = 1.5, float("inf")
     state, flags, text, _ = send(client, GraspCommand.PRE_GRASP_STATE, grasp(torques=torques))
     assert (state, flags) == (GoalStatus.SUCCEEDED, (True, False, False)), text
@@ -164,7 +167,8 @@ def test_fingers_that_stall_where_they_began_have_grasped_nothing(gripper: FakeG
 
 
 def test_fingers_that_stall_where_they_began_hold_something_with_a_torque_that_moved_them_before(
-        gripper: FakeGripper, client) -> None:
+    gripper: FakeGripper, client
+) -> None:
     gripper.position, gripper.obstacle = 0.0, float("inf")
     assert send(client, GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED
     gripper.obstacle = gripper.position
@@ -186,12 +190,18 @@ def test_a_pregrasp_that_is_blocked_is_a_failure(gripper: FakeGripper, client) -
     assert "'f'" in text
 
 
-@pytest.mark.parametrize(("message", "stage", "torque", "hint"), [
-    (grasp, 7, 400.0, "POST_GRASP_STATE"), (lambda: grasp(3.0), 1, 400.0, "limits"),
-    (StandardisedGrasp, 1, 400.0, "at least"), (grasp, 1, 0.0, "max_torque"),
-    (grasp, 1, float("nan"), "max_torque is nan"),
-    (lambda: grasp(torques=(0.0,)), 1, 400.0, "to move with no torque"),
-    (lambda: grasp(torques=(1.0, 1.0)), 1, 400.0, "1 joint names and 2 values")])
+@pytest.mark.parametrize(
+    ("message", "stage", "torque", "hint"),
+    [
+        (grasp, 7, 400.0, "POST_GRASP_STATE"),
+        (lambda: grasp(3.0), 1, 400.0, "limits"),
+        (StandardisedGrasp, 1, 400.0, "at least"),
+        (grasp, 1, 0.0, "max_torque"),
+        (grasp, 1, float("nan"), "max_torque is nan"),
+        (lambda: grasp(torques=(0.0,)), 1, 400.0, "to move with no torque"),
+        (lambda: grasp(torques=(1.0, 1.0)), 1, 400.0, "1 joint names and 2 values"),
+    ],
+)
 def test_a_command_without_sense_is_refused_with_the_reason(gripper, client, message, stage, torque, hint) -> None:
     state, flags, text, _ = send(client, stage, message(), torque)
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The grasp action also drives hands whose controller follows trajectories."""
+
 from __future__ import annotations
 
 import threading
@@ -39,15 +40,17 @@ class FakeHand:
         self.obstacle = float("inf")
         self.fault = ""
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
-        self._server = actionlib.SimpleActionServer("hand/follow_joint_trajectory", FollowJointTrajectoryAction,
-                                                    self._follow, False)
+        self._server = actionlib.SimpleActionServer(
+            "hand/follow_joint_trajectory", FollowJointTrajectoryAction, self._follow, False
+        )
         self._server.start()
         threading.Thread(target=self._publish, daemon=True).start()
 
     def _publish(self) -> None:
         while not rospy.is_shutdown():
-            self._publisher.publish(JointState(name=list(self.positions), position=list(self.positions.values()),
-                                               velocity=[0.0, 0.0]))
+            self._publisher.publish(
+                JointState(name=list(self.positions), position=list(self.positions.values()), velocity=[0.0, 0.0])
+            )
             time.sleep(0.02)
 
     def _follow(self, goal: FollowJointTrajectoryGoal) -> None:

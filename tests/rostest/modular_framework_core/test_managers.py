@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The managers answer on the wire as clients of the original expect, without its defects."""
+
 from __future__ import annotations
 
 import hashlib
@@ -137,9 +138,15 @@ def test_a_grasp_without_id_takes_its_name(managers):
     assert call("get_grasp", srv.GetStandardisedGrasp, "side").grasp_message.grasp_id == "own"
 
 
-@pytest.mark.parametrize(("suffix", "get_type"), [
-    ("plan", srv.GetMoveitPlan), ("grasp", srv.GetStandardisedGrasp), ("trajectory", srv.GetJointTrajectory),
-    ("robot_pose", srv.GetRobotPose)])
+@pytest.mark.parametrize(
+    ("suffix", "get_type"),
+    [
+        ("plan", srv.GetMoveitPlan),
+        ("grasp", srv.GetStandardisedGrasp),
+        ("trajectory", srv.GetJointTrajectory),
+        ("robot_pose", srv.GetRobotPose),
+    ],
+)
 def test_every_manager_says_no_instead_of_raising(managers, suffix, get_type):
     assert not call(f"get_{suffix}", get_type, "nobody").success
     assert not call(f"get_{suffix}", get_type, "").success
@@ -205,8 +212,9 @@ def test_the_links_of_the_manipulator_are_read_again_with_every_reference_matrix
     names = ["arm", "thumb"]
     rospy.set_param("manipulator_links_indices", [1])
     assert call("set_init_acm", srv.SetInitACM, matrix(names, [])).success
-    answer = call("get_modified_acm", srv.GetModifiedACM, GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION,
-                  ["early"], True)
+    answer = call(
+        "get_modified_acm", srv.GetModifiedACM, GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION, ["early"], True
+    )
     assert allowed(answer.acm, "thumb", "early__link")
     assert not allowed(answer.acm, "arm", "early__link")
     rospy.set_param("manipulator_links_indices", [7])
@@ -217,10 +225,12 @@ def test_the_links_of_the_manipulator_are_read_again_with_every_reference_matrix
 def test_loose_objects_of_the_simulation_are_known_without_being_added_and_static_ones_are_not(managers):
     def scene(request):
         answer = GetPlanningSceneResponse()
-        answer.scene.world.collision_objects = [CollisionObject(id=name) for name in
-                                                ("wood_block__link", "table__link", "early__link", "drawn_by_hand")]
+        answer.scene.world.collision_objects = [
+            CollisionObject(id=name) for name in ("wood_block__link", "table__link", "early__link", "drawn_by_hand")
+        ]
         answer.scene.robot_state.attached_collision_objects = [
-            AttachedCollisionObject(object=CollisionObject(id="can__link"))]
+            AttachedCollisionObject(object=CollisionObject(id="can__link"))
+        ]
         return answer
 
     def properties(request):
@@ -235,8 +245,10 @@ def test_loose_objects_of_the_simulation_are_known_without_being_added_and_stati
         before = call("get_modified_acm", srv.GetModifiedACM, touch, [], True)
         assert before.success
         assert "cannot be looked up" in managers.log()
-        services = [rospy.Service("get_planning_scene", GetPlanningScene, scene),
-                    rospy.Service("gazebo/get_model_properties", GetModelProperties, properties)]
+        services = [
+            rospy.Service("get_planning_scene", GetPlanningScene, scene),
+            rospy.Service("gazebo/get_model_properties", GetModelProperties, properties),
+        ]
         answer = call("get_modified_acm", srv.GetModifiedACM, touch, [], True)
         assert {"wood_block__link", "can__link", "early__link"} <= set(answer.acm.entry_names)
         assert not {"table__link", "drawn_by_hand"} & set(answer.acm.entry_names)
@@ -272,18 +284,34 @@ def test_messages_are_listed_removed_and_cleared(managers):
 def test_every_change_is_told_in_order(managers):
     change = ManagerChange
     heard: list[tuple[int, str, int, int]] = []
-    subscriber = rospy.Subscriber("manager_changes", ManagerChange, lambda message: heard.append(
-        (message.action, message.name, message.named, message.anonymous)) if message.kind == "plan" else None)
+    subscriber = rospy.Subscriber(
+        "manager_changes",
+        ManagerChange,
+        lambda message: (
+            heard.append((message.action, message.name, message.named, message.anonymous))
+            if message.kind == "plan"
+            else None
+        ),
+    )
     until(lambda: call("clear_plans", Trigger).success and bool(heard), "a publisher that knows its subscriber", 60.0)
     for name in ("a", "a", ""):
         call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), name)
     call("get_plan", srv.GetMoveitPlan, "")
     call("remove_plan", srv.RemoveMessage, "a")
     call("clear_plans", Trigger)
-    expected = [(change.ADDED, "a", 1, 0), (change.REPLACED, "a", 1, 0), (change.ADDED, "", 1, 1),
-                (change.HANDED_OUT, "", 1, 0), (change.REMOVED, "a", 0, 0), (change.CLEARED, "", 0, 0)]
-    until(lambda: heard[-1] == expected[-1] and len(heard) >= 7 and heard[-2][0] == change.REMOVED,
-          "the last change", 60.0)
+    expected = [
+        (change.ADDED, "a", 1, 0),
+        (change.REPLACED, "a", 1, 0),
+        (change.ADDED, "", 1, 1),
+        (change.HANDED_OUT, "", 1, 0),
+        (change.REMOVED, "a", 0, 0),
+        (change.CLEARED, "", 0, 0),
+    ]
+    until(
+        lambda: heard[-1] == expected[-1] and len(heard) >= 7 and heard[-2][0] == change.REMOVED,
+        "the last change",
+        60.0,
+    )
     subscriber.unregister()
     assert heard[-6:] == expected
     assert {action for action, *_ in heard[:-6]} == {change.CLEARED}
@@ -311,16 +339,28 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
     assert call("get_grasp", srv.GetStandardisedGrasp, "g").grasp_message == grasp
 
 
-@pytest.mark.parametrize(("path", "text", "reason"), [
-    ("", None, "a file that ends in .yaml"), ("x.txt", None, "a file that ends in .yaml"),
-    ("missing.yaml", None, "cannot be read"), ("bad.yaml", "kind: [", "cannot be read"),
-    ("kind.yaml", "kind: grasp\nnamed: {}\n", "holds messages of the kind 'grasp'"),
-    ("field.yaml", "kind: plan\nnamed:\n  p: {no_such_field: 1}\n", "'p' is no moveit_msgs/RobotTrajectory"),
-    ("a\0.yaml", None, "embedded null byte"), ("~no_such_user/a.yaml", None, "is no path of a file"),
-    ("../a.yaml", None, "is outside of the managers' folder"), ("/etc/a.yaml", None, "is outside of the managers'"),
-    ("deep.yaml", "a: " + "[" * 20000, "nested more than 100 levels deep"),
-    ("nan.yaml", 'kind: plan\nnamed: {p: {joint_trajectory: {points: [{positions: [.nan]}]}}}', "positions[0] is nan"),
-    ("type.yaml", "kind: plan\nanonymous:\n- {joint_trajectory: {joint_names: 5}}\n", "anonymous message 1 is no")])
+@pytest.mark.parametrize(
+    ("path", "text", "reason"),
+    [
+        ("", None, "a file that ends in .yaml"),
+        ("x.txt", None, "a file that ends in .yaml"),
+        ("missing.yaml", None, "cannot be read"),
+        ("bad.yaml", "kind: [", "cannot be read"),
+        ("kind.yaml", "kind: grasp\nnamed: {}\n", "holds messages of the kind 'grasp'"),
+        ("field.yaml", "kind: plan\nnamed:\n  p: {no_such_field: 1}\n", "'p' is no moveit_msgs/RobotTrajectory"),
+        ("a\0.yaml", None, "embedded null byte"),
+        ("~no_such_user/a.yaml", None, "is no path of a file"),
+        ("../a.yaml", None, "is outside of the managers' folder"),
+        ("/etc/a.yaml", None, "is outside of the managers'"),
+        ("deep.yaml", "a: " + "[" * 20000, "nested more than 100 levels deep"),
+        (
+            "nan.yaml",
+            "kind: plan\nnamed: {p: {joint_trajectory: {points: [{positions: [.nan]}]}}}",
+            "positions[0] is nan",
+        ),
+        ("type.yaml", "kind: plan\nanonymous:\n- {joint_trajectory: {joint_names: 5}}\n", "anonymous message 1 is no"),
+    ],
+)
 def test_a_wrong_file_is_refused_and_nothing_is_lost(managers, path, text, reason):
     call("add_plan", srv.AddMoveitPlan, RobotTrajectory(), "stays")
     if text is not None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Objects enter and leave everywhere or nowhere, exit codes tell, and the sensors' frames are on TF."""
+
 from __future__ import annotations
 
 import subprocess
@@ -29,8 +30,10 @@ class FakeSimulation:
     def __init__(self) -> None:
         self.models: dict[str, object] = {}
         self.refuse_delete = False
-        self._services = [rospy.Service("gazebo/spawn_sdf_model", SpawnModel, self._spawn),
-                          rospy.Service("gazebo/delete_model", DeleteModel, self._delete)]
+        self._services = [
+            rospy.Service("gazebo/spawn_sdf_model", SpawnModel, self._spawn),
+            rospy.Service("gazebo/delete_model", DeleteModel, self._delete),
+        ]
 
     def _spawn(self, request):
         if "broken" in request.model_xml:
@@ -65,8 +68,14 @@ def simulation(ros_session, ros_launch, tmp_path_factory: pytest.TempPathFactory
 
 
 def manage(simulation: FakeSimulation, *arguments: str) -> tuple[int, str]:
-    done = subprocess.run(["rosrun", "modular_framework_core", "manage_object", *arguments], env=simulation.session.env,
-                          capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        ["rosrun", "modular_framework_core", "manage_object", *arguments],
+        env=simulation.session.env,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     return done.returncode, done.stdout + done.stderr
 
 
@@ -136,8 +145,9 @@ def test_the_file_of_sensors_is_read_again_on_request(simulation: FakeSimulation
     added = rospy.ServiceProxy("add_pose", srv.AddPoseStamped)
     pose = PoseStamped(header=Header(frame_id="world"), pose=Pose(Point(0.5, 0.0, 1.5), Quaternion(0.0, 0.0, 0.0, 1.0)))
     assert added(pose, "corner").success
-    simulation.sensors.write_text("camera: {frame_id: camera_frame, initial_pose: corner}\n"
-                                  "lost: {frame_id: lost_frame, initial_pose: nowhere}\n")
+    simulation.sensors.write_text(
+        "camera: {frame_id: camera_frame, initial_pose: corner}\nlost: {frame_id: lost_frame, initial_pose: nowhere}\n"
+    )
     reload = rospy.ServiceProxy("reload_sensor_frames", Trigger)
     reload.wait_for_service(60)
     answer = reload()
@@ -152,20 +162,35 @@ def test_the_file_of_sensors_is_read_again_on_request(simulation: FakeSimulation
 
 
 def test_the_sensors_node_needs_its_file(simulation: FakeSimulation) -> None:
-    done = subprocess.run(["rosrun", "modular_framework_core", "sensors_tf2_broadcaster", "__name:=other"],
-                          env=simulation.session.env, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        ["rosrun", "modular_framework_core", "sensors_tf2_broadcaster", "__name:=other"],
+        env=simulation.session.env,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert done.returncode == 2
     assert "expected one" in done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(("executable", "service"), [
-    ("joint_state_manager_server", "get_joint_state"), ("joint_trajectory_manager_server", "get_trajectory"),
-    ("pose_stamped_manager_server", "get_pose"), ("moveit_plan_manager_server", "get_plan"),
-    ("standardised_grasp_manager_server", "get_grasp"), ("robot_pose_manager_server", "get_robot_pose"),
-    ("acm_manager_server", "get_modified_acm"), ("gazebo_mapping_server", "get_object_type")])
+@pytest.mark.parametrize(
+    ("executable", "service"),
+    [
+        ("joint_state_manager_server", "get_joint_state"),
+        ("joint_trajectory_manager_server", "get_trajectory"),
+        ("pose_stamped_manager_server", "get_pose"),
+        ("moveit_plan_manager_server", "get_plan"),
+        ("standardised_grasp_manager_server", "get_grasp"),
+        ("robot_pose_manager_server", "get_robot_pose"),
+        ("acm_manager_server", "get_modified_acm"),
+        ("gazebo_mapping_server", "get_object_type"),
+    ],
+)
 def test_every_manager_runs_as_a_node_of_its_own(simulation: FakeSimulation, executable: str, service: str) -> None:
     launch = simulation.session.launch(
         f'<launch><group ns="alone"><node name="{executable}" pkg="modular_framework_core" type="{executable}" '
-        'required="true" output="screen"/></group></launch>')
+        'required="true" output="screen"/></group></launch>'
+    )
     simulation.session.wait_for_service(f"/alone/{service}", 60)
     launch.stop()

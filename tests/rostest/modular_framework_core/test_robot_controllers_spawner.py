@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The spawner of a robot's controllers, run as the launch file runs it, against fake hardware."""
+
 from __future__ import annotations
 
 import os
@@ -26,12 +27,17 @@ def robot_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A robot package with a good controller file and faulty ones, found through ROS_PACKAGE_PATH."""
     package = tmp_path_factory.mktemp("packages") / "some_robot"
     (package / "controllers").mkdir(parents=True)
-    (package / "package.xml").write_text("<package format='2'><name>some_robot</name><version>0.1.0</version>"
-                                         "<description>d</description><maintainer email='a@b.c'>m</maintainer>"
-                                         "<license>BSD</license></package>")
-    files = {"good.yaml": CONTROLLERS, "arm_only.yaml": CONTROLLERS.splitlines()[2],
-             "unsafe.yaml": "arm: !!python/object/apply:os.getpid []",
-             "wrong_joint.yaml": "leg: {type: position_controllers/JointTrajectoryController, joints: [knee]}"}
+    (package / "package.xml").write_text(
+        "<package format='2'><name>some_robot</name><version>0.1.0</version>"
+        "<description>d</description><maintainer email='a@b.c'>m</maintainer>"
+        "<license>BSD</license></package>"
+    )
+    files = {
+        "good.yaml": CONTROLLERS,
+        "arm_only.yaml": CONTROLLERS.splitlines()[2],
+        "unsafe.yaml": "arm: !!python/object/apply:os.getpid []",
+        "wrong_joint.yaml": "leg: {type: position_controllers/JointTrajectoryController, joints: [knee]}",
+    }
     for name, text in files.items():
         (package / "controllers" / name).write_text(text)
     return package
@@ -43,8 +49,13 @@ def spawn(ros_session: Any, robot_package: Path) -> Iterator[Callable[..., Any]]
     started: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen(["rosrun", "modular_framework_core", "robot_controllers_spawner", *arguments],
-                                   env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        process = subprocess.Popen(
+            ["rosrun", "modular_framework_core", "robot_controllers_spawner", *arguments],
+            env=env,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
         started.append(process)
         return process
 
@@ -65,9 +76,11 @@ def states() -> dict[str, str]:
 
 
 def test_a_missing_package_file_or_unsafe_file_is_named(spawn: Callable[..., Any]) -> None:
-    faulty = {("no_such_robot", "good.yaml"): "robot package 'no_such_robot' is not found",
-              ("some_robot", "absent.yaml"): "beside it: arm_only.yaml, good.yaml",
-              ("some_robot", "unsafe.yaml"): "not valid YAML"}
+    faulty = {
+        ("no_such_robot", "good.yaml"): "robot package 'no_such_robot' is not found",
+        ("some_robot", "absent.yaml"): "beside it: arm_only.yaml, good.yaml",
+        ("some_robot", "unsafe.yaml"): "not valid YAML",
+    }
     processes = {words: spawn(*arguments) for arguments, words in faulty.items()}
     for words, process in processes.items():
         code, output = result(process)

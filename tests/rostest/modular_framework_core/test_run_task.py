@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """run_task on a real master: makes the state machine of a task, runs it, tells how it ended, and stops when asked."""
+
 from __future__ import annotations
 
 import json
@@ -199,9 +200,12 @@ def test_the_outcome_and_the_states_are_published(run, status: Heard) -> None:
     outcome = Heard("task_outcome")
     nap = "states:\n  - Nap: {source: nap, transitions: {success: A, fail: A}}\n"
     process = run(BAD.replace("states:\n", nap))
-    status.wait_for(lambda messages: any(
-        event["event"] == "running" and event["active"] == ["Nap"] and event["state_elapsed_s"] >= 0.3
-        for event in map(json.loads, messages)))
+    status.wait_for(
+        lambda messages: any(
+            event["event"] == "running" and event["active"] == ["Nap"] and event["state_elapsed_s"] >= 0.3
+            for event in map(json.loads, messages)
+        )
+    )
     rospy.set_param("/alarm", True)
     process.end()
     outcome.wait_for(lambda messages: messages == ["gave_up"])
@@ -238,11 +242,18 @@ def test_a_faulty_script_exits_with_2_and_lists_every_fault(run) -> None:
 def test_names_are_checked_against_the_files_and_the_robot_of_the_launch(run, tmp_path: Path) -> None:
     (tmp_path / "named_poses.yaml").write_text("above: {reference_frame: world, position: {}, orientation: {}}\n")
     (tmp_path / "manipulator_controller_parameters.yaml").write_text("manipulator_group_name: hand\n")
-    rospy.set_param("/robot_description_semantic", """<robot name="r"><group name="hand"><joint name="f"/></group>
-<group_state name="wide" group="hand"><joint name="f" value="0"/></group_state></robot>""")
+    rospy.set_param(
+        "/robot_description_semantic",
+        """<robot name="r"><group name="hand"><joint name="f"/></group>
+<group_state name="wide" group="hand"><joint name="f" value="0"/></group_state></robot>""",
+    )
     line = "      source: {}\n      transitions: {{success: done, fail: gave_up}}\n"
-    text = task("  - A:\n" + line.format("cartesian_move\n      pose_name: abvoe").replace("done", "B")
-                + "  - B:\n" + line.format("gripper\n      posture: open"))
+    text = task(
+        "  - A:\n"
+        + line.format("cartesian_move\n      pose_name: abvoe").replace("done", "B")
+        + "  - B:\n"
+        + line.format("gripper\n      posture: open")
+    )
     text = text.replace("source: state_machine", "source: framework_state_machine")
     try:
         code, output = run(text, f"_config_directory:={tmp_path}").end()
@@ -361,8 +372,10 @@ def test_a_launch_ends_with_its_task(ros_session: RosSession, tmp_path: Path) ->
 
 
 def test_the_shipped_wait_for_signal_state_runs_in_a_task(run, status: Heard) -> None:
-    text = task("  - A:\n      source: wait_for_signal\n      topic_name: go\n"
-                "      transitions: {success: done, fail: gave_up}\n")
+    text = task(
+        "  - A:\n      source: wait_for_signal\n      topic_name: go\n"
+        "      transitions: {success: done, fail: gave_up}\n"
+    )
     publisher = rospy.Publisher("go", Bool, queue_size=1, latch=True)
     publisher.publish(Bool(True))
     code, output = run(text, own=False).end()

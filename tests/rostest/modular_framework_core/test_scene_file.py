@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A text scene ends up in the planning scene of move_group and comes back; exit codes say whether it did."""
+
 from __future__ import annotations
 
 import subprocess
@@ -15,8 +16,14 @@ SCENE = Path(__file__).parents[3] / "src" / "modular_framework_description" / "s
 
 
 def publish(session, *arguments: object, node: str = "moveit_publish_scene_from_text") -> tuple[int, str]:
-    done = subprocess.run(["rosrun", "modular_framework_core", node, *map(str, arguments)],
-                          env=session.env, capture_output=True, text=True, timeout=180, check=False)
+    done = subprocess.run(
+        ["rosrun", "modular_framework_core", node, *map(str, arguments)],
+        env=session.env,
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=False,
+    )
     return done.returncode, done.stdout + done.stderr
 
 
@@ -32,9 +39,15 @@ def test_the_planning_scene_has_the_objects_of_the_file(session) -> None:
     proxy = rospy.ServiceProxy("/get_planning_scene", GetPlanningScene)
     wanted = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.WORLD_OBJECT_GEOMETRY
     objects = {item.id: item for item in proxy(PlanningSceneComponents(wanted)).scene.world.collision_objects}
-    assert set(objects) == {"ground_plane__link", "robot_pedestal__link", "table__link", "wood_block__link",
-                            "can__link", "l_bracket__link"}
-    can, = objects["can__link"].primitives
+    assert set(objects) == {
+        "ground_plane__link",
+        "robot_pedestal__link",
+        "table__link",
+        "wood_block__link",
+        "can__link",
+        "l_bracket__link",
+    }
+    (can,) = objects["can__link"].primitives
     assert can.type == SolidPrimitive.CYLINDER
     assert can.dimensions[SolidPrimitive.CYLINDER_HEIGHT] == pytest.approx(0.115)
     assert can.dimensions[SolidPrimitive.CYLINDER_RADIUS] == pytest.approx(0.033)
@@ -51,8 +64,9 @@ def test_a_file_that_is_no_scene_has_an_exit_code_of_its_own(session, tmp_path: 
 
 def test_an_exported_scene_has_the_same_objects_colours_and_subframes(session, tmp_path: Path) -> None:
     coloured = tmp_path / "coloured.scene"
-    coloured.write_text("room\n* cup\n1 2 3\n0 0 0 1\n1\ncylinder\n0.1 0.4\n0 0 0.5\n0 0 0 1\n0 1 0 0.5\n"
-                        "1\nhandle\n0 0 1\n0 0 0 1\n.\n")
+    coloured.write_text(
+        "room\n* cup\n1 2 3\n0 0 0 1\n1\ncylinder\n0.1 0.4\n0 0 0.5\n0 0 0 1\n0 1 0 0.5\n1\nhandle\n0 0 1\n0 0 0 1\n.\n"
+    )
     code, text = publish(session, "--scene", coloured)
     assert code == 0, text
     exported = tmp_path / "exported.scene"

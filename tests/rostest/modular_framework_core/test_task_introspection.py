@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A running task shows its state machine to viewers, and they cannot disturb it."""
+
 from __future__ import annotations
 
 import base64

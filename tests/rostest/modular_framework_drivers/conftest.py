@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes ur_arm_on_ros.py known to the tests beside it."""
+
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The EZGripper's Grasp action as the framework starts and uses it, on emulated servos with faults on command."""
+
 from __future__ import annotations
 
 import re
@@ -51,8 +52,11 @@ class Gripper:
         rospy.Subscriber("joint_states", JointState, self._on_joint_state, queue_size=1)
         self.client = actionlib.SimpleActionClient("ezgripper_grasp", GraspAction)
         assert self.client.wait_for_server(rospy.Duration(60)), session.log()
-        until(lambda: self.joint_state is not None and self.joint_state.position[0] < 0.03,
-              "open fingers in the joint states", 60.0)
+        until(
+            lambda: self.joint_state is not None and self.joint_state.position[0] < 0.03,
+            "open fingers in the joint states",
+            60.0,
+        )
 
     def _on_joint_state(self, message: JointState) -> None:
         self.joint_state = message
@@ -93,8 +97,10 @@ def gripper(running: Gripper) -> Gripper:
     for command in ("plug", "clear", "no_object"):
         running.command(command)
     running.command("heat", celsius=30)
-    until(lambda: running.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
-          "a pregrasp without a fault")
+    until(
+        lambda: running.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
+        "a pregrasp without a fault",
+    )
     return running
 
 
@@ -112,8 +118,9 @@ def test_an_object_is_grasped_held_and_let_go(gripper: Gripper) -> None:
     state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
     until(lambda: gripper.joint_state.position[0] == pytest.approx(1.2, abs=0.05), "the fingers at the object")
-    until(lambda: gripper.joint_state.effort[0] == pytest.approx(0.5 * 400 / 1023, abs=0.02),
-          "half of the allowed torque")
+    until(
+        lambda: gripper.joint_state.effort[0] == pytest.approx(0.5 * 400 / 1023, abs=0.02), "half of the allowed torque"
+    )
     state, flags, text, _ = gripper.run(GraspCommand.POST_GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, False, True)), text
     assert gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED
@@ -154,17 +161,23 @@ def test_fingers_that_touch_an_object_from_the_beginning_grasp_it(gripper: Gripp
     assert (state, flags) == (GoalStatus.SUCCEEDED, (False, True, False)), text
 
 
-@pytest.mark.parametrize(("message", "stage", "torque", "hint"), [
-    (grasp, 1, float("nan"), "max_torque is nan, allowed are numbers of more than 0"),
-    (lambda: grasp(intensity=0.0), 1, 400.0, "is to move with no torque, allowed is more than 0"),
-    (lambda: grasp(intensity=float("nan")), 1, 400.0, "torque intensity .* is nan"),
-    (lambda: grasp(closed=2.0), 1, 400.0, r"is to go to 2.0, its limits are \[0.0, 1.94\]"),
-    (lambda: grasp(closed=float("nan")), 1, 400.0, "is to go to nan"),
-    (grasp, 7, 400.0, "POST_GRASP_STATE"), (grasp, 1, 0.0, "max_torque"),
-    (lambda: grasp(intensity=1.5), 1, 400.0, "torque intensity .* is 1.5, allowed is -1 to 1"),
-    (StandardisedGrasp, 1, 400.0, "at least")])
-def test_a_goal_without_sense_is_refused_with_value_and_limits(gripper: Gripper, stage: int, torque: float, hint: str,
-                                                               message: Callable[[], StandardisedGrasp]) -> None:
+@pytest.mark.parametrize(
+    ("message", "stage", "torque", "hint"),
+    [
+        (grasp, 1, float("nan"), "max_torque is nan, allowed are numbers of more than 0"),
+        (lambda: grasp(intensity=0.0), 1, 400.0, "is to move with no torque, allowed is more than 0"),
+        (lambda: grasp(intensity=float("nan")), 1, 400.0, "torque intensity .* is nan"),
+        (lambda: grasp(closed=2.0), 1, 400.0, r"is to go to 2.0, its limits are \[0.0, 1.94\]"),
+        (lambda: grasp(closed=float("nan")), 1, 400.0, "is to go to nan"),
+        (grasp, 7, 400.0, "POST_GRASP_STATE"),
+        (grasp, 1, 0.0, "max_torque"),
+        (lambda: grasp(intensity=1.5), 1, 400.0, "torque intensity .* is 1.5, allowed is -1 to 1"),
+        (StandardisedGrasp, 1, 400.0, "at least"),
+    ],
+)
+def test_a_goal_without_sense_is_refused_with_value_and_limits(
+    gripper: Gripper, stage: int, torque: float, hint: str, message: Callable[[], StandardisedGrasp]
+) -> None:
     state, flags, text, _ = gripper.run(stage, message(), torque)
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
     assert re.search(hint, text), text
@@ -203,8 +216,9 @@ def test_a_new_goal_takes_over(gripper: Gripper) -> None:
 
 
 @pytest.mark.parametrize(("fault", "text"), [("unplug", "port .* is gone"), ("overload", "overloaded")])
-def test_a_fault_under_way_ends_the_goal_with_the_reason_and_the_next_one_works(gripper: Gripper, fault: str,
-                                                                                 text: str) -> None:
+def test_a_fault_under_way_ends_the_goal_with_the_reason_and_the_next_one_works(
+    gripper: Gripper, fault: str, text: str
+) -> None:
     gripper.send(GraspCommand.GRASP_STATE, grasp(intensity=0.2))
     until(lambda: gripper.joint_state.position[0] > 0.5, "closing fingers")
     gripper.command(fault)
@@ -213,17 +227,23 @@ def test_a_fault_under_way_ends_the_goal_with_the_reason_and_the_next_one_works(
     assert re.search(text, gripper.client.get_goal_status_text()), gripper.client.get_goal_status_text()
     assert not gripper.client.get_result().grasped.data
     gripper.command("plug")
-    until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
-          "a pregrasp after the fault")
+    until(
+        lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp())[0] == GoalStatus.SUCCEEDED,
+        "a pregrasp after the fault",
+    )
 
 
 def test_a_hot_motor_refuses_goals_until_it_has_cooled(gripper: Gripper) -> None:
     gripper.command("heat", celsius=85)
-    until(lambda: "too hot (8" in gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[2],
-          "the refusal of a hot motor")
+    until(
+        lambda: "too hot (8" in gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[2],
+        "the refusal of a hot motor",
+    )
     gripper.command("heat", celsius=40)
-    until(lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[0] == GoalStatus.SUCCEEDED,
-          "a pregrasp of the cooled motor")
+    until(
+        lambda: gripper.run(GraspCommand.PRE_GRASP_STATE, grasp(pregrasp=1.0))[0] == GoalStatus.SUCCEEDED,
+        "a pregrasp of the cooled motor",
+    )
 
 
 def test_orders_without_arguments_are_services_too(gripper: Gripper) -> None:

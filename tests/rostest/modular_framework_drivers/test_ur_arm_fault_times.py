@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How soon a client of the trajectory controller is told that the UR arm, with its default settings, can do no more."""
+
 from __future__ import annotations
 
 import time
@@ -35,16 +36,22 @@ def told_after_s(arm: Arm, command: str, reason: str) -> float:
     told_at = arm.true_positions()
     time.sleep(0.2)
     stood = arm.true_positions()
-    assert stood == pytest.approx(told_at, abs=0.02)     # its way to rest, from 0.16 rad/s
+    assert stood == pytest.approx(told_at, abs=0.02)  # its way to rest, from 0.16 rad/s
     arm.well()
     time.sleep(0.2)
     assert arm.true_positions() == pytest.approx(stood, abs=1e-3)
     return told_s
 
 
-@pytest.mark.parametrize(("command", "reason"), [
-    ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
-    ("cut", "link to the arm"), ("freeze", "link to the arm")])
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("protective_stop", "protective stop of the arm"),
+        ("emergency_stop", "emergency stop of the arm"),
+        ("cut", "link to the arm"),
+        ("freeze", "link to the arm"),
+    ],
+)
 def test_a_client_is_told_of_a_fault_within_a_fifth_of_a_second(arm: Arm, command: str, reason: str) -> None:
     """Other work on the computer can only make it later: what the software takes is the shortest of some times."""
     times_s: list[float] = []

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The UR arm as the framework runs it: node robot_hw, trajectory controller, action client, and faults of the arm."""
+
 from __future__ import annotations
 
 import os
@@ -52,17 +53,24 @@ def test_a_pause_makes_a_goal_wait(arm: Arm) -> None:
     target = [position + 0.2 for position in arm.positions]
     done = arm.send(target, 1.0)
     assert arm.call("dashboard/pause") == (True, "Pausing program")
-    assert not done.wait(1.5)     # longer than the motion takes
+    assert not done.wait(1.5)  # longer than the motion takes
     assert arm.call("dashboard/play") == (True, "Starting program")
     assert done.wait(20.0)
     assert arm.client.get_result().error_code == 0, arm.client.get_goal_status_text()
 
 
-@pytest.mark.parametrize(("command", "reason"), [
-    ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
-    ("cut", "link to the arm"), ("freeze", "link to the arm")])
-def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_stands(arm: Arm, command: str,
-                                                                                      reason: str) -> None:
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("protective_stop", "protective stop of the arm"),
+        ("emergency_stop", "emergency stop of the arm"),
+        ("cut", "link to the arm"),
+        ("freeze", "link to the arm"),
+    ],
+)
+def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_stands(
+    arm: Arm, command: str, reason: str
+) -> None:
     start = arm.positions
     done = arm.send([position + 0.5 for position in start], 4.0)
     time.sleep(0.7)
@@ -98,5 +106,7 @@ def test_a_dashboard_that_does_not_answer_is_told(arm: Arm) -> None:
 
 def test_the_node_stops_the_arm_and_its_program_at_its_end(arm: Arm) -> None:
     os.system("rosnode kill /robot_hw > /dev/null 2>&1")
-    until(lambda: "runtime_state=STOPPED" in arm.command("state") and "connections=0" in arm.command("state"),
-          "an arm without program and links")
+    until(
+        lambda: "runtime_state=STOPPED" in arm.command("state") and "connections=0" in arm.command("state"),
+        "an arm without program and links",
+    )

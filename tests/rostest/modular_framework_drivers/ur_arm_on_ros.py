@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An emulated UR arm with node robot_hw and a trajectory controller, as a client sees it; for tests of the driver."""
+
 from __future__ import annotations
 
 import functools
@@ -59,8 +60,9 @@ class Arm:
         self.ready: bool | None = None
         rospy.Subscriber("joint_states", JointState, self._on_joint_state, queue_size=1)
         rospy.Subscriber("arm_ready", Bool, self._on_ready, queue_size=1)
-        self.client = actionlib.SimpleActionClient("arm_controller/follow_joint_trajectory",
-                                                   FollowJointTrajectoryAction)
+        self.client = actionlib.SimpleActionClient(
+            "arm_controller/follow_joint_trajectory", FollowJointTrajectoryAction
+        )
         assert self.client.wait_for_server(rospy.Duration(60)), session.log()
         until(lambda: bool(self.positions) and self.ready is True, "a ready arm")
 
@@ -92,8 +94,9 @@ class Arm:
     def send(self, positions: list[float], duration_s: float) -> threading.Event:
         goal = FollowJointTrajectoryGoal()
         goal.trajectory.joint_names = list(JOINT_NAMES)
-        goal.trajectory.points = [JointTrajectoryPoint(positions=positions, velocities=[0.0] * 6,
-                                                       time_from_start=rospy.Duration(duration_s))]
+        goal.trajectory.points = [
+            JointTrajectoryPoint(positions=positions, velocities=[0.0] * 6, time_from_start=rospy.Duration(duration_s))
+        ]
         done = threading.Event()
         self.client.send_goal(goal, done_cb=lambda status, result: done.set())
         return done

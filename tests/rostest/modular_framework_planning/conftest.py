@@ -4,6 +4,7 @@
 A module says what it needs by a mark: `pytest.mark.move_group(service=..., gripper=...)`, both optional. Modules of one
 suite share node and robot.
 """
+
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fills any message with nonsense, field by field, so that no endpoint and no field is forgotten."""
+
 from __future__ import annotations
 
 import itertools
@@ -9,8 +10,18 @@ from typing import Any
 import genpy
 
 NAN, HUGE = float("nan"), 1e308
-INTEGERS = {"int8": 7, "int16": 15, "int32": 31, "int64": 63, "uint8": 8, "uint16": 16, "uint32": 32, "uint64": 64,
-            "byte": 7, "char": 8}
+INTEGERS = {
+    "int8": 7,
+    "int16": 15,
+    "int32": 31,
+    "int64": 63,
+    "uint8": 8,
+    "uint16": 16,
+    "uint32": 32,
+    "uint64": 64,
+    "byte": 7,
+    "char": 8,
+}
 
 
 @dataclass(frozen=True)

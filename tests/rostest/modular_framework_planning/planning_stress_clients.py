@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Clients that ask many questions with known answers at once, and what becomes of the answers; see stress()."""
+
 from __future__ import annotations
 
 import itertools
@@ -69,9 +70,10 @@ class Clients:
     def run(self, clients: int) -> int:
         """Lets all of them ask until the time is over; returns how many never came back."""
         kinds = [self._ask_action, self._prove, self._prove]
-        works = [self._change, *(kinds[:max(0, clients - 1)]), *[self._ask_service] * max(1, clients - len(kinds))]
-        threads = [threading.Thread(target=self._guard, args=(work, number), daemon=True)
-                   for number, work in enumerate(works)]
+        works = [self._change, *(kinds[: max(0, clients - 1)]), *[self._ask_service] * max(1, clients - len(kinds))]
+        threads = [
+            threading.Thread(target=self._guard, args=(work, number), daemon=True) for number, work in enumerate(works)
+        ]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -97,8 +99,9 @@ class Clients:
                 return
             self._world.change(FLIPPER, places[here], gone(there))
 
-    def _note(self, begun: float, response: Any, wanted: int, walls: tuple[CollisionObject, ...], kind: str,
-              trajectory: Any) -> None:
+    def _note(
+        self, begun: float, response: Any, wanted: int, walls: tuple[CollisionObject, ...], kind: str, trajectory: Any
+    ) -> None:
         points = np.array([point.positions for point in trajectory.joint_trajectory.points], dtype=float)
         self.answers.append(Answer(begun, time.monotonic(), response.error_code.val, wanted, points, walls, kind))
 
@@ -113,8 +116,12 @@ class Clients:
     def _ask_service(self, _: int) -> None:
         """The wall comes with the start state, attached to the robot's base: it counts for this question alone."""
         walls, wanted, kind = self._question()
-        state = RobotState(is_diff=True, attached_collision_objects=[
-            AttachedCollisionObject(link_name="base_link", object=wall, touch_links=["base_link"]) for wall in walls])
+        state = RobotState(
+            is_diff=True,
+            attached_collision_objects=[
+                AttachedCollisionObject(link_name="base_link", object=wall, touch_links=["base_link"]) for wall in walls
+            ],
+        )
         begun = time.monotonic()
         response = plan(request(joint_goal(PAN, START[0] + WAY), start_state=state, allowed_planning_time=20.0))
         self._note(begun, response, wanted, walls, f"service, {kind}", response.trajectory)
@@ -204,7 +211,7 @@ class MemoryWatch:
         """Returns memory at a quarter of the time and at the end [MB], and the slope between [MB/min]."""
         self._over.set()
         self._thread.join(5.0)
-        late = np.array(self.samples[len(self.samples) // 4:])
+        late = np.array(self.samples[len(self.samples) // 4 :])
         slope = float(np.polyfit(late[:, 0], late[:, 1], 1)[0]) * 60.0 if len(late) > 2 else 0.0
         return float(late[0, 1]), float(late[-1, 1]), slope
 
@@ -236,23 +243,32 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
     wrong = [text for answer in asking.answers if (text := judge.fault(answer, world))]
     took = sorted(item.ended - item.begun for item in asking.answers)
     flips = world.histories[FLIPPER]
-    return {"seconds": seconds, "clients": clients, "plans": len(asking.answers),
-            "motions_checked": sum(item.code == OK for item in asking.answers),
-            "kinds": dict(Counter(item.kind for item in asking.answers)), "wrong": len(wrong) + len(asking.errors),
-            "timeouts": sum(item.code in TIMED_OUT for item in asking.answers), "unanswered": unanswered,
-            "scene_changes": sum(map(len, world.histories.values())),
-            "flips_per_s": round(len(flips) / seconds, 2),
-            "change_median_ms": round(1000.0 * float(np.median([item.ended - item.begun for item in flips])), 1),
-            "change_max_ms": round(1000.0 * max(item.ended - item.begun for item in flips), 1),
-            "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
-            "rss_start_mb": round(rss_start, 1), "rss_end_mb": round(rss_end, 1), "rss_mb_per_min": round(slope, 2),
-            "rss_mb_every_tenth": memory.tenths(),
-            "wrong_answers": wrong[:10] + asking.errors[:10]}
+    return {
+        "seconds": seconds,
+        "clients": clients,
+        "plans": len(asking.answers),
+        "motions_checked": sum(item.code == OK for item in asking.answers),
+        "kinds": dict(Counter(item.kind for item in asking.answers)),
+        "wrong": len(wrong) + len(asking.errors),
+        "timeouts": sum(item.code in TIMED_OUT for item in asking.answers),
+        "unanswered": unanswered,
+        "scene_changes": sum(map(len, world.histories.values())),
+        "flips_per_s": round(len(flips) / seconds, 2),
+        "change_median_ms": round(1000.0 * float(np.median([item.ended - item.begun for item in flips])), 1),
+        "change_max_ms": round(1000.0 * max(item.ended - item.begun for item in flips), 1),
+        "median_ms": round(1000.0 * took[len(took) // 2], 1) if took else None,
+        "rss_start_mb": round(rss_start, 1),
+        "rss_end_mb": round(rss_end, 1),
+        "rss_mb_per_min": round(slope, 2),
+        "rss_mb_every_tenth": memory.tenths(),
+        "wrong_answers": wrong[:10] + asking.errors[:10],
+    }
 
 
 def robot_checker() -> IndependentChecker:
     """The shipped robot, as the parameter server has it."""
     from modular_framework_planning.robot_model.urdf_document import package_resolver
 
-    return IndependentChecker(str(rospy.get_param("robot_description")),
-                              str(rospy.get_param("robot_description_semantic")), package_resolver)
+    return IndependentChecker(
+        str(rospy.get_param("robot_description")), str(rospy.get_param("robot_description_semantic")), package_resolver
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The scene as several clients change it at once, and whether a motion is free in a scene that was in force."""
+
 from __future__ import annotations
 
 import sys
@@ -49,8 +50,13 @@ class World:
 
     def objects_between(self, begun: float, ended: float) -> dict[str, CollisionObject]:
         """Every object that may have been in the scene at some time of a span."""
-        return {name: item for history in self.histories.values() for number, change in enumerate(history)
-                if change.begun <= ended and _end(history, number) >= begun for name, item in change.objects.items()}
+        return {
+            name: item
+            for history in self.histories.values()
+            for number, change in enumerate(history)
+            if change.begun <= ended and _end(history, number) >= begun
+            for name, item in change.objects.items()
+        }
 
     def was_free_of(self, touched: set[str], begun: float, ended: float) -> bool:
         """Whether at some moment of a span the scene may have had none of the touched objects.
@@ -58,10 +64,18 @@ class World:
         While a client waits for an answer, its objects may be the old ones or the new ones.
         """
         changes = [item for history in self.histories.values() for item in history]
-        moments = {begun, ended, *(moment for item in changes for moment in (item.begun, item.ended)
-                                   if begun <= moment <= ended)}
-        return any(all(any(not item.keys() & touched for item in _in_force(history, moment))
-                       for history in self.histories.values()) for moment in moments)
+        moments = {
+            begun,
+            ended,
+            *(moment for item in changes for moment in (item.begun, item.ended) if begun <= moment <= ended),
+        }
+        return any(
+            all(
+                any(not item.keys() & touched for item in _in_force(history, moment))
+                for history in self.histories.values()
+            )
+            for moment in moments
+        )
 
 
 def _end(history: Sequence[Change], number: int) -> float:
@@ -70,8 +84,7 @@ def _end(history: Sequence[Change], number: int) -> float:
 
 def _in_force(history: Sequence[Change], moment: float) -> list[Mapping[str, CollisionObject]]:
     """What one client's objects may have been at a moment."""
-    found = [change.objects for number, change in enumerate(history)
-             if change.begun <= moment <= _end(history, number)]
+    found = [change.objects for number, change in enumerate(history) if change.begun <= moment <= _end(history, number)]
     return found + [{}] if moment <= history[0].ended else found
 
 
@@ -86,8 +99,14 @@ def obstacle(message: CollisionObject) -> tuple[str, Solid, np.ndarray]:
     return message.id, box(*size), pose_matrix([place.x, place.y, place.z], np.eye(3))
 
 
-def touched_bodies(checker: IndependentChecker, names: Sequence[str], path: np.ndarray, rest: Mapping[str, float],
-                   objects: Mapping[str, CollisionObject], step: float) -> set[str]:
+def touched_bodies(
+    checker: IndependentChecker,
+    names: Sequence[str],
+    path: np.ndarray,
+    rest: Mapping[str, float],
+    objects: Mapping[str, CollisionObject],
+    step: float,
+) -> set[str]:
     """Names of the bodies that touch another one along a path, looked at every `step` [rad] and at its end."""
     checker.set_world([obstacle(item) for item in objects.values()])
     touched: set[str] = set()

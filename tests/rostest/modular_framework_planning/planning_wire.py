@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the tests of move_group share: a robot that follows trajectories, a client's calls and messages."""
+
 from __future__ import annotations
 
 import json
@@ -60,14 +61,19 @@ class FakeArm:
         self.positions = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}
         self.cancelled = threading.Event()
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=20)
-        self._server = actionlib.SimpleActionServer("arm_trajectory_controller/follow_joint_trajectory",
-                                                    FollowJointTrajectoryAction, self._follow, auto_start=False)
+        self._server = actionlib.SimpleActionServer(
+            "arm_trajectory_controller/follow_joint_trajectory",
+            FollowJointTrajectoryAction,
+            self._follow,
+            auto_start=False,
+        )
         self._server.start()
         self.durations_s: list[float] = []  # of the motions it was given
         self.grips: list[float] = []
         if with_gripper:
-            self._gripper = actionlib.SimpleActionServer("ezgripper_controller/gripper_cmd", GripperCommandAction,
-                                                         self._grip, auto_start=False)
+            self._gripper = actionlib.SimpleActionServer(
+                "ezgripper_controller/gripper_cmd", GripperCommandAction, self._grip, auto_start=False
+            )
             self._gripper.start()
         self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
 
@@ -78,9 +84,11 @@ class FakeArm:
 
     def settle(self) -> None:
         """Returns when the node knows where the robot is."""
+
         def is_known() -> bool:
-            state = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(
-                PlanningSceneComponents.ROBOT_STATE)).scene.robot_state.joint_state
+            state = call(
+                "get_planning_scene", GetPlanningScene, PlanningSceneComponents(PlanningSceneComponents.ROBOT_STATE)
+            ).scene.robot_state.joint_state
             known = dict(zip(state.name, state.position, strict=True))
             return all(abs(known[name] - value) < 1e-9 for name, value in self.positions.items())
 
@@ -98,8 +106,9 @@ class FakeArm:
     def _publish(self, _: Any) -> None:
         if rospy.is_shutdown():
             return
-        self._publisher.publish(JointState(Header(stamp=rospy.Time.now()), list(self.positions),
-                                           list(self.positions.values()), [], []))
+        self._publisher.publish(
+            JointState(Header(stamp=rospy.Time.now()), list(self.positions), list(self.positions.values()), [], [])
+        )
 
     def _follow(self, goal: Any) -> None:
         begun = time.monotonic()
@@ -126,8 +135,11 @@ def call(name: str, kind: Any, *args: Any) -> Any:
 
 
 def box(name: str, x: float, y: float, z: float, size: tuple[float, float, float]) -> CollisionObject:
-    message = CollisionObject(id=name, primitives=[SolidPrimitive(SolidPrimitive.BOX, list(size))],
-                              primitive_poses=[Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))])
+    message = CollisionObject(
+        id=name,
+        primitives=[SolidPrimitive(SolidPrimitive.BOX, list(size))],
+        primitive_poses=[Pose(Point(x, y, z), Quaternion(0, 0, 0, 1))],
+    )
     message.header.frame_id = "world"
     return message
 
@@ -174,9 +186,14 @@ def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOW
 
 
 def request(goal: Constraints | None = None, **changes: Any) -> MotionPlanRequest:
-    message = MotionPlanRequest(group_name=GROUP, allowed_planning_time=5.0, num_planning_attempts=1,
-                                max_velocity_scaling_factor=0.5, max_acceleration_scaling_factor=0.5,
-                                goal_constraints=[goal or pose_constraints(0.1, 0.5, 0.95)])
+    message = MotionPlanRequest(
+        group_name=GROUP,
+        allowed_planning_time=5.0,
+        num_planning_attempts=1,
+        max_velocity_scaling_factor=0.5,
+        max_acceleration_scaling_factor=0.5,
+        goal_constraints=[goal or pose_constraints(0.1, 0.5, 0.95)],
+    )
     for name, value in changes.items():
         setattr(message, name, value)
     return message
@@ -194,8 +211,9 @@ class Reports:
 
     def __init__(self) -> None:
         self.heard: list[dict[str, Any]] = []
-        subscriber = rospy.Subscriber("move_group/planning_report", String,
-                                      lambda message: self.heard.append(json.loads(message.data)))
+        subscriber = rospy.Subscriber(
+            "move_group/planning_report", String, lambda message: self.heard.append(json.loads(message.data))
+        )
         until(subscriber.get_num_connections, "the publisher of planning reports")
         time.sleep(0.5)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters choose the endpoints of move_group, and its optional tf publisher says where the scene's objects are."""
+
 from __future__ import annotations
 
 import time
@@ -26,8 +27,15 @@ def session(ros_session: Any) -> Iterator[Any]:
 def test_defaults_are_offered_but_for_the_disabled_one(session: Any) -> None:
     session.wait_for_service("clear_octomap", 60.0)
     services = {name for name, _ in rosgraph.Master("/test").getSystemState()[2]}
-    assert {"/plan_kinematic_path", "/compute_ik", "/compute_fk", "/check_state_validity", "/get_planning_scene",
-            "/apply_planning_scene", "/clear_octomap"} <= services
+    assert {
+        "/plan_kinematic_path",
+        "/compute_ik",
+        "/compute_fk",
+        "/check_state_validity",
+        "/get_planning_scene",
+        "/apply_planning_scene",
+        "/clear_octomap",
+    } <= services
     assert "/query_planner_interface" not in services
 
 
@@ -38,12 +46,17 @@ def test_an_unknown_capability_is_a_warning_with_the_list_of_known_ones(session:
 
 def test_the_tf_publisher_tells_where_objects_and_their_subframes_are() -> None:
     heard: dict[str, Any] = {}
-    rospy.Subscriber("/tf", TFMessage, lambda message: heard.update(
-        {item.child_frame_id: item for item in message.transforms}))
-    crate = CollisionObject(id="crate", primitives=[SolidPrimitive(SolidPrimitive.BOX, [0.1, 0.1, 0.1])],
-                            primitive_poses=[Pose(Point(0, 0, 0), Quaternion(0, 0, 0, 1))], subframe_names=["lid"],
-                            subframe_poses=[Pose(Point(0, 0, 0.05), Quaternion(0, 0, 0, 1))],
-                            pose=Pose(Point(0.5, 0.4, 1.5), Quaternion(0, 0, 0, 1)))
+    rospy.Subscriber(
+        "/tf", TFMessage, lambda message: heard.update({item.child_frame_id: item for item in message.transforms})
+    )
+    crate = CollisionObject(
+        id="crate",
+        primitives=[SolidPrimitive(SolidPrimitive.BOX, [0.1, 0.1, 0.1])],
+        primitive_poses=[Pose(Point(0, 0, 0), Quaternion(0, 0, 0, 1))],
+        subframe_names=["lid"],
+        subframe_poses=[Pose(Point(0, 0, 0.05), Quaternion(0, 0, 0, 1))],
+        pose=Pose(Point(0.5, 0.4, 1.5), Quaternion(0, 0, 0, 1)),
+    )
     crate.header.frame_id = "world"
     scene = PlanningScene(is_diff=True)
     scene.world.collision_objects = [crate]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """compute_cartesian_path on the wire: straight, timed, honest about how far it goes and why no further."""
+
 from __future__ import annotations
 
 import re
@@ -24,8 +25,13 @@ def shifted(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
 
 
 def follow(*waypoints: Pose, **changes: Any) -> Any:
-    message = GetCartesianPathRequest(group_name=GROUP, waypoints=list(waypoints), max_step=0.01,
-                                      avoid_collisions=True, start_state=RobotState(is_diff=True))
+    message = GetCartesianPathRequest(
+        group_name=GROUP,
+        waypoints=list(waypoints),
+        max_step=0.01,
+        avoid_collisions=True,
+        start_state=RobotState(is_diff=True),
+    )
     message.header.frame_id = "world"
     for name, value in changes.items():
         setattr(message, name, value)
@@ -34,8 +40,10 @@ def follow(*waypoints: Pose, **changes: Any) -> Any:
 
 def rows_of(answer: Any) -> tuple[np.ndarray, np.ndarray]:
     points = answer.solution.joint_trajectory.points
-    return (np.array([point.positions for point in points]),
-            np.array([point.time_from_start.to_sec() for point in points]))
+    return (
+        np.array([point.positions for point in points]),
+        np.array([point.time_from_start.to_sec() for point in points]),
+    )
 
 
 def test_a_line_is_straight_and_timed_within_limits(home: Pose) -> None:
@@ -128,8 +136,17 @@ def test_a_held_object_follows_the_line_itself(home: Pose) -> None:
 
 
 def test_path_constraints_end_a_line(home: Pose) -> None:
-    tight = Constraints(joint_constraints=[JointConstraint(joint_name="shoulder_pan_joint", position=START[0],
-                                                           tolerance_above=0.05, tolerance_below=0.05, weight=1.0)])
+    tight = Constraints(
+        joint_constraints=[
+            JointConstraint(
+                joint_name="shoulder_pan_joint",
+                position=START[0],
+                tolerance_above=0.05,
+                tolerance_below=0.05,
+                weight=1.0,
+            )
+        ]
+    )
     answer, report = report_of(lambda: follow(shifted(home, 0.2), path_constraints=tight))
     assert answer.error_code.val == OK and 0.0 < answer.fraction < 1.0
     assert "path_constraints: joint 'shoulder_pan_joint'" in report["reason"]
@@ -149,17 +166,25 @@ NAN = float("nan")
 CODES = MoveItErrorCodes
 
 
-@pytest.mark.parametrize(("changes", "code"), [
-    ({"group_name": "nobody"}, CODES.INVALID_GROUP_NAME), ({"link_name": "nobody"}, CODES.INVALID_LINK_NAME),
-    ({"header": Header(frame_id="nowhere")}, CODES.FRAME_TRANSFORM_FAILURE),
-    ({"waypoints": []}, CODES.INVALID_MOTION_PLAN), ({"max_step": 0.0}, CODES.INVALID_MOTION_PLAN),
-    ({"max_step": NAN}, CODES.INVALID_MOTION_PLAN), ({"jump_threshold": -1.0}, CODES.INVALID_MOTION_PLAN),
-    ({"revolute_jump_threshold": NAN}, CODES.INVALID_MOTION_PLAN),
-    ({"waypoints": [Pose()]}, CODES.FAILURE), ({"waypoints": [Pose(Point(NAN, 0, 0), DOWN)]}, CODES.FAILURE),
-    ({"max_cartesian_speed": NAN}, CODES.INVALID_MOTION_PLAN), ({"link_name": "base_link"}, CODES.NO_IK_SOLUTION),
-    ({"max_cartesian_speed": 0.1, "cartesian_speed_limited_link": "nobody"}, CODES.INVALID_LINK_NAME),
-    ({"start_state": RobotState(joint_state=JointState(name=ARM, position=[NAN] * 6))}, CODES.INVALID_ROBOT_STATE),
-])
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"group_name": "nobody"}, CODES.INVALID_GROUP_NAME),
+        ({"link_name": "nobody"}, CODES.INVALID_LINK_NAME),
+        ({"header": Header(frame_id="nowhere")}, CODES.FRAME_TRANSFORM_FAILURE),
+        ({"waypoints": []}, CODES.INVALID_MOTION_PLAN),
+        ({"max_step": 0.0}, CODES.INVALID_MOTION_PLAN),
+        ({"max_step": NAN}, CODES.INVALID_MOTION_PLAN),
+        ({"jump_threshold": -1.0}, CODES.INVALID_MOTION_PLAN),
+        ({"revolute_jump_threshold": NAN}, CODES.INVALID_MOTION_PLAN),
+        ({"waypoints": [Pose()]}, CODES.FAILURE),
+        ({"waypoints": [Pose(Point(NAN, 0, 0), DOWN)]}, CODES.FAILURE),
+        ({"max_cartesian_speed": NAN}, CODES.INVALID_MOTION_PLAN),
+        ({"link_name": "base_link"}, CODES.NO_IK_SOLUTION),
+        ({"max_cartesian_speed": 0.1, "cartesian_speed_limited_link": "nobody"}, CODES.INVALID_LINK_NAME),
+        ({"start_state": RobotState(joint_state=JointState(name=ARM, position=[NAN] * 6))}, CODES.INVALID_ROBOT_STATE),
+    ],
+)
 def test_malformed_requests_get_a_code(home: Pose, changes: dict[str, Any], code: int) -> None:
     answer = follow(*changes.pop("waypoints", [shifted(home, 0.02)]), **changes)
     assert answer.error_code.val == code and answer.fraction == 0.0

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Motions planned at the same time are those that are planned one by one with the same seeds."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Constraints and kinematics on the wire: goals of any mix, compute_ik, compute_fk and check_state_validity."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -49,8 +50,13 @@ pytestmark = [pytest.mark.usefixtures("clean_scene")]
 
 
 def in_box(x: float, y: float, z: float, size: tuple[float, float, float], **changes: Any) -> PositionConstraint:
-    message = PositionConstraint(Header(frame_id="world"), TIP, Vector3(), BoundingVolume(
-        [SolidPrimitive(SolidPrimitive.BOX, list(size))], [Pose(Point(x, y, z), UNTURNED)], [], []), 1.0)
+    message = PositionConstraint(
+        Header(frame_id="world"),
+        TIP,
+        Vector3(),
+        BoundingVolume([SolidPrimitive(SolidPrimitive.BOX, list(size))], [Pose(Point(x, y, z), UNTURNED)], [], []),
+        1.0,
+    )
     for name, value in changes.items():
         setattr(message, name, value)
     return message
@@ -95,8 +101,11 @@ def test_a_goal_may_be_a_position_alone_an_orientation_alone_or_partly_tolerant(
 
 def test_joints_positions_and_orientations_may_be_mixed_in_one_goal() -> None:
     pan = JointConstraint("shoulder_pan_joint", 1.2, 0.3, 0.3, 1.0)
-    goal = Constraints(joint_constraints=[pan], position_constraints=[in_box(0.1, 0.5, 1.1, (0.4, 0.4, 0.4))],
-                       orientation_constraints=[turned(0.3, 0.3, 7.0)])
+    goal = Constraints(
+        joint_constraints=[pan],
+        position_constraints=[in_box(0.1, 0.5, 1.1, (0.4, 0.4, 0.4))],
+        orientation_constraints=[turned(0.3, 0.3, 7.0)],
+    )
     answer = plan(request(goal))
     assert answer.error_code.val == OK
     end = end_of(answer)
@@ -136,34 +145,77 @@ def test_a_region_that_cannot_be_reached_is_called_empty() -> None:
     assert "goal region was empty" in report["reason"] and TIP in report["reason"]
 
 
-NO_POSE = in_box(0.2, 0.5, 1.1, (0.1, 0.1, 0.1), constraint_region=BoundingVolume(
-    [SolidPrimitive(SolidPrimitive.BOX, [0.1, 0.1, 0.1])], [], [], []))
+NO_POSE = in_box(
+    0.2,
+    0.5,
+    1.1,
+    (0.1, 0.1, 0.1),
+    constraint_region=BoundingVolume([SolidPrimitive(SolidPrimitive.BOX, [0.1, 0.1, 0.1])], [], [], []),
+)
 EMPTY = in_box(0.2, 0.5, 1.1, (0.1, 0.1, 0.1), constraint_region=BoundingVolume())
-OLD_KIND = in_box(0.2, 0.5, 1.1, (0.1, 0.1, 0.1), constraint_region=BoundingVolume(
-    [SolidPrimitive(9, [0.1])], [Pose(Point(0.2, 0.5, 1.1), UNTURNED)], [], []))
+OLD_KIND = in_box(
+    0.2,
+    0.5,
+    1.1,
+    (0.1, 0.1, 0.1),
+    constraint_region=BoundingVolume([SolidPrimitive(9, [0.1])], [Pose(Point(0.2, 0.5, 1.1), UNTURNED)], [], []),
+)
 
 
-@pytest.mark.parametrize(("constraints", "code", "words"), [
-    (Constraints(visibility_constraints=[VisibilityConstraint()]), CODES.INVALID_GOAL_CONSTRAINTS, "visibility"),
-    (Constraints(position_constraints=[EMPTY]), CODES.INVALID_GOAL_CONSTRAINTS, "is empty"),
-    (Constraints(position_constraints=[NO_POSE]), CODES.INVALID_GOAL_CONSTRAINTS, "0 poses"),
-    (Constraints(position_constraints=[OLD_KIND]), CODES.INVALID_GOAL_CONSTRAINTS, "type 9; allowed are 1 box"),
-    (Constraints(position_constraints=[in_box(NAN, 0, 1, (0.1, 0.1, 0.1))]), CODES.INVALID_GOAL_CONSTRAINTS, "finite"),
-    (Constraints(position_constraints=[in_box(0, 0, 1, (0.1, -1.0, 0.1))]), CODES.INVALID_GOAL_CONSTRAINTS, "y is -1"),
-    (Constraints(position_constraints=[in_box(0, 0, 1, (0.1, 0.1, 0.1), link_name="nobody")]), CODES.INVALID_LINK_NAME,
-     "'nobody' does not exist"),
-    (Constraints(position_constraints=[in_box(0, 0, 1, (0.1, 0.1, 0.1), weight=NAN)]), CODES.INVALID_GOAL_CONSTRAINTS,
-     "weight"),
-    (Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, orientation=Quaternion(0, 0, 0, 0.5))]),
-     CODES.INVALID_GOAL_CONSTRAINTS, "length 0.5"),
-    (Constraints(orientation_constraints=[turned(NAN, 0.1, 0.1)]), CODES.INVALID_GOAL_CONSTRAINTS, "absolute_x_axis"),
-    (Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, parameterization=7)]), CODES.INVALID_GOAL_CONSTRAINTS,
-     "1 ROTATION_VECTOR"),
-    (Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, header=Header(frame_id="nowhere"))]),
-     CODES.FRAME_TRANSFORM_FAILURE, "'nowhere'"),
-    (Constraints(joint_constraints=[JointConstraint(ARM[0], 0.0, -0.1, 0.1, 1.0)]), CODES.INVALID_GOAL_CONSTRAINTS,
-     "tolerance_above is -0.1"),
-])
+@pytest.mark.parametrize(
+    ("constraints", "code", "words"),
+    [
+        (Constraints(visibility_constraints=[VisibilityConstraint()]), CODES.INVALID_GOAL_CONSTRAINTS, "visibility"),
+        (Constraints(position_constraints=[EMPTY]), CODES.INVALID_GOAL_CONSTRAINTS, "is empty"),
+        (Constraints(position_constraints=[NO_POSE]), CODES.INVALID_GOAL_CONSTRAINTS, "0 poses"),
+        (Constraints(position_constraints=[OLD_KIND]), CODES.INVALID_GOAL_CONSTRAINTS, "type 9; allowed are 1 box"),
+        (
+            Constraints(position_constraints=[in_box(NAN, 0, 1, (0.1, 0.1, 0.1))]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "finite",
+        ),
+        (
+            Constraints(position_constraints=[in_box(0, 0, 1, (0.1, -1.0, 0.1))]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "y is -1",
+        ),
+        (
+            Constraints(position_constraints=[in_box(0, 0, 1, (0.1, 0.1, 0.1), link_name="nobody")]),
+            CODES.INVALID_LINK_NAME,
+            "'nobody' does not exist",
+        ),
+        (
+            Constraints(position_constraints=[in_box(0, 0, 1, (0.1, 0.1, 0.1), weight=NAN)]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "weight",
+        ),
+        (
+            Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, orientation=Quaternion(0, 0, 0, 0.5))]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "length 0.5",
+        ),
+        (
+            Constraints(orientation_constraints=[turned(NAN, 0.1, 0.1)]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "absolute_x_axis",
+        ),
+        (
+            Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, parameterization=7)]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "1 ROTATION_VECTOR",
+        ),
+        (
+            Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, header=Header(frame_id="nowhere"))]),
+            CODES.FRAME_TRANSFORM_FAILURE,
+            "'nowhere'",
+        ),
+        (
+            Constraints(joint_constraints=[JointConstraint(ARM[0], 0.0, -0.1, 0.1, 1.0)]),
+            CODES.INVALID_GOAL_CONSTRAINTS,
+            "tolerance_above is -0.1",
+        ),
+    ],
+)
 def test_goals_without_meaning_get_a_code_and_a_reason(constraints: Constraints, code: int, words: str) -> None:
     answer, report = report_of(lambda: plan(request(constraints)))
     assert answer.error_code.val == code and words in report["reason"], report["reason"]
@@ -228,7 +280,9 @@ def test_with_position_only_ik_the_orientation_is_open() -> None:
 def test_validity_answers_every_constraint_and_every_contact() -> None:
     constraints = Constraints(
         joint_constraints=[JointConstraint(ARM[0], START[0] + 0.2, 0.1, 0.1, 2.0)],
-        position_constraints=[in_box(0.0, 0.5, 1.1, (9.0, 9.0, 9.0))], orientation_constraints=[turned(9.0, 9.0, 9.0)])
+        position_constraints=[in_box(0.0, 0.5, 1.1, (9.0, 9.0, 9.0))],
+        orientation_constraints=[turned(9.0, 9.0, 9.0)],
+    )
     answer = call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP, constraints)
     assert not answer.valid and [item.result for item in answer.constraint_result] == [False, True, True]
     assert answer.constraint_result[0].distance == pytest.approx(0.4, abs=1e-6)
@@ -240,17 +294,21 @@ def test_validity_answers_every_constraint_and_every_contact() -> None:
     answer = call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP, Constraints())
     assert not answer.valid and any("inside" in (item.contact_body_1, item.contact_body_2) for item in answer.contacts)
     constraints.visibility_constraints = [VisibilityConstraint()]
-    answer, report = report_of(lambda: call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
-                                            constraints))
+    answer, report = report_of(
+        lambda: call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP, constraints)
+    )
     assert not answer.valid and "visibility" in report["reason"]
 
 
 def test_validity_says_which_constraint_is_refused_and_answers_the_others() -> None:
     constraints = Constraints(
         joint_constraints=[JointConstraint(ARM[0], START[0], 0.1, 0.1, 1.0), JointConstraint("knee", 0.0, 0.1, 0.1, 1)],
-        orientation_constraints=[turned(9.0, 9.0, 9.0)], visibility_constraints=[VisibilityConstraint()])
-    answer, report = report_of(lambda: call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
-                                            constraints))
+        orientation_constraints=[turned(9.0, 9.0, 9.0)],
+        visibility_constraints=[VisibilityConstraint()],
+    )
+    answer, report = report_of(
+        lambda: call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP, constraints)
+    )
     assert not answer.valid and [item.result for item in answer.constraint_result] == [True, False, True, False]
     assert [np.isinf(item.distance) for item in answer.constraint_result] == [False, True, False, True]
     assert "constraints.joint_constraints[1]: joint 'knee'" in report["reason"]
@@ -260,13 +318,29 @@ def test_validity_says_which_constraint_is_refused_and_answers_the_others() -> N
 def test_an_orientation_that_was_not_filled_in_is_the_identity() -> None:
     given, empty = turned(9.0, 9.0, 9.0), turned(9.0, 9.0, 9.0)
     given.orientation, empty.orientation = Quaternion(0, 0, 0, 1), Quaternion()
-    results = [call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
-                    Constraints(orientation_constraints=[item])).constraint_result[0] for item in (given, empty)]
+    results = [
+        call(
+            "check_state_validity",
+            GetStateValidity,
+            RobotState(is_diff=True),
+            GROUP,
+            Constraints(orientation_constraints=[item]),
+        ).constraint_result[0]
+        for item in (given, empty)
+    ]
     assert results[0] == results[1]
     regions = [in_box(0.2, 0.5, 1.1, (0.1, 0.2, 0.3)) for _ in range(2)]
     regions[1].constraint_region.primitive_poses[0].orientation = Quaternion()
-    results = [call("check_state_validity", GetStateValidity, RobotState(is_diff=True), GROUP,
-                    Constraints(position_constraints=[item])).constraint_result[0] for item in regions]
+    results = [
+        call(
+            "check_state_validity",
+            GetStateValidity,
+            RobotState(is_diff=True),
+            GROUP,
+            Constraints(position_constraints=[item]),
+        ).constraint_result[0]
+        for item in regions
+    ]
     assert results[0] == results[1] and np.isfinite(results[0].distance)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests in frames that only tf knows, settings that change while the node runs, and what is shown of a plan."""
+
 from __future__ import annotations
 
 import time
@@ -64,8 +65,9 @@ def tell_frame(broadcaster: Any, name: str, place: tuple[float, float, float], p
     broadcaster.sendTransform(message)
 
     def is_known() -> bool:
-        frames = call("get_planning_scene", GetPlanningScene,
-                      PlanningSceneComponents(PlanningSceneComponents.TRANSFORMS)).scene.fixed_frame_transforms
+        frames = call(
+            "get_planning_scene", GetPlanningScene, PlanningSceneComponents(PlanningSceneComponents.TRANSFORMS)
+        ).scene.fixed_frame_transforms
         found = {item.child_frame_id: item.transform.translation for item in frames}.get(name)
         return found is not None and np.allclose([found.x, found.y, found.z], place)
 
@@ -74,8 +76,10 @@ def tell_frame(broadcaster: Any, name: str, place: tuple[float, float, float], p
 
 def places_of_objects() -> dict[str, list[float]]:
     scene = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
-    return {item.id: [item.pose.position.x, item.pose.position.y, item.pose.position.z]
-            for item in scene.world.collision_objects}
+    return {
+        item.id: [item.pose.position.x, item.pose.position.y, item.pose.position.z]
+        for item in scene.world.collision_objects
+    }
 
 
 def end_of(answer: Any) -> np.ndarray:
@@ -84,16 +88,21 @@ def end_of(answer: Any) -> np.ndarray:
 
 # ---------------------------------------------------------------- frames of tf
 def test_goals_objects_and_ik_may_be_given_in_a_frame_that_only_tf_knows(broadcaster: Any) -> None:
-    assert plan(request(pose_constraints(0, 0, 0, frame="camera"))).error_code.val == \
-        MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+    assert (
+        plan(request(pose_constraints(0, 0, 0, frame="camera"))).error_code.val
+        == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+    )
     tell_frame(broadcaster, "camera", (0.1, 0.4, 0.9))
     answer = plan(request(pose_constraints(0.0, 0.1, 0.05, frame="camera")))
     assert answer.error_code.val == OK and np.allclose(end_of(answer), (0.1, 0.5, 0.95), atol=1e-5)
     crate = box("crate", 0.3, 0.0, 1.0, (0.1, 0.1, 0.1))
     crate.header.frame_id = "camera"
     assert add(crate) and np.allclose(places_of_objects()["crate"], (0.4, 0.4, 1.9))
-    asked = PositionIKRequest(group_name=GROUP, ik_link_name=TIP, pose_stamped=PoseStamped(
-        Header(frame_id="camera"), Pose(Point(0.0, 0.1, 0.05), DOWN)))
+    asked = PositionIKRequest(
+        group_name=GROUP,
+        ik_link_name=TIP,
+        pose_stamped=PoseStamped(Header(frame_id="camera"), Pose(Point(0.0, 0.1, 0.05), DOWN)),
+    )
     assert call("compute_ik", GetPositionIK, asked).error_code.val == OK
 
 
@@ -120,8 +129,15 @@ def test_the_monitored_scene_tells_frames_of_tf(broadcaster: Any) -> None:
     with heard("monitored_planning_scene", PlanningScene) as messages:
         until(lambda: messages, "the scene")
         tell_frame(broadcaster, "bench", (1.0, 0.0, 0.0))
-        until(lambda: [item for message in messages for item in message.fixed_frame_transforms
-                       if item.child_frame_id == "bench"], "the frame")
+        until(
+            lambda: [
+                item
+                for message in messages
+                for item in message.fixed_frame_transforms
+                if item.child_frame_id == "bench"
+            ],
+            "the frame",
+        )
         assert all(message.is_diff for message in messages[1:])
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The goal one drags in RViz: this test sends what RViz would send, and sees what RViz would show."""
+
 from __future__ import annotations
 
 import threading
@@ -48,8 +49,10 @@ class Rviz:
             rospy.Subscriber(f"{NODE}/{name}_ghost", MarkerArray, self._on_ghost, callback_args=name)
         rospy.Subscriber("/move_group/display_planned_path", DisplayTrajectory, self.motions.append)
         self._feedback = rospy.Publisher(f"{NODE}/marker/feedback", InteractiveMarkerFeedback, queue_size=10)
-        self._panel = {name: rospy.Publisher(f"/rviz/moveit/{name}", Empty, queue_size=1)
-                       for name in ("plan", "execute", "stop", "update_start_state", "update_goal_state")}
+        self._panel = {
+            name: rospy.Publisher(f"/rviz/moveit/{name}", Empty, queue_size=1)
+            for name in ("plan", "execute", "stop", "update_start_state", "update_goal_state")
+        }
         self.custom_goal = rospy.Publisher("/rviz/moveit/update_custom_goal_state", RobotState, queue_size=1)
         until(lambda: self.marker is not None, "the marker", 120.0)
         publishers = (self._feedback, self.custom_goal, *self._panel.values())
@@ -124,8 +127,14 @@ def clean(arm: FakeArm, rviz: Rviz) -> None:
     rviz.select("Start: follow the robot")
     said = len(LAST_WORDS)
     rviz.press("update_goal_state")
-    until(lambda: len(LAST_WORDS) > said and rviz.status == "goal is free"
-          and rviz.goal_is_at(rviz.home.x, rviz.home.y, rviz.home.z), "the goal where the robot is")
+    until(
+        lambda: (
+            len(LAST_WORDS) > said
+            and rviz.status == "goal is free"
+            and rviz.goal_is_at(rviz.home.x, rviz.home.y, rviz.home.z)
+        ),
+        "the goal where the robot is",
+    )
     rviz.motions.clear()
 
 
@@ -184,8 +193,10 @@ def test_plan_and_execute_can_be_stopped(rviz: Rviz, arm: FakeArm) -> None:
     state = RobotState(is_diff=True)
     state.joint_state.name, state.joint_state.position = ["shoulder_pan_joint"], [START[0] - 3.0]
     rviz.custom_goal.publish(state)
-    until(lambda: rviz.status == "goal is free" and not rviz.goal_is_at(rviz.home.x, rviz.home.y, rviz.home.z),
-          "the goal from the topic")
+    until(
+        lambda: rviz.status == "goal is free" and not rviz.goal_is_at(rviz.home.x, rviz.home.y, rviz.home.z),
+        "the goal from the topic",
+    )
     arm.cancelled.clear()
     rviz.select("Plan and execute")
     until(lambda: abs(arm.positions["shoulder_pan_joint"] - START[0]) > 0.05, "the robot moves")

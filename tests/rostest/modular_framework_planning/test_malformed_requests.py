@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whatever is sent to any endpoint of move_group, it answers with a refusal or ignores it, and works on."""
+
 from __future__ import annotations
 
 import time
@@ -49,21 +50,43 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from modular_framework_ros.action_client import SteadyActionClient
 
 MILLION, MANY = 1_000_000, 100_000
-SERVICES = {"plan_kinematic_path": GetMotionPlan, "compute_cartesian_path": GetCartesianPath,
-            "compute_ik": GetPositionIK, "compute_fk": GetPositionFK, "check_state_validity": GetStateValidity,
-            "query_planner_interface": QueryPlannerInterfaces, "get_planner_params": GetPlannerParams,
-            "set_planner_params": SetPlannerParams, "get_planning_scene": GetPlanningScene,
-            "apply_planning_scene": ApplyPlanningScene, "plan_sequence_path": GetMotionSequence}
-ACTIONS = {"move_group": MoveGroupAction, "execute_trajectory": ExecuteTrajectoryAction, "pickup": PickupAction,
-           "place": PlaceAction, "sequence_move_group": MoveGroupSequenceAction}
-TOPICS = {"joint_states": JointState, "planning_scene": PlanningScene, "planning_scene_world": PlanningSceneWorld,
-          "collision_object": CollisionObject, "attached_collision_object": AttachedCollisionObject,
-          "trajectory_execution_event": String}
+SERVICES = {
+    "plan_kinematic_path": GetMotionPlan,
+    "compute_cartesian_path": GetCartesianPath,
+    "compute_ik": GetPositionIK,
+    "compute_fk": GetPositionFK,
+    "check_state_validity": GetStateValidity,
+    "query_planner_interface": QueryPlannerInterfaces,
+    "get_planner_params": GetPlannerParams,
+    "set_planner_params": SetPlannerParams,
+    "get_planning_scene": GetPlanningScene,
+    "apply_planning_scene": ApplyPlanningScene,
+    "plan_sequence_path": GetMotionSequence,
+}
+ACTIONS = {
+    "move_group": MoveGroupAction,
+    "execute_trajectory": ExecuteTrajectoryAction,
+    "pickup": PickupAction,
+    "place": PlaceAction,
+    "sequence_move_group": MoveGroupSequenceAction,
+}
+TOPICS = {
+    "joint_states": JointState,
+    "planning_scene": PlanningScene,
+    "planning_scene_world": PlanningSceneWorld,
+    "collision_object": CollisionObject,
+    "attached_collision_object": AttachedCollisionObject,
+    "trajectory_execution_event": String,
+}
 WITHOUT_CODE = {"get_planner_params", "set_planner_params"}  # a refusal can only be the failure of the call
 ALWAYS_ANSWERED = {"query_planner_interface", "get_planner_params", "set_planner_params", "get_planning_scene"}
-MEANS_SOMETHING = {("apply_planning_scene", "nothing"), ("check_state_validity", "nothing"),  # clear; ask for all
-                   ("execute_trajectory", "nothing"), ("sequence_move_group", "nothing"),  # nothing to do is done
-                   ("plan_sequence_path", "nothing")}
+MEANS_SOMETHING = {
+    ("apply_planning_scene", "nothing"),
+    ("check_state_validity", "nothing"),  # clear; ask for all
+    ("execute_trajectory", "nothing"),
+    ("sequence_move_group", "nothing"),  # nothing to do is done
+    ("plan_sequence_path", "nothing"),
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -103,8 +126,11 @@ def test_services_answer_nonsense_with_a_refusal(name: str, style: str) -> None:
     if name in ALWAYS_ANSWERED or (name, style) in MEANS_SOMETHING:
         return
     code = code_of(answer)
-    assert code not in (0, OK) if code is not None else not (getattr(answer, "success", answer) is True
-                                                             or getattr(answer, "valid", False))
+    assert (
+        code not in (0, OK)
+        if code is not None
+        else not (getattr(answer, "success", answer) is True or getattr(answer, "valid", False))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -163,15 +189,17 @@ def test_times_that_go_back_are_refused(clients: dict[str, Any], times: tuple[fl
     goal = ExecuteTrajectoryGoal()
     goal.trajectory.joint_trajectory.joint_names = ARM
     goal.trajectory.joint_trajectory.points = [
-        JointTrajectoryPoint(positions=[0.0] * 6, time_from_start=rospy.Duration.from_sec(stamp)) for stamp in times]
+        JointTrajectoryPoint(positions=[0.0] * 6, time_from_start=rospy.Duration.from_sec(stamp)) for stamp in times
+    ]
     result, report = execute(goal, clients)
     assert result.error_code.val == MoveItErrorCodes.INVALID_MOTION_PLAN and "point" in report["reason"]
 
 
 def test_a_hundred_thousand_waypoints_get_an_answer() -> None:
     far = Pose(Point(5.0, 0.0, 1.0), DOWN)
-    message = GetCartesianPath._request_class(group_name=GROUP, link_name="eg_manipulator", max_step=0.01,
-                                              waypoints=[far] * MANY)
+    message = GetCartesianPath._request_class(
+        group_name=GROUP, link_name="eg_manipulator", max_step=0.01, waypoints=[far] * MANY
+    )
     message.header.frame_id = "world"
     message.start_state.is_diff = True
     answer = call("compute_cartesian_path", GetCartesianPath, message)
@@ -187,14 +215,16 @@ def test_a_hundred_thousand_constraints_get_an_answer() -> None:
 def test_a_mesh_of_a_million_corners_that_are_none_is_refused() -> None:
     mesh = Mesh(vertices=[Point(float("nan"), 0, 0)] * MILLION, triangles=[MeshTriangle([0, 1, 2])])
     scene = PlanningScene(is_diff=True)
-    scene.world.collision_objects = [CollisionObject(id="mesh", meshes=[mesh],
-                                                     mesh_poses=[Pose(Point(), Quaternion(0, 0, 0, 1))])]
+    scene.world.collision_objects = [
+        CollisionObject(id="mesh", meshes=[mesh], mesh_poses=[Pose(Point(), Quaternion(0, 0, 0, 1))])
+    ]
     assert not call("apply_planning_scene", ApplyPlanningScene, scene).success
 
 
 def test_counts_without_end_can_be_cancelled(clients: dict[str, Any]) -> None:
-    goal = MoveGroupGoal(request=request(joint_goal("elbow_joint", 1.0), num_planning_attempts=2**31 - 1,
-                                         allowed_planning_time=1e-3))
+    goal = MoveGroupGoal(
+        request=request(joint_goal("elbow_joint", 1.0), num_planning_attempts=2**31 - 1, allowed_planning_time=1e-3)
+    )
     goal.planning_options.plan_only = goal.planning_options.replan = True
     goal.planning_options.replan_attempts = 2**31 - 1
     goal.request.pipeline_id = "nobody"

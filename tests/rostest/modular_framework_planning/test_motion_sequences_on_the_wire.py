@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """PTP, LIN, CIRC and sequences on the wire, with the shipped config package: planned, refused, executed, cancelled."""
+
 from __future__ import annotations
 
 import threading
@@ -45,22 +46,31 @@ from sensor_msgs.msg import JointState
 
 PILZ = "pilz_industrial_motion_planner"
 CODES = MoveItErrorCodes
-pytestmark = [pytest.mark.move_group(service="plan_sequence_path", gripper=True),
-              pytest.mark.usefixtures("clean_scene")]
+pytestmark = [
+    pytest.mark.move_group(service="plan_sequence_path", gripper=True),
+    pytest.mark.usefixtures("clean_scene"),
+]
 
 
 def to(home: Pose, x: float, y: float, z: float, planner: str = "LIN", **changes: Any) -> MotionPlanRequest:
     goal = pose_constraints(home.position.x + x, home.position.y + y, home.position.z + z, home.orientation)
-    return request(goal, pipeline_id=PILZ, planner_id=planner, max_velocity_scaling_factor=0.2,
-                   max_acceleration_scaling_factor=0.2, **changes)
+    return request(
+        goal,
+        pipeline_id=PILZ,
+        planner_id=planner,
+        max_velocity_scaling_factor=0.2,
+        max_acceleration_scaling_factor=0.2,
+        **changes,
+    )
 
 
 def point_of(home: Pose, name: str, x: float, y: float, z: float) -> Constraints:
     """As clients of Pilz's planner write it: no shape, no orientation."""
     point = PositionConstraint(link_name=TIP)
     point.header.frame_id = "world"
-    point.constraint_region.primitive_poses = [Pose(Point(home.position.x + x, home.position.y + y,
-                                                          home.position.z + z), Quaternion())]
+    point.constraint_region.primitive_poses = [
+        Pose(Point(home.position.x + x, home.position.y + y, home.position.z + z), Quaternion())
+    ]
     return Constraints(name=name, position_constraints=[point])
 
 
@@ -73,8 +83,10 @@ def times_of(trajectory: Any) -> np.ndarray:
 
 
 def test_the_pipeline_and_its_planners_are_listed() -> None:
-    known = {item.pipeline_id: item.planner_ids for item in
-             call("query_planner_interface", QueryPlannerInterfaces).planner_interfaces}
+    known = {
+        item.pipeline_id: item.planner_ids
+        for item in call("query_planner_interface", QueryPlannerInterfaces).planner_interfaces
+    }
     assert sorted(known[PILZ]) == ["CIRC", "LIN", "PTP"] and "ompl" in known
 
 
@@ -96,10 +108,13 @@ def test_lin_is_straight(home: Pose) -> None:
     assert (np.diff(times_of(answer.trajectory)) > 0.0).all()
 
 
-@pytest.mark.parametrize(("name", "point", "goal"), [("interim", (0.05, 0, -0.05), (0.1, 0.0, 0.0)),
-                                                     ("center", (0.05, 0, 0), (0.05, 0.0, -0.05))])
-def test_circ_is_a_circle(home: Pose, name: str, point: tuple[float, float, float],
-                          goal: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize(
+    ("name", "point", "goal"),
+    [("interim", (0.05, 0, -0.05), (0.1, 0.0, 0.0)), ("center", (0.05, 0, 0), (0.05, 0.0, -0.05))],
+)
+def test_circ_is_a_circle(
+    home: Pose, name: str, point: tuple[float, float, float], goal: tuple[float, float, float]
+) -> None:
     answer = plan(to(home, *goal, planner="CIRC", path_constraints=point_of(home, name, *point)))
     assert answer.error_code.val == OK
     centre = vector(home) + np.array([0.05, 0.0, 0.0])
@@ -110,12 +125,16 @@ def test_circ_is_a_circle(home: Pose, name: str, point: tuple[float, float, floa
 def test_refusals_have_a_code_and_a_reason(home: Pose) -> None:
     moving = RobotState(joint_state=JointState(name=ARM, position=START, velocity=[0.0, 0.0, 0.3, 0.0, 0.0, 0.0]))
     for message, code, text in (
-            (to(home, 0.1, 0, 0, planner="RRTConnect"), CODES.PLANNING_FAILED, "PTP, LIN, CIRC"),
-            (to(home, 0.1, 0, 0, start_state=moving), CODES.INVALID_ROBOT_STATE, "elbow_joint"),
-            (to(home, 0.1, 0, 0, planner="CIRC"), CODES.INVALID_MOTION_PLAN, "center"),
-            (to(home, 0.1, 0, 0, planner="CIRC", path_constraints=point_of(home, "center", 0.05, 0, 0)),
-             CODES.INVALID_MOTION_PLAN, "half"),
-            (to(home, 0, 2.0, 0), CODES.NO_IK_SOLUTION, "out of reach")):
+        (to(home, 0.1, 0, 0, planner="RRTConnect"), CODES.PLANNING_FAILED, "PTP, LIN, CIRC"),
+        (to(home, 0.1, 0, 0, start_state=moving), CODES.INVALID_ROBOT_STATE, "elbow_joint"),
+        (to(home, 0.1, 0, 0, planner="CIRC"), CODES.INVALID_MOTION_PLAN, "center"),
+        (
+            to(home, 0.1, 0, 0, planner="CIRC", path_constraints=point_of(home, "center", 0.05, 0, 0)),
+            CODES.INVALID_MOTION_PLAN,
+            "half",
+        ),
+        (to(home, 0, 2.0, 0), CODES.NO_IK_SOLUTION, "out of reach"),
+    ):
         answer, report = report_of(lambda message=message: plan(message))
         assert answer.error_code.val == code and text in report["reason"], report
 
@@ -172,13 +191,14 @@ def test_rules_of_a_sequence_are_kept_and_told(home: Pose) -> None:
     here = RobotState(joint_state=JointState(name=ARM, position=START))
     started = to(home, 0.1, 0, -0.1, start_state=here)
     for message, code, text in (
-            (sequence((first, -0.01), (second, 0.0)), CODES.INVALID_MOTION_PLAN, "items[0].blend_radius is -0.01"),
-            (sequence((first, 0.01), (second, 0.01)), CODES.INVALID_MOTION_PLAN, "the last one must be 0"),
-            (sequence((first, 0.0), (started, 0.0)), CODES.INVALID_ROBOT_STATE, "items[1].start_state"),
-            (sequence((first, 0.06), (second, 0.06), (third, 0.0)), CODES.INVALID_MOTION_PLAN, "overlap"),
-            (sequence((first, 0.0), (to(home, 0, 3.0, 0), 0.0)), CODES.NO_IK_SOLUTION, "items[1]: "),
-            (sequence((first, 0.0), (to(home, 0, 0, 0, group_name="nobody"), 0.0)), CODES.INVALID_GROUP_NAME, "nobody"),
-            (sequence((first, float("nan")), (second, 0.0)), CODES.INVALID_MOTION_PLAN, "is nan")):
+        (sequence((first, -0.01), (second, 0.0)), CODES.INVALID_MOTION_PLAN, "items[0].blend_radius is -0.01"),
+        (sequence((first, 0.01), (second, 0.01)), CODES.INVALID_MOTION_PLAN, "the last one must be 0"),
+        (sequence((first, 0.0), (started, 0.0)), CODES.INVALID_ROBOT_STATE, "items[1].start_state"),
+        (sequence((first, 0.06), (second, 0.06), (third, 0.0)), CODES.INVALID_MOTION_PLAN, "overlap"),
+        (sequence((first, 0.0), (to(home, 0, 3.0, 0), 0.0)), CODES.NO_IK_SOLUTION, "items[1]: "),
+        (sequence((first, 0.0), (to(home, 0, 0, 0, group_name="nobody"), 0.0)), CODES.INVALID_GROUP_NAME, "nobody"),
+        (sequence((first, float("nan")), (second, 0.0)), CODES.INVALID_MOTION_PLAN, "is nan"),
+    ):
         answer, report = report_of(lambda message=message: solve(message))
         assert answer.error_code.val == code and text in report["reason"], report
         assert not answer.planned_trajectories, "all or nothing"
@@ -228,8 +248,10 @@ def test_a_cancel_stops_the_sequence(home: Pose, arm: FakeArm, client: Any) -> N
         item.req.max_velocity_scaling_factor = 0.02
     arm.cancelled.clear()
     moving = threading.Event()
-    client.send_goal(MoveGroupSequenceGoal(request=slow),
-                     feedback_cb=lambda feedback: moving.set() if feedback.state == "MONITOR" else None)
+    client.send_goal(
+        MoveGroupSequenceGoal(request=slow),
+        feedback_cb=lambda feedback: moving.set() if feedback.state == "MONITOR" else None,
+    )
     assert moving.wait(30.0)
     time.sleep(0.5)
     client.cancel_goal()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action move_group: its planning options, what it says of the executed motion, and how it is stopped."""
+
 from __future__ import annotations
 
 import time

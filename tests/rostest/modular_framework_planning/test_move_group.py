@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The move_group node on the wire: it plans, keeps the scene, executes, cancels, and survives malformed requests."""
+
 from __future__ import annotations
 
 import threading
@@ -202,24 +203,27 @@ SHORT_STATE = RobotState(joint_state=JointState(name=ARM, position=[0.0]))
 CODES = MoveItErrorCodes
 
 
-@pytest.mark.parametrize(("message", "codes"), [
-    (MotionPlanRequest(), {CODES.INVALID_GROUP_NAME}),
-    (request(group_name="nobody"), {CODES.INVALID_GROUP_NAME}),
-    (request(joint_goal("no_such_joint", 0.0)), {CODES.INVALID_GOAL_CONSTRAINTS}),
-    (request(joint_goal("elbow_joint", NAN)), {CODES.INVALID_GOAL_CONSTRAINTS}),
-    (request(joint_goal("elbow_joint", 100.0)), {-27}),
-    (request(pose_constraints(NAN, 0.5, 0.95)), {CODES.INVALID_GOAL_CONSTRAINTS}),
-    (request(pose_constraints(0.1, 0.5, 0.95, Quaternion(0, 0, 0, 0.5))), {CODES.INVALID_GOAL_CONSTRAINTS}),
-    (request(pose_constraints(0.1, 0.5, 0.95, frame="nowhere")), {CODES.FRAME_TRANSFORM_FAILURE}),
-    (request(Constraints()), {CODES.INVALID_GOAL_CONSTRAINTS}),
-    (request(goal_constraints=[]), {CODES.INVALID_GOAL_CONSTRAINTS}),
-    (request(start_state=BAD_STATE), {CODES.INVALID_ROBOT_STATE}),
-    (request(start_state=NAN_STATE), {CODES.INVALID_ROBOT_STATE}),
-    (request(start_state=SHORT_STATE), {CODES.INVALID_ROBOT_STATE}),
-    (request(allowed_planning_time=NAN), {CODES.TIMED_OUT}),
-    (request(max_velocity_scaling_factor=NAN), {CODES.INVALID_MOTION_PLAN}),
-    (request(pipeline_id="nobody"), {CODES.PLANNING_FAILED}),
-])
+@pytest.mark.parametrize(
+    ("message", "codes"),
+    [
+        (MotionPlanRequest(), {CODES.INVALID_GROUP_NAME}),
+        (request(group_name="nobody"), {CODES.INVALID_GROUP_NAME}),
+        (request(joint_goal("no_such_joint", 0.0)), {CODES.INVALID_GOAL_CONSTRAINTS}),
+        (request(joint_goal("elbow_joint", NAN)), {CODES.INVALID_GOAL_CONSTRAINTS}),
+        (request(joint_goal("elbow_joint", 100.0)), {-27}),
+        (request(pose_constraints(NAN, 0.5, 0.95)), {CODES.INVALID_GOAL_CONSTRAINTS}),
+        (request(pose_constraints(0.1, 0.5, 0.95, Quaternion(0, 0, 0, 0.5))), {CODES.INVALID_GOAL_CONSTRAINTS}),
+        (request(pose_constraints(0.1, 0.5, 0.95, frame="nowhere")), {CODES.FRAME_TRANSFORM_FAILURE}),
+        (request(Constraints()), {CODES.INVALID_GOAL_CONSTRAINTS}),
+        (request(goal_constraints=[]), {CODES.INVALID_GOAL_CONSTRAINTS}),
+        (request(start_state=BAD_STATE), {CODES.INVALID_ROBOT_STATE}),
+        (request(start_state=NAN_STATE), {CODES.INVALID_ROBOT_STATE}),
+        (request(start_state=SHORT_STATE), {CODES.INVALID_ROBOT_STATE}),
+        (request(allowed_planning_time=NAN), {CODES.TIMED_OUT}),
+        (request(max_velocity_scaling_factor=NAN), {CODES.INVALID_MOTION_PLAN}),
+        (request(pipeline_id="nobody"), {CODES.PLANNING_FAILED}),
+    ],
+)
 def test_malformed_plan_requests_get_a_code(message: MotionPlanRequest, codes: set[int]) -> None:
     assert plan(message).error_code.val in codes
 
@@ -227,21 +231,31 @@ def test_malformed_plan_requests_get_a_code(message: MotionPlanRequest, codes: s
 def test_malformed_ik_and_fk_requests_get_a_code() -> None:
     zero = PoseStamped(Header(frame_id="world"), Pose())
     lost = PoseStamped(Header(frame_id="nowhere"), Pose(Point(0, 0.5, 1), DOWN))
-    for message, code in ((PositionIKRequest(), CODES.INVALID_GROUP_NAME), (ik(pose_stamped=zero), CODES.FAILURE),
-                          (ik(pose_stamped=lost), CODES.FRAME_TRANSFORM_FAILURE),
-                          (ik(ik_link_name="nobody"), CODES.INVALID_LINK_NAME),
-                          (ik(robot_state=NAN_STATE), CODES.INVALID_ROBOT_STATE)):
+    for message, code in (
+        (PositionIKRequest(), CODES.INVALID_GROUP_NAME),
+        (ik(pose_stamped=zero), CODES.FAILURE),
+        (ik(pose_stamped=lost), CODES.FRAME_TRANSFORM_FAILURE),
+        (ik(ik_link_name="nobody"), CODES.INVALID_LINK_NAME),
+        (ik(robot_state=NAN_STATE), CODES.INVALID_ROBOT_STATE),
+    ):
         assert call("compute_ik", GetPositionIK, message).error_code.val == code
-    for header, links, code in ((Header(), ["nobody"], CODES.INVALID_LINK_NAME),
-                                (Header(), [], CODES.INVALID_LINK_NAME),
-                                (Header(frame_id="nowhere"), ["tool0"], CODES.FRAME_TRANSFORM_FAILURE)):
+    for header, links, code in (
+        (Header(), ["nobody"], CODES.INVALID_LINK_NAME),
+        (Header(), [], CODES.INVALID_LINK_NAME),
+        (Header(frame_id="nowhere"), ["tool0"], CODES.FRAME_TRANSFORM_FAILURE),
+    ):
         assert call("compute_fk", GetPositionFK, header, links, RobotState()).error_code.val == code
 
 
 def test_malformed_scenes_are_refused_whole_and_leave_the_scene_alone() -> None:
-    bad = [box("", 0, 0, 3, (1, 1, 1)), box("x", NAN, 0, 3, (1, 1, 1)), box("x", 0, 0, 3, (1, -1, 1)),
-           box("forearm_link", 0, 0, 3, (1, 1, 1)), CollisionObject(id="empty"),
-           CollisionObject(id="nobody", operation=CollisionObject.MOVE)]
+    bad = [
+        box("", 0, 0, 3, (1, 1, 1)),
+        box("x", NAN, 0, 3, (1, 1, 1)),
+        box("x", 0, 0, 3, (1, -1, 1)),
+        box("forearm_link", 0, 0, 3, (1, 1, 1)),
+        CollisionObject(id="empty"),
+        CollisionObject(id="nobody", operation=CollisionObject.MOVE),
+    ]
     for item in bad:
         assert not add(box("good", 0, 0, 3, (0.1, 0.1, 0.1)), item)
     scene = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
@@ -281,8 +295,9 @@ def test_a_motion_from_elsewhere_is_refused_with_the_joint_that_is_off(arm: Fake
     arm.positions["elbow_joint"] += 0.3
     arm.settle()
     client = execute_client()
-    _, report = report_of(lambda: client.send_goal_and_wait(ExecuteTrajectoryGoal(answer.trajectory),
-                                                            rospy.Duration(30.0)))
+    _, report = report_of(
+        lambda: client.send_goal_and_wait(ExecuteTrajectoryGoal(answer.trajectory), rospy.Duration(30.0))
+    )
     assert client.get_result().error_code.val == CODES.INVALID_MOTION_PLAN
     assert "elbow_joint" in report["reason"] and "allowed_start_tolerance" in report["reason"]
 

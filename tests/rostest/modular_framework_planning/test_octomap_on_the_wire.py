@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Depth images and clouds become obstacles of the scene; robot and known objects do not; maps are cleared and kept."""
+
 from __future__ import annotations
 
 import time
@@ -51,8 +52,10 @@ class Camera:
         info = CameraInfo(height=480, width=640)
         info.K = [FOCUS, 0, CENTER[0], 0, FOCUS, CENTER[1], 0, 0, 1]
         self._info.publish(info)
-        until(lambda: self._image.get_num_connections() > 0 and self._info.get_num_connections() > 0,
-              "move_group listens to the camera")
+        until(
+            lambda: self._image.get_num_connections() > 0 and self._info.get_num_connections() > 0,
+            "move_group listens to the camera",
+        )
 
     @staticmethod
     def depth(boxes: list[tuple[tuple[float, float, float], tuple[float, float, float]]]) -> np.ndarray:
@@ -100,6 +103,7 @@ def until_seen(send: Callable[[], None], condition: Callable[[], bool], what: st
 
     move_group leaves out what it sees while joint states come more than a second late, as on a busy computer.
     """
+
     def sent_and_seen() -> bool:
         send()
         end = time.monotonic() + 5.0
@@ -119,14 +123,19 @@ def test_a_box_in_a_depth_image_is_an_obstacle_and_goes_when_it_is_gone(camera: 
     clear()
     depth = camera.depth([OBSTACLE])
     for encoding in ("16UC1", "32FC1"):
-        until_seen(partial(camera.show, depth, encoding), lambda: occupied((-0.7, 0.9, 1.2)),
-                   f"the box's front is occupied ({encoding})")
+        until_seen(
+            partial(camera.show, depth, encoding),
+            lambda: occupied((-0.7, 0.9, 1.2)),
+            f"the box's front is occupied ({encoding})",
+        )
         assert not occupied((-1.5, 0.5, 1.2)), "the ray to it is free"
         clear()
         assert octomap() is None
     until_seen(lambda: camera.show(depth), lambda: occupied((-0.7, 0.9, 1.2)), "the box's front is occupied")
-    until(lambda: (camera.show(camera.depth([])), time.sleep(0.3), not occupied((-0.7, 0.9, 1.2)))[-1],
-          "three empty looks clear it")
+    until(
+        lambda: (camera.show(camera.depth([])), time.sleep(0.3), not occupied((-0.7, 0.9, 1.2)))[-1],
+        "three empty looks clear it",
+    )
     assert occupied((WALL_X, 1.0, 1.2)), "the wall behind is still there"
 
 
@@ -172,8 +181,14 @@ def test_an_object_that_becomes_known_leaves_the_octomap(camera: Camera) -> None
 
 def cloud(points: np.ndarray, frame: str) -> PointCloud2:
     fields = [PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate("xyz")]
-    message = PointCloud2(height=1, width=len(points), fields=fields, point_step=12, row_step=12 * len(points),
-                          data=points.astype("<f4").tobytes())
+    message = PointCloud2(
+        height=1,
+        width=len(points),
+        fields=fields,
+        point_step=12,
+        row_step=12 * len(points),
+        data=points.astype("<f4").tobytes(),
+    )
     message.header.frame_id, message.header.stamp = frame, rospy.Time.now()
     return message
 
@@ -195,15 +210,21 @@ def test_points_in_a_cloud_are_obstacles_that_can_be_allowed(camera: Camera) -> 
     until(lambda: publisher.get_num_connections() > 0, "move_group listens to the scanner")
     assert validity(elbow_joint=REACHED).valid
     points = np.vstack([ball(), [[np.nan] * 3, [90.0, 0.0, 0.0]], wrist()[None]])
-    until_seen(lambda: publisher.publish(cloud(points, "world")), lambda: occupied(tuple(wrist(REACHED))),
-               "the ball is occupied")
+    until_seen(
+        lambda: publisher.publish(cloud(points, "world")),
+        lambda: occupied(tuple(wrist(REACHED))),
+        "the ball is occupied",
+    )
     until(lambda: bool(filtered), "the rest is published")
     assert filtered[-1].width == 200, "without the point on the robot and those without a place or out of range"
     touching = validity(elbow_joint=REACHED)
     assert not touching.valid
     assert "<octomap>" in {name for item in touching.contacts for name in (item.contact_body_1, item.contact_body_2)}
-    matrix = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(
-        PlanningSceneComponents.ALLOWED_COLLISION_MATRIX)).scene.allowed_collision_matrix
+    matrix = call(
+        "get_planning_scene",
+        GetPlanningScene,
+        PlanningSceneComponents(PlanningSceneComponents.ALLOWED_COLLISION_MATRIX),
+    ).scene.allowed_collision_matrix
     for allowed in (True, False):
         matrix.default_entry_names, matrix.default_entry_values = ["<octomap>"], [allowed]
         change = PlanningScene(is_diff=True, allowed_collision_matrix=matrix)
@@ -211,8 +232,9 @@ def test_points_in_a_cloud_are_obstacles_that_can_be_allowed(camera: Camera) -> 
         assert validity(elbow_joint=REACHED).valid is allowed
 
 
-def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_seen(camera: Camera,
-                                                                                   arm: FakeArm) -> None:
+def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_seen(
+    camera: Camera, arm: FakeArm
+) -> None:
     clear()
     publisher = rospy.Publisher("/scanner/points", PointCloud2, queue_size=1)
     until(lambda: publisher.get_num_connections() > 0, "move_group listens to the scanner")
@@ -222,7 +244,7 @@ def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_se
         state = RobotState(joint_state=JointState(name=ARM, position=[START[0] + turn, *START[1:]]))
         pose = call("compute_fk", GetPositionFK, Header(frame_id="world"), ["wrist_1_link"], state).pose_stamped[0].pose
         q = pose.orientation
-        axis = np.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+        axis = np.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x**2 + q.y**2)])
         poses[turn] = np.array([pose.position.x, pose.position.y, pose.position.z]) + 0.4 * axis
     message = cloud(np.repeat(ahead, 5, axis=0), "wrist_1_link")
     arm.tell()
@@ -231,8 +253,11 @@ def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_se
     publisher.publish(message)
     until(lambda: occupied(tuple(poses[0.0])), "the point is where the link was")
     assert not occupied(tuple(poses[0.7]))
-    until_seen(lambda: publisher.publish(cloud(ahead, "wrist_1_link")), lambda: occupied(tuple(poses[0.7])),
-               "and then where it is")
+    until_seen(
+        lambda: publisher.publish(cloud(ahead, "wrist_1_link")),
+        lambda: occupied(tuple(poses[0.7])),
+        "and then where it is",
+    )
     arm.positions["shoulder_pan_joint"] = START[0]
 
 
@@ -244,14 +269,16 @@ def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> 
     rospy.Subscriber("/move_group/octomap_markers", MarkerArray, cubes.append, queue_size=5)
     until(lambda: bool(told), "the whole scene came first")
     depth = camera.depth([OBSTACLE])
-    until_seen(lambda: camera.show(depth),
-               lambda: any(item.world.octomap.octomap.id == "OcTree" for item in told), "the map is published")
+    until_seen(
+        lambda: camera.show(depth),
+        lambda: any(item.world.octomap.octomap.id == "OcTree" for item in told),
+        "the map is published",
+    )
     path = tmp_path / "room.bt"
     assert call("/move_group/save_map", SaveMap, str(path)).success
     before = octomap()
     assert before is not None and np.array_equal(read_file(path).occupied_keys, before.occupied_keys)
-    until(lambda: bool(cubes) and len(cubes[-1].markers[-1].points) == len(before.occupied_keys),
-          "the cubes are shown")
+    until(lambda: bool(cubes) and len(cubes[-1].markers[-1].points) == len(before.occupied_keys), "the cubes are shown")
     known = len(told)
     clear()
     until(lambda: any(item.world.octomap.octomap.id == "cleared" for item in told[known:]), "the clearing is told")
@@ -262,8 +289,9 @@ def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> 
     for name in (tmp_path / "no.bt", tmp_path / "missing.bt", tmp_path):
         assert not call("/move_group/load_map", LoadMap, str(name)).success
     assert not call("/move_group/save_map", SaveMap, "/no/such/folder/room.bt").success
-    sent = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(
-        PlanningSceneComponents.OCTOMAP)).scene.world
+    sent = call(
+        "get_planning_scene", GetPlanningScene, PlanningSceneComponents(PlanningSceneComponents.OCTOMAP)
+    ).scene.world
     clear()
     publisher = rospy.Publisher("/planning_scene_world", PlanningSceneWorld, queue_size=1)
     until(lambda: publisher.get_num_connections() > 0, "move_group listens to planning_scene_world")
@@ -285,5 +313,8 @@ def test_looks_that_cannot_be_placed_are_left_out(camera: Camera) -> None:
         publisher.publish(message)
         time.sleep(1.5)
     assert octomap() is None
-    until_seen(lambda: publisher.publish(cloud(good, "world")), lambda: occupied((1.0, 1.0, 1.0)),
-               "the node lives, the next cloud counts")
+    until_seen(
+        lambda: publisher.publish(cloud(good, "world")),
+        lambda: occupied((1.0, 1.0, 1.0)),
+        "the node lives, the next cloud counts",
+    )

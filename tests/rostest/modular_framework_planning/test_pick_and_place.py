@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pickup and place on the wire: which grasp is taken, what each motion does, and why a grasp cannot be done."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -80,20 +81,32 @@ def along(x: float, y: float, z: float, wished: float = 0.1, least: float = 0.05
     return message
 
 
-def grasp(name: str = "top", quality: float = 1.0, place_of_block: tuple[float, float, float] = BLOCK,
-          **changes: Any) -> Grasp:
+def grasp(
+    name: str = "top", quality: float = 1.0, place_of_block: tuple[float, float, float] = BLOCK, **changes: Any
+) -> Grasp:
     x, y, z = place_of_block
-    message = Grasp(id=name, grasp_quality=quality, pre_grasp_posture=fingers(OPEN), grasp_posture=fingers(CLOSED),
-                    pre_grasp_approach=along(0, 0, -1), post_grasp_retreat=along(0, 0, 1),
-                    grasp_pose=PoseStamped(Header(frame_id="world"), Pose(Point(x, y, z + PALM_TO_BLOCK), EE_DOWN)))
+    message = Grasp(
+        id=name,
+        grasp_quality=quality,
+        pre_grasp_posture=fingers(OPEN),
+        grasp_posture=fingers(CLOSED),
+        pre_grasp_approach=along(0, 0, -1),
+        post_grasp_retreat=along(0, 0, 1),
+        grasp_pose=PoseStamped(Header(frame_id="world"), Pose(Point(x, y, z + PALM_TO_BLOCK), EE_DOWN)),
+    )
     for key, value in changes.items():
         setattr(message, key, value)
     return message
 
 
 def pick_goal(*grasps: Grasp, plan_only: bool = True, **changes: Any) -> PickupGoal:
-    goal = PickupGoal(target_name="block", group_name=GROUP, possible_grasps=list(grasps) or [grasp()],
-                      support_surface_name="table", allowed_planning_time=10.0)
+    goal = PickupGoal(
+        target_name="block",
+        group_name=GROUP,
+        possible_grasps=list(grasps) or [grasp()],
+        support_surface_name="table",
+        allowed_planning_time=10.0,
+    )
     goal.planning_options.plan_only = plan_only
     goal.planning_options.planning_scene_diff.is_diff = True
     goal.planning_options.planning_scene_diff.robot_state.is_diff = True
@@ -103,12 +116,20 @@ def pick_goal(*grasps: Grasp, plan_only: bool = True, **changes: Any) -> PickupG
 
 
 def place_goal(plan_only: bool = True, **changes: Any) -> PlaceGoal:
-    location = PlaceLocation(id="left", pre_place_approach=along(0, 0, -1), post_place_retreat=along(0, 0, 1),
-                             post_place_posture=fingers(OPEN))
-    location.place_pose = PoseStamped(Header(frame_id="world"), Pose(Point(-0.15, 0.5, 0.9005),
-                                                                     Quaternion(0, 0, 0, 1)))
-    goal = PlaceGoal(group_name=GROUP, attached_object_name="block", place_locations=[location],
-                     support_surface_name="table", allowed_planning_time=10.0)
+    location = PlaceLocation(
+        id="left",
+        pre_place_approach=along(0, 0, -1),
+        post_place_retreat=along(0, 0, 1),
+        post_place_posture=fingers(OPEN),
+    )
+    location.place_pose = PoseStamped(Header(frame_id="world"), Pose(Point(-0.15, 0.5, 0.9005), Quaternion(0, 0, 0, 1)))
+    goal = PlaceGoal(
+        group_name=GROUP,
+        attached_object_name="block",
+        place_locations=[location],
+        support_surface_name="table",
+        allowed_planning_time=10.0,
+    )
     goal.planning_options.plan_only = plan_only
     for key, value in changes.items():
         setattr(goal, key, value)
@@ -168,8 +189,11 @@ def test_a_pick_and_a_place_are_executed(pickup: Any, place: Any, arm: FakeArm) 
     result, report = ask(pickup, pick_goal(plan_only=False))
     assert result.error_code.val == OK and pickup.get_state() == GoalStatus.SUCCEEDED, report
     assert arm.grips == [OPEN, CLOSED] and held() == ["block"]
-    assert np.allclose([arm.positions[name] for name in ARM],
-                       result.trajectory_stages[-1].joint_trajectory.points[-1].positions, atol=1e-6)
+    assert np.allclose(
+        [arm.positions[name] for name in ARM],
+        result.trajectory_stages[-1].joint_trajectory.points[-1].positions,
+        atol=1e-6,
+    )
     assert not [item for item in scene().world.collision_objects if item.id == "block"]
     touched = scene().robot_state.attached_collision_objects[0]
     assert touched.link_name == "ee_link" and "ezgripper_palm_link" in touched.touch_links
@@ -179,8 +203,9 @@ def test_a_pick_and_a_place_are_executed(pickup: Any, place: Any, arm: FakeArm) 
     assert result.trajectory_descriptions == ["plan", "approach", "release", "retreat"]
     assert result.place_location.id == "left" and arm.grips == [OPEN, CLOSED, OPEN] and not held()
     block = next(item for item in scene().world.collision_objects if item.id == "block")
-    assert np.allclose([block.pose.position.x, block.pose.position.y, block.pose.position.z], [-0.15, 0.5, 0.9005],
-                       atol=1e-3)
+    assert np.allclose(
+        [block.pose.position.x, block.pose.position.y, block.pose.position.z], [-0.15, 0.5, 0.9005], atol=1e-3
+    )
 
 
 def test_the_best_grasp_that_can_be_done_is_taken_and_the_others_say_why_not(pickup: Any) -> None:
@@ -283,37 +308,53 @@ def test_moveit_commander_picks_and_places(arm: FakeArm) -> None:
 NAN = float("nan")
 
 
-@pytest.mark.parametrize(("goal", "codes", "word"), [
-    (PickupGoal(), {CODES.INVALID_GROUP_NAME}, "group_name"),
-    (pick_goal(group_name="nobody"), {CODES.INVALID_GROUP_NAME}, "nobody"),
-    (pick_goal(end_effector="nobody"), {CODES.INVALID_GROUP_NAME}, "end effector"),
-    (pick_goal(target_name="nothing"), {CODES.INVALID_OBJECT_NAME}, "nothing"),
-    (pick_goal(support_surface_name="nothing"), {CODES.INVALID_OBJECT_NAME}, "nothing"),
-    (pick_goal(possible_grasps=[]), {CODES.INVALID_GOAL_CONSTRAINTS}, "possible_grasps"),
-    (pick_goal(grasp(pre_grasp_posture=JointTrajectory(joint_names=["elbow_joint"]))),
-     {CODES.INVALID_GOAL_CONSTRAINTS}, "elbow_joint"),
-    (pick_goal(grasp(grasp_posture=fingers(NAN))), {CODES.INVALID_GOAL_CONSTRAINTS}, "finite"),
-    (pick_goal(grasp(grasp_posture=JointTrajectory(joint_names=[GRIPPER]))), {CODES.INVALID_GOAL_CONSTRAINTS},
-     "0 points"),
-    (pick_goal(grasp(pre_grasp_approach=along(0, 0, 0))), {CODES.INVALID_GOAL_CONSTRAINTS}, "direction"),
-    (pick_goal(grasp(pre_grasp_approach=along(0, 0, NAN))), {CODES.INVALID_GOAL_CONSTRAINTS}, "direction"),
-    (pick_goal(grasp(pre_grasp_approach=along(0, 0, 1, -0.1, -0.2))), {CODES.INVALID_GOAL_CONSTRAINTS}, "distance"),
-    (pick_goal(grasp(pre_grasp_approach=along(0, 0, 1, frame="nowhere"))), {CODES.FRAME_TRANSFORM_FAILURE}, "nowhere"),
-    (pick_goal(grasp(quality=NAN)), {CODES.INVALID_GOAL_CONSTRAINTS}, "grasp_quality"),
-    (pick_goal(grasp(grasp_pose=PoseStamped(Header(frame_id="world"), Pose()))), {CODES.FAILURE}, "quaternion"),
-    (pick_goal(allowed_planning_time=NAN), {CODES.TIMED_OUT}, "allowed_planning_time"),
-])
+@pytest.mark.parametrize(
+    ("goal", "codes", "word"),
+    [
+        (PickupGoal(), {CODES.INVALID_GROUP_NAME}, "group_name"),
+        (pick_goal(group_name="nobody"), {CODES.INVALID_GROUP_NAME}, "nobody"),
+        (pick_goal(end_effector="nobody"), {CODES.INVALID_GROUP_NAME}, "end effector"),
+        (pick_goal(target_name="nothing"), {CODES.INVALID_OBJECT_NAME}, "nothing"),
+        (pick_goal(support_surface_name="nothing"), {CODES.INVALID_OBJECT_NAME}, "nothing"),
+        (pick_goal(possible_grasps=[]), {CODES.INVALID_GOAL_CONSTRAINTS}, "possible_grasps"),
+        (
+            pick_goal(grasp(pre_grasp_posture=JointTrajectory(joint_names=["elbow_joint"]))),
+            {CODES.INVALID_GOAL_CONSTRAINTS},
+            "elbow_joint",
+        ),
+        (pick_goal(grasp(grasp_posture=fingers(NAN))), {CODES.INVALID_GOAL_CONSTRAINTS}, "finite"),
+        (
+            pick_goal(grasp(grasp_posture=JointTrajectory(joint_names=[GRIPPER]))),
+            {CODES.INVALID_GOAL_CONSTRAINTS},
+            "0 points",
+        ),
+        (pick_goal(grasp(pre_grasp_approach=along(0, 0, 0))), {CODES.INVALID_GOAL_CONSTRAINTS}, "direction"),
+        (pick_goal(grasp(pre_grasp_approach=along(0, 0, NAN))), {CODES.INVALID_GOAL_CONSTRAINTS}, "direction"),
+        (pick_goal(grasp(pre_grasp_approach=along(0, 0, 1, -0.1, -0.2))), {CODES.INVALID_GOAL_CONSTRAINTS}, "distance"),
+        (
+            pick_goal(grasp(pre_grasp_approach=along(0, 0, 1, frame="nowhere"))),
+            {CODES.FRAME_TRANSFORM_FAILURE},
+            "nowhere",
+        ),
+        (pick_goal(grasp(quality=NAN)), {CODES.INVALID_GOAL_CONSTRAINTS}, "grasp_quality"),
+        (pick_goal(grasp(grasp_pose=PoseStamped(Header(frame_id="world"), Pose()))), {CODES.FAILURE}, "quaternion"),
+        (pick_goal(allowed_planning_time=NAN), {CODES.TIMED_OUT}, "allowed_planning_time"),
+    ],
+)
 def test_malformed_picks_get_a_code_and_a_reason(pickup: Any, goal: PickupGoal, codes: set[int], word: str) -> None:
     result, report = ask(pickup, goal)
     assert result.error_code.val in codes and word in report["reason"], report
 
 
-@pytest.mark.parametrize(("goal", "codes", "word"), [
-    (PlaceGoal(), {CODES.INVALID_GROUP_NAME}, "group_name"),
-    (place_goal(), {CODES.INVALID_OBJECT_NAME}, "block"),
-    (place_goal(attached_object_name=""), {CODES.INVALID_OBJECT_NAME}, "holds 0"),
-    (place_goal(place_locations=[]), {CODES.INVALID_GOAL_CONSTRAINTS}, "place_locations"),
-])
+@pytest.mark.parametrize(
+    ("goal", "codes", "word"),
+    [
+        (PlaceGoal(), {CODES.INVALID_GROUP_NAME}, "group_name"),
+        (place_goal(), {CODES.INVALID_OBJECT_NAME}, "block"),
+        (place_goal(attached_object_name=""), {CODES.INVALID_OBJECT_NAME}, "holds 0"),
+        (place_goal(place_locations=[]), {CODES.INVALID_GOAL_CONSTRAINTS}, "place_locations"),
+    ],
+)
 def test_malformed_places_get_a_code_and_a_reason(place: Any, goal: PlaceGoal, codes: set[int], word: str) -> None:
     result, report = ask(place, goal)
     assert result.error_code.val in codes and word in report["reason"], report

@@ -2,6 +2,7 @@
 """Pipelines of move_group on the wire: chosen by name, a planner and a collision checker of the user's own,
 settings of planners, seeds.
 """
+
 from __future__ import annotations
 
 import re
@@ -24,10 +25,13 @@ from planning_wire import ARM, GROUP, LAUNCH, OK, FakeArm, add, box, call, plan,
 
 ROOT = Path(__file__).resolve().parents[3]
 POSITIONS = (0.2, -1.57, 1.2, -1.2, -1.57, 0.0)
-GOAL = Constraints(joint_constraints=[JointConstraint(name, value, 0.0, 0.0, 1.0)
-                                       for name, value in zip(ARM, POSITIONS, strict=True)])
-ADAPTERS = " ".join(f"default_planner_request_adapters/{name}" for name in (
-    "AddTimeOptimalParameterization", "FixStartStateBounds", "FixStartStateCollision"))
+GOAL = Constraints(
+    joint_constraints=[JointConstraint(name, value, 0.0, 0.0, 1.0) for name, value in zip(ARM, POSITIONS, strict=True)]
+)
+ADAPTERS = " ".join(
+    f"default_planner_request_adapters/{name}"
+    for name in ("AddTimeOptimalParameterization", "FixStartStateBounds", "FixStartStateCollision")
+)
 PARAMETERS = f"""<launch>
   <env name="PYTHONPATH" value="{{package}}/src:$(env PYTHONPATH)"/>
   <param name="move_group/collision_detector" value="my_checkers/Named"/>
@@ -87,21 +91,30 @@ def reaches_tip_pose() -> bool:
     return bool(call("compute_ik", GetPositionIK, message).error_code.val == OK)
 
 
-@pytest.mark.parametrize("ask", [
-    lambda: plan(request(GOAL, allowed_planning_time=10.0)).error_code.val == OK,
-    lambda: plan(request(GOAL, pipeline_id="seeded", allowed_planning_time=20.0)).error_code.val == OK,
-    lambda: call("check_state_validity", GetStateValidity, GetStateValidityRequest()).valid,
-    reaches_tip_pose], ids=["plan", "plan with a seed", "check_state_validity", "compute_ik"])
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda: plan(request(GOAL, allowed_planning_time=10.0)).error_code.val == OK,
+        lambda: plan(request(GOAL, pipeline_id="seeded", allowed_planning_time=20.0)).error_code.val == OK,
+        lambda: call("check_state_validity", GetStateValidity, GetStateValidityRequest()).valid,
+        reaches_tip_pose,
+    ],
+    ids=["plan", "plan with a seed", "check_state_validity", "compute_ik"],
+)
 def test_the_collision_checker_that_the_parameter_names_is_used(session: Any, ask: Callable[[], bool]) -> None:
     made = session.log().count(USED)
     assert ask()
     assert session.log().count(USED) > made
 
 
-@pytest.mark.parametrize(("changes", "parts"), [
-    ({"pipeline_id": "nobody"}, ("'nobody' is not loaded", "ompl", "mine")),
-    ({"pipeline_id": "chomp"}, ("chomp_interface/CHOMPPlanner", "available: ", "mine")),
-    ({"pipeline_id": "wrong"}, ("Nonsense", "default_planner_request_adapters/FixStartStateBounds"))])
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({"pipeline_id": "nobody"}, ("'nobody' is not loaded", "ompl", "mine")),
+        ({"pipeline_id": "chomp"}, ("chomp_interface/CHOMPPlanner", "available: ", "mine")),
+        ({"pipeline_id": "wrong"}, ("Nonsense", "default_planner_request_adapters/FixStartStateBounds")),
+    ],
+)
 def test_a_name_that_is_not_there_is_refused_with_the_list(session: Any, changes: Any, parts: Any) -> None:
     answer, report = report_of(lambda: plan(request(GOAL, **changes)))
     assert answer.error_code.val == MoveItErrorCodes.PLANNING_FAILED

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Eight clients plan at once while the scene changes: every answer is right, all of them come. Longer: benchmarks."""
+
 from __future__ import annotations
 
 from typing import Any

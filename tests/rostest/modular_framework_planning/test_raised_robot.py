@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A robot that stands half a metre above the origin of the world: the planning frame is its root, tf has the rest."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator

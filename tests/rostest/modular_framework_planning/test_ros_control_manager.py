@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of ros_control: found through their controller manager, started when a motion needs them."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator

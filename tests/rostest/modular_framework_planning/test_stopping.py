@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node is stopped while clients ask it for plans, inverse kinematics and motions: it ends without an error."""
+
 from __future__ import annotations
 
 import contextlib
@@ -27,10 +28,14 @@ def test_a_stop_amid_requests_leaves_no_error_in_the_log(ros_session: Any) -> No
     message = request(joint_goal(ARM[0], 1.0))
     goal = MoveGroupGoal(request=message)
     goal.planning_options.plan_only = True
-    clients = [threading.Thread(target=ask_on, args=(ended, ask), daemon=True) for ask in (
-        lambda: rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)(message),
-        lambda: rospy.ServiceProxy("compute_ik", GetPositionIK)(GetPositionIKRequest()),
-        lambda: client.send_goal_and_wait(goal, rospy.Duration(1.0)))]
+    clients = [
+        threading.Thread(target=ask_on, args=(ended, ask), daemon=True)
+        for ask in (
+            lambda: rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)(message),
+            lambda: rospy.ServiceProxy("compute_ik", GetPositionIK)(GetPositionIKRequest()),
+            lambda: client.send_goal_and_wait(goal, rospy.Duration(1.0)),
+        )
+    ]
     for thread in clients:
         thread.start()
     until(lambda: "ik failed (INVALID_GROUP_NAME)" in launch.log(), "an answer to what is asked")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A config package as the MoveIt Setup Assistant writes it launches, plans and executes as it is."""
+
 from __future__ import annotations
 
 import time
@@ -86,8 +87,10 @@ def test_a_motion_is_planned_and_executed(arm: MoveGroupCommander) -> None:
     duration_s = trajectory.joint_trajectory.points[-1].time_from_start.to_sec()
     assert time.monotonic() - begun >= duration_s, "a fake robot takes its time"
     names = trajectory.joint_trajectory.joint_names
-    until(lambda: any(state.name == names and np.allclose(state.position, REACHING, atol=1e-3)
-                      for state in list(states)), "the last state of the motion")
+    until(
+        lambda: any(state.name == names and np.allclose(state.position, REACHING, atol=1e-3) for state in list(states)),
+        "the last state of the motion",
+    )
     listener.unregister()
     assert arm.get_current_joint_values() == pytest.approx(REACHING, abs=1e-3)
     travelled = np.array([state.position for state in states if state.name == names])
@@ -101,7 +104,8 @@ def test_a_pose_is_reached(arm: MoveGroupCommander) -> None:
     assert arm.go()
     reached = arm.get_current_pose().pose.position
     assert [reached.x, reached.y, reached.z] == pytest.approx(
-        [pose.pose.position.x, pose.pose.position.y, pose.pose.position.z], abs=2e-3)
+        [pose.pose.position.x, pose.pose.position.y, pose.pose.position.z], abs=2e-3
+    )
 
 
 def test_the_hand_closes_and_arm_and_hand_move_together(demo: Any) -> None:
@@ -109,8 +113,9 @@ def test_the_hand_closes_and_arm_and_hand_move_together(demo: Any) -> None:
     hand.set_joint_value_target({"panda_finger_joint1": 0.03})
     assert hand.go()
     assert hand.get_current_joint_values() == pytest.approx([0.03, 0.03], abs=1e-3)
-    both.set_joint_value_target({**{f"panda_joint{n + 1}": value for n, value in enumerate(READY)},
-                                 "panda_finger_joint1": 0.02})
+    both.set_joint_value_target(
+        {**{f"panda_joint{n + 1}": value for n, value in enumerate(READY)}, "panda_finger_joint1": 0.02}
+    )
     assert both.go()
     assert both.get_current_joint_values() == pytest.approx([*READY, 0.02, 0.02], abs=1e-3)
 
@@ -122,8 +127,13 @@ def test_both_fingers_may_be_named_in_a_goal(demo: Any) -> None:
     def plan(**fingers: float) -> Any:
         request = MotionPlanRequest(group_name="hand", num_planning_attempts=1, allowed_planning_time=20.0)
         request.start_state.is_diff = True
-        request.goal_constraints = [Constraints(joint_constraints=[
-            JointConstraint(name, position, 1e-4, 1e-4, 1.0) for name, position in fingers.items()])]
+        request.goal_constraints = [
+            Constraints(
+                joint_constraints=[
+                    JointConstraint(name, position, 1e-4, 1e-4, 1.0) for name, position in fingers.items()
+                ]
+            )
+        ]
         return ask(request).motion_plan_response
 
     for fingers in ({"panda_finger_joint1": 0.01, "panda_finger_joint2": 0.01}, {"panda_finger_joint2": 0.01}):
@@ -131,8 +141,10 @@ def test_both_fingers_may_be_named_in_a_goal(demo: Any) -> None:
         assert answer.error_code.val == MoveItErrorCodes.SUCCESS
         assert answer.trajectory.joint_trajectory.joint_names == ["panda_finger_joint1"]
         assert answer.trajectory.joint_trajectory.points[-1].positions == pytest.approx([0.01], abs=2e-4)
-    assert plan(panda_finger_joint1=0.01, panda_finger_joint2=0.02).error_code.val == \
-        MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
+    assert (
+        plan(panda_finger_joint1=0.01, panda_finger_joint2=0.02).error_code.val
+        == MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
+    )
     hand.set_joint_value_target({"panda_finger_joint2": 0.025})
     assert hand.go()
     assert hand.get_current_joint_values() == pytest.approx([0.025, 0.025], abs=1e-3)
@@ -159,8 +171,9 @@ def test_a_stop_leaves_the_robot_on_its_way(arm: MoveGroupCommander) -> None:
 
 def test_a_coarse_link_is_checked_against_the_links_that_are_enabled_only(arm: MoveGroupCommander) -> None:
     read = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
-    matrix = read(PlanningSceneComponents(PlanningSceneComponents.ALLOWED_COLLISION_MATRIX)
-                  ).scene.allowed_collision_matrix
+    matrix = read(
+        PlanningSceneComponents(PlanningSceneComponents.ALLOWED_COLLISION_MATRIX)
+    ).scene.allowed_collision_matrix
     assert (matrix.default_entry_names, matrix.default_entry_values) == (["panda_hand_sc"], [True])
     coarse = matrix.entry_values[matrix.entry_names.index("panda_hand_sc")].enabled
     assert [name for name, allowed in zip(matrix.entry_names, coarse, strict=True) if not allowed] == ["panda_link1"]
@@ -215,11 +228,24 @@ def test_every_planner_of_the_package_is_offered_or_refused_with_a_reason(arm: M
 
 def test_nodes_and_names_are_those_clients_look_for(demo: Any) -> None:
     publishers, _, services = rosgraph.Master("/test").getSystemState()
-    assert {"/move_group/monitored_planning_scene", "/move_group/display_planned_path",
-            "/move_group/fake_controller_joint_states", "/joint_states", "/tf", "/tf_static"
-            } <= {name for name, _ in publishers}
-    assert {"/plan_kinematic_path", "/compute_ik", "/compute_fk", "/get_planning_scene", "/apply_planning_scene",
-            "/clear_octomap", "/query_planner_interface", "/check_state_validity"} <= {name for name, _ in services}
+    assert {
+        "/move_group/monitored_planning_scene",
+        "/move_group/display_planned_path",
+        "/move_group/fake_controller_joint_states",
+        "/joint_states",
+        "/tf",
+        "/tf_static",
+    } <= {name for name, _ in publishers}
+    assert {
+        "/plan_kinematic_path",
+        "/compute_ik",
+        "/compute_fk",
+        "/get_planning_scene",
+        "/apply_planning_scene",
+        "/clear_octomap",
+        "/query_planner_interface",
+        "/check_state_validity",
+    } <= {name for name, _ in services}
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The simulation as its users see it on the wire: clock, controllers, Gazebo's services and topics, planning scene."""
+
 from __future__ import annotations
 
 import functools
@@ -58,8 +59,11 @@ BALL = """<sdf version="1.6"><model name="ball"><link name="link"><inertial><mas
   <iyy>4e-5</iyy><izz>4e-5</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.03</radius>
   </sphere></geometry></collision></link></model></sdf>"""
 
-BOMB = "<?xml version='1.0'?>\n<!DOCTYPE sdf [<!ENTITY e0 'boom'>" + "".join(
-    f"<!ENTITY e{n} '{f'&e{n - 1};' * 30}'>" for n in range(1, 12)) + "]><sdf version='1.6'>&e11;</sdf>"
+BOMB = (
+    "<?xml version='1.0'?>\n<!DOCTYPE sdf [<!ENTITY e0 'boom'>"
+    + "".join(f"<!ENTITY e{n} '{f'&e{n - 1};' * 30}'>" for n in range(1, 12))
+    + "]><sdf version='1.6'>&e11;</sdf>"
+)
 
 until = functools.partial(wait_until, timeout_s=10.0)
 
@@ -73,8 +77,10 @@ class FakePlanningScene:
         self.poses: dict[str, Any] = {}
         self.colours: dict[str, Any] = {}
         self.refuse = False
-        self.services = [rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply),
-                         rospy.Service("/get_planning_scene", GetPlanningScene, self.read)]
+        self.services = [
+            rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply),
+            rospy.Service("/get_planning_scene", GetPlanningScene, self.read),
+        ]
 
     def apply(self, request: Any) -> ApplyPlanningSceneResponse:
         if self.refuse:
@@ -205,10 +211,24 @@ def test_a_model_can_be_put_elsewhere_by_topic(simulation: Any) -> None:
         (lambda: call("/gazebo/spawn_urdf_model", SpawnModel, "x", BOMB, "", Pose(), ""), ":2: got a DOCTYPE"),
         (lambda: spawn("x" * 5000, 0, 0, 1), "is 5,000 bytes long"),
         (lambda: spawn("x", 0, 0, 1, xml=BALL.replace('"link"', f'"{"l" * 5000}"')), "is 5,000 bytes long"),
-        (lambda: call("/gazebo/spawn_urdf_model", SpawnModel, "x" * 5000, "<robot name='r'><link name='a'/></robot>",
-                      "", Pose(), ""), "is 5,000 bytes long"),
-        (lambda: call("/gazebo/set_model_configuration", SetModelConfiguration, "ur5_with_ezgripper", "", ["j" * 5000],
-                      [1.0]), "no joint"),
+        (
+            lambda: call(
+                "/gazebo/spawn_urdf_model",
+                SpawnModel,
+                "x" * 5000,
+                "<robot name='r'><link name='a'/></robot>",
+                "",
+                Pose(),
+                "",
+            ),
+            "is 5,000 bytes long",
+        ),
+        (
+            lambda: call(
+                "/gazebo/set_model_configuration", SetModelConfiguration, "ur5_with_ezgripper", "", ["j" * 5000], [1.0]
+            ),
+            "no joint",
+        ),
         (lambda: spawn("x", 0, 0, 1, "nowhere"), "no model 'nowhere'"),
         (lambda: spawn("x", 0, 0, float("nan")), "give finite numbers"),
         (lambda: spawn("x", 0, 0, 1e30), "at most 10000 m"),

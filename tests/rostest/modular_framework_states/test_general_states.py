@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """States that are not about motions: waiting, counting, any topic, service and action, managers, objects, figures."""
+
 from __future__ import annotations
 
 import json
@@ -115,11 +116,13 @@ def test_call_service_finds_the_type_and_is_positive_only_when_the_answer_is() -
     service = rospy.Service("switch", SetBool, lambda request: SetBoolResponse(request.data, "the lamp is broken"))
     outcome, userdata = run(CallService("switch", {"data": True}, output_keys=("response",)))
     assert outcome == "success" and userdata.response.success
-    cases = [(CallService("switch", {"data": False}), "answered success: false: the lamp is broken"),
-             (CallService("switch", {"data": True}, {"message": "fine"}), "message is 'the lamp is broken', expected"),
-             (CallService("switch", {"on": True}), "its fields are data (bool)"),
-             (CallService("switch", {"data": "yes"}), "do not fit std_srvs/SetBoolRequest"),
-             (CallService("nobody", timeout=0.3), "was not advertised within 0.3 s")]
+    cases = [
+        (CallService("switch", {"data": False}), "answered success: false: the lamp is broken"),
+        (CallService("switch", {"data": True}, {"message": "fine"}), "message is 'the lamp is broken', expected"),
+        (CallService("switch", {"on": True}), "its fields are data (bool)"),
+        (CallService("switch", {"data": "yes"}), "do not fit std_srvs/SetBoolRequest"),
+        (CallService("nobody", timeout=0.3), "was not advertised within 0.3 s"),
+    ]
     for state, reason in cases:
         assert run(state)[0] == "fail"
         assert reason in state.reason
@@ -135,16 +138,21 @@ def test_fields_of_requests_come_from_userdata_and_fields_of_the_answer_go_there
 
     service = rospy.Service("place_it", srv.AddPoseStamped, answer)
     pose = PoseStamped(header=Header(frame_id="table"), pose=Pose(Point(0.1, 0.2, 0.3), Quaternion(w=1.0)))
-    request = {"pose_stamped": {"header": {"frame_id": "world"}, "pose": "userdata.where.pose"},
-               "pose_name": "userdata.who"}
-    ask = CallService("place_it", request, input_keys=("where", "who"), keep={"placed": "success"},
-                      output_keys=("placed",))
+    request = {
+        "pose_stamped": {"header": {"frame_id": "world"}, "pose": "userdata.where.pose"},
+        "pose_name": "userdata.who",
+    }
+    ask = CallService(
+        "place_it", request, input_keys=("where", "who"), keep={"placed": "success"}, output_keys=("placed",)
+    )
     outcome, userdata = run(ask, where=pose, who="me")
     assert (outcome, userdata.placed, asked[0].header.frame_id, asked[0].pose) == ("success", True, "world", pose.pose)
-    for values, reason in (({"where": pose.pose, "who": "me"}, "'pose': there is no 'pose'; there are: position, "),
-                           ({"where": pose, "who": 3}, "do not fit modular_framework_core/AddPoseStampedRequest"),
-                           ({"where": None, "who": "me"}, "userdata 'where' is empty; let a state before write it"),
-                           ({"who": "me"}, "'userdata.where.pose' refers to userdata that is not there")):
+    for values, reason in (
+        ({"where": pose.pose, "who": "me"}, "'pose': there is no 'pose'; there are: position, "),
+        ({"where": pose, "who": 3}, "do not fit modular_framework_core/AddPoseStampedRequest"),
+        ({"where": None, "who": "me"}, "userdata 'where' is empty; let a state before write it"),
+        ({"who": "me"}, "'userdata.where.pose' refers to userdata that is not there"),
+    ):
         assert run(ask, **values)[0] == "fail"
         assert reason in ask.reason, ask.reason
     service.shutdown()
@@ -152,20 +160,32 @@ def test_fields_of_requests_come_from_userdata_and_fields_of_the_answer_go_there
 
 def test_a_field_of_the_answer_decides_about_the_outcome_where_it_is_named() -> None:
     codes = iter((0, 1, 2, 7, 0))
-    service = rospy.Service("detect", srv.MessageFile, lambda request: srv.MessageFileResponse(
-        success=False, message="looked", count=next(codes)))
+    service = rospy.Service(
+        "detect",
+        srv.MessageFile,
+        lambda request: srv.MessageFileResponse(success=False, message="looked", count=next(codes)),
+    )
     outcomes = ("found", "nothing", "fail")
     state = CallService("detect", outcome_field="count", outcomes=outcomes)
     assert [ended(state) for _ in range(4)] == ["found", "nothing", "fail", "fail"]
     assert "count is 7, which stands for no outcome; allowed are a truth value, 0 to 2, or one of found" in state.reason
     codes = iter((10, 20, 21, 3))
-    state = CallService("detect", outcome_field="count", outcomes=outcomes, keep={"said": "message"},
-                        output_keys=("said",), outcome_values={"found": 10, "nothing": [20, 21]})
+    state = CallService(
+        "detect",
+        outcome_field="count",
+        outcomes=outcomes,
+        keep={"said": "message"},
+        output_keys=("said",),
+        outcome_values={"found": 10, "nothing": [20, 21]},
+    )
     assert [ended(state) for _ in range(4)] == ["found", "nothing", "nothing", "fail"]
     assert "count is 3, which is none of outcome_values" in state.reason
     service.shutdown()
-    for wrong in ({"outcome_values": {"found": 1}}, {"outcome_field": "a", "outcome_values": {"fond": 1}},
-                  {"keep": {"said": "message"}}):
+    for wrong in (
+        {"outcome_values": {"found": 1}},
+        {"outcome_field": "a", "outcome_values": {"fond": 1}},
+        {"keep": {"said": "message"}},
+    ):
         with pytest.raises(ValueError, match="outcome_field; name the field|outcome_values names|keep writes"):
             CallService("detect", outcomes=outcomes, **wrong)
 
@@ -200,20 +220,29 @@ class Gripper:
 
 def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:
     gripper = Gripper()
-    outcome, userdata = run(CallAction("hand", {"command": {"position": 0.5}}, {"reached_goal": True},
-                                       output_keys=("result",)))
+    outcome, userdata = run(
+        CallAction("hand", {"command": {"position": 0.5}}, {"reached_goal": True}, output_keys=("result",))
+    )
     assert outcome == "success" and userdata.result.position == 0.5
-    cases = [(CallAction("hand", {"command": {"position": -1.0}}), "ended as ABORTED: fingers do not open that far"),
-             (CallAction("hand", {"command": {"position": 0.5}}, {"stalled": True}), "stalled is False, expected True"),
-             (CallAction("hand", {"force": 1}), "the values do not fit control_msgs/GripperCommandGoal"),
-             (CallAction("hand", {"command": {"position": 2.0}}, timeout=0.3), "did not end within 0.3 s"),
-             (CallAction("foot", server_timeout=0.3), "nobody offers it within 0.3 s")]
+    cases = [
+        (CallAction("hand", {"command": {"position": -1.0}}), "ended as ABORTED: fingers do not open that far"),
+        (CallAction("hand", {"command": {"position": 0.5}}, {"stalled": True}), "stalled is False, expected True"),
+        (CallAction("hand", {"force": 1}), "the values do not fit control_msgs/GripperCommandGoal"),
+        (CallAction("hand", {"command": {"position": 2.0}}, timeout=0.3), "did not end within 0.3 s"),
+        (CallAction("foot", server_timeout=0.3), "nobody offers it within 0.3 s"),
+    ]
     for state, reason in cases:
         assert run(state)[0] == "fail"
         assert reason in state.reason, state.reason
     assert gripper.preempted.wait(30.0)
-    values = {"outcome_field": "reached_goal", "outcomes": ("there", "short", "fail"), "input_keys": ("width",),
-              "keep": {"at": "position"}, "output_keys": ("at",), "outcome_values": {"there": True, "short": False}}
+    values = {
+        "outcome_field": "reached_goal",
+        "outcomes": ("there", "short", "fail"),
+        "input_keys": ("width",),
+        "keep": {"at": "position"},
+        "output_keys": ("at",),
+        "outcome_values": {"there": True, "short": False},
+    }
     state = CallAction("hand", {"command": {"position": "userdata.width"}}, **values)
     machine = smach.StateMachine(outcomes=["there", "short", "fail"])
     with machine:
@@ -223,8 +252,18 @@ def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:
         machine.userdata.width = width
         results.append((machine.execute(), machine.userdata.at))
     assert results == [("there", 0.5), ("short", 0.0)]
-    assert ended(CallAction("hand", {"command": {"position": -1.0}}, outcome_field="reached_goal",
-                            outcome_values={"there": False}, outcomes=("there", "fail"))) == "fail"
+    assert (
+        ended(
+            CallAction(
+                "hand",
+                {"command": {"position": -1.0}},
+                outcome_field="reached_goal",
+                outcome_values={"there": False},
+                outcomes=("there", "fail"),
+            )
+        )
+        == "fail"
+    )
     assert GoalStatus.ABORTED == 4
 
 
@@ -237,8 +276,10 @@ def test_what_managers_hold_is_stored_loaded_and_forgotten() -> None:
     assert run(Load("joint_state", "kept.yaml"))[0] == "success"
     assert names("joint_states") == ["mine", "up"]
     assert run(ReinitialiseManagers())[0] == "success"
-    for state, reason in ((Load("plan", "kept.yaml"), "holds messages of the kind 'joint state'"),
-                          (Store("pose", "poses.txt"), "a file that ends in .yaml")):
+    for state, reason in (
+        (Load("plan", "kept.yaml"), "holds messages of the kind 'joint state'"),
+        (Store("pose", "poses.txt"), "a file that ends in .yaml"),
+    ):
         assert run(state)[0] == "fail"
         assert reason in state.reason
 
@@ -260,10 +301,12 @@ def test_a_metric_is_published_and_must_be_a_number() -> None:
 def test_set_planner_changes_what_is_given_and_refuses_unknown_planners() -> None:
     calls: list[tuple[str, object]] = []
     commander = SimpleNamespace(
-        planner_names=lambda: ["RRTConnect", "pilz/LIN"], set_planner_id=lambda value: calls.append(("id", value)),
+        planner_names=lambda: ["RRTConnect", "pilz/LIN"],
+        set_planner_id=lambda value: calls.append(("id", value)),
         set_planning_time=lambda value: calls.append(("time", value)),
         set_num_planning_attempts=lambda value: calls.append(("attempts", value)),
-        set_max_velocity_scaling_factor=lambda value: calls.append(("speed", value)))
+        set_max_velocity_scaling_factor=lambda value: calls.append(("speed", value)),
+    )
     commander.of_group = lambda name: calls.append(("group", name)) or commander
     assert run(SetPlanner("pilz/LIN", speed_factor=0.1), arm_commander=commander)[0] == "success"
     assert run(SetPlanner("RRTConnect", group="hand"), arm_commander=commander)[0] == "success"
@@ -283,15 +326,22 @@ def test_objects_are_spawned_and_deleted_and_unknown_models_named(tmp_path) -> N
         models[request.model_name] = request
         return SpawnModelResponse(True, "")
 
-    services = [rospy.Service("gazebo/spawn_sdf_model", SpawnModel, spawn),
-                rospy.Service("gazebo/delete_model", DeleteModel, lambda request: DeleteModelResponse(
-                    models.pop(request.model_name, None) is not None, "no such model"))]
+    services = [
+        rospy.Service("gazebo/spawn_sdf_model", SpawnModel, spawn),
+        rospy.Service(
+            "gazebo/delete_model",
+            DeleteModel,
+            lambda request: DeleteModelResponse(models.pop(request.model_name, None) is not None, "no such model"),
+        ),
+    ]
     rospy.ServiceProxy("set_init_acm", srv.SetInitACM)(srv.SetInitACMRequest().acm)
     assert run(SpawnObject("cube", "mine", (0.1, 0.2, 0.3)))[0] == "success"
     assert models["mine"].initial_pose.position.y == 0.2
-    for state, reason in ((SpawnObject("cube", "mine"), "an object 'mine' already"),
-                          (SpawnObject("sphere"), "the type must be a folder of"),
-                          (DeleteObject("other"), "no such model")):
+    for state, reason in (
+        (SpawnObject("cube", "mine"), "an object 'mine' already"),
+        (SpawnObject("sphere"), "the type must be a folder of"),
+        (DeleteObject("other"), "no such model"),
+    ):
         assert run(state)[0] == "fail"
         assert reason in state.reason, state.reason
     with pytest.raises(ValueError, match="option 'position' must be a list of 3 items, .* found a list of 2"):

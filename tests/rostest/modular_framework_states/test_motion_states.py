@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """States that move arm and fingers beside Move and Grasp: written trajectories, straight lines, postures."""
+
 from __future__ import annotations
 
 import math
@@ -44,9 +45,11 @@ class Arm:
 
     def __init__(self) -> None:
         self.position, self.executed, self.stuck = 0.0, [], False
-        self.services = [rospy.Service("check_state_validity", GetStateValidity, self._validity),
-                         rospy.Service("compute_fk", GetPositionFK, self._fk),
-                         rospy.Service("compute_cartesian_path", GetCartesianPath, self._line)]
+        self.services = [
+            rospy.Service("check_state_validity", GetStateValidity, self._validity),
+            rospy.Service("compute_fk", GetPositionFK, self._fk),
+            rospy.Service("compute_cartesian_path", GetCartesianPath, self._line),
+        ]
 
     def positions_of(self, joints) -> dict[str, float]:
         return {name: value for name, value in self.current_joints().items() if name in joints}
@@ -85,8 +88,12 @@ class Arm:
 
 
 def trajectory(*points: tuple[float, float]) -> JointTrajectory:
-    return JointTrajectory(joint_names=["j"], points=[
-        JointTrajectoryPoint(positions=[value], time_from_start=rospy.Duration(time_s)) for time_s, value in points])
+    return JointTrajectory(
+        joint_names=["j"],
+        points=[
+            JointTrajectoryPoint(positions=[value], time_from_start=rospy.Duration(time_s)) for time_s, value in points
+        ],
+    )
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -127,10 +134,15 @@ def test_a_named_trajectory_begins_where_the_arm_is_and_ends_at_its_last_point(a
     assert arm.position == 1.5
 
 
-@pytest.mark.parametrize(("name", "reason"), [
-    ("through_the_wall", "on the way to point 1 the robot would be in collision ('tip' with 'wall')"),
-    ("in_a_hurry", "joint 'j' has 0.10 s to get to point 2 and needs 0.17 s at its greatest velocity, 6.00"),
-    ("nowhere", "no trajectory named 'nowhere' is stored"), ("other_robot", "the joints ['k'] are none of the arm's")])
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("through_the_wall", "on the way to point 1 the robot would be in collision ('tip' with 'wall')"),
+        ("in_a_hurry", "joint 'j' has 0.10 s to get to point 2 and needs 0.17 s at its greatest velocity, 6.00"),
+        ("nowhere", "no trajectory named 'nowhere' is stored"),
+        ("other_robot", "the joints ['k'] are none of the arm's"),
+    ],
+)
 def test_a_trajectory_that_cannot_be_run_is_not_begun(arm: Arm, name: str, reason: str) -> None:
     state = ExecuteTrajectory(name)
     assert run(state, arm_commander=arm) == "fail"
@@ -181,8 +193,10 @@ def test_fingers_go_to_a_posture_of_the_group_and_the_server_has_the_last_word()
     assert (goals[0].grasp_state, list(goals[0].grasp.pregrasp.posture.position)) == (0, [0.0])
     assert run(Gripper(positions={"f": 0.7}, grip=True, torque=0.3), **keys) == "success"
     assert (goals[1].grasp_state, list(goals[1].grasp.torque_intensity.torque_intensity)) == (1, [0.3])
-    for state, reason in ((Gripper(positions={"f": 1.5}), "gripper to f 1.5: the fingers are jammed"),
-                          (Gripper("shut"), "group 'hand' has no state 'shut'; it has open")):
+    for state, reason in (
+        (Gripper(positions={"f": 1.5}), "gripper to f 1.5: the fingers are jammed"),
+        (Gripper("shut"), "group 'hand' has no state 'shut'; it has open"),
+    ):
         assert run(state, **keys) == "fail"
         assert reason in state.reason
     state = Gripper("open")

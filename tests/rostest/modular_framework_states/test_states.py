@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The six states of a task: success is earned, failure has a reason, and a stop is obeyed."""
+
 from __future__ import annotations
 
 import re
@@ -219,8 +220,10 @@ def test_a_missing_output_key_fails_and_keeps_the_message() -> None:
     assert run(Select("grasp", output_keys=["selected_grasp"]))[0] == "fail"
 
 
-@pytest.mark.parametrize(("message_type", "key"), [("joint_state", "selected_joint_state"), ("pose", "selected_pose"),
-                                                   ("plan", "selected_plan")])
+@pytest.mark.parametrize(
+    ("message_type", "key"),
+    [("joint_state", "selected_joint_state"), ("pose", "selected_pose"), ("plan", "selected_plan")],
+)
 def test_every_type_goes_to_its_own_key(message_type: str, key: str) -> None:
     call("add_pose", srv.AddPoseStamped, pose_stamped=PoseStamped(), pose_name="one")
     call("add_plan", srv.AddMoveitPlan, moveit_plan=trajectory(0.0), plan_name="one")
@@ -230,9 +233,14 @@ def test_every_type_goes_to_its_own_key(message_type: str, key: str) -> None:
 
 
 def test_unknown_words_are_refused_when_a_state_is_made() -> None:
-    for make in (lambda: Select("cup"), lambda: Plan("cup"), lambda: Plan("pose", starting_state_type="cup"),
-                 lambda: Grasp("cup"), lambda: AllowManipulatorCollisions(True, "cup"),
-                 lambda: AllowManipulatorCollisions(True, "", links=["cup"])):
+    for make in (
+        lambda: Select("cup"),
+        lambda: Plan("cup"),
+        lambda: Plan("pose", starting_state_type="cup"),
+        lambda: Grasp("cup"),
+        lambda: AllowManipulatorCollisions(True, "cup"),
+        lambda: AllowManipulatorCollisions(True, "", links=["cup"]),
+    ):
         with pytest.raises(ValueError, match="cup|links are of use"):
             make()
 
@@ -256,8 +264,12 @@ def test_a_pose_goes_through_inverse_kinematics_near_the_start(arm: FakeArm) -> 
 def test_plans_made_at_the_same_time_fit_end_to_start(arm: FakeArm) -> None:
     arm.position = 0.1
     keys = {"input_keys": ["selected_grasp"]}
-    plans = smach.Concurrence(outcomes=["success", "fail"], default_outcome="fail", input_keys=["selected_grasp"],
-                              outcome_map={"success": {"A": "success", "B": "success", "C": "success"}})
+    plans = smach.Concurrence(
+        outcomes=["success", "fail"],
+        default_outcome="fail",
+        input_keys=["selected_grasp"],
+        outcome_map={"success": {"A": "success", "B": "success", "C": "success"}},
+    )
     plans.register_io_keys(["arm_commander"])
     with plans:
         smach.Concurrence.add("A", Plan("pregrasp", "userdata", "a", **keys))
@@ -271,9 +283,13 @@ def test_plans_made_at_the_same_time_fit_end_to_start(arm: FakeArm) -> None:
     assert all(start["f"] == 0.4 for start in starts)
 
 
-@pytest.mark.parametrize(("change", "hint"), [
-    ({"unreachable": 0.5}, "pregrasp pose of grasp 'g'.*out of reach"),
-    ({"refuse_plan": "GOAL_IN_COLLISION"}, "GOAL_IN_COLLISION")])
+@pytest.mark.parametrize(
+    ("change", "hint"),
+    [
+        ({"unreachable": 0.5}, "pregrasp pose of grasp 'g'.*out of reach"),
+        ({"refuse_plan": "GOAL_IN_COLLISION"}, "GOAL_IN_COLLISION"),
+    ],
+)
 def test_what_cannot_be_planned_fails_with_the_reason(arm: FakeArm, change: dict, hint: str) -> None:
     vars(arm).update(change)
     state = Plan("pregrasp", "userdata", "none", input_keys=["selected_grasp"])
@@ -282,8 +298,11 @@ def test_what_cannot_be_planned_fails_with_the_reason(arm: FakeArm, change: dict
 
 
 def test_missing_messages_fail_with_the_reason(arm: FakeArm) -> None:
-    for state, hint in ((Plan("joint_state", "nobody"), "nobody"), (Plan("grasp", "userdata"), "input keys"),
-                        (Plan("grasp", "userdata", input_keys=["selected_grasp"]), "is empty")):
+    for state, hint in (
+        (Plan("joint_state", "nobody"), "nobody"),
+        (Plan("grasp", "userdata"), "input keys"),
+        (Plan("grasp", "userdata", input_keys=["selected_grasp"]), "is empty"),
+    ):
         assert run(state, arm_commander=arm, selected_grasp=None)[0] == "fail"
         assert hint in state.reason
 
@@ -340,8 +359,9 @@ def test_a_missing_or_empty_plan_fails(arm: FakeArm) -> None:
 
 @pytest.fixture(scope="module")
 def hand():
-    fake = SimpleNamespace(flags=(True, True, True), succeed=True, wait=False, moving=threading.Event(),
-                           stopped=threading.Event())
+    fake = SimpleNamespace(
+        flags=(True, True, True), succeed=True, wait=False, moving=threading.Event(), stopped=threading.Event()
+    )
 
     def on_goal(goal):
         fake.moving.set()
@@ -360,10 +380,16 @@ def hand():
     return fake
 
 
-@pytest.mark.parametrize(("grasp_type", "flags", "succeed", "outcome"), [
-    ("pregrasp", (True, False, False), True, "success"), ("grasp", (False, True, False), True, "success"),
-    ("postgrasp", (False, False, True), True, "success"), ("grasp", (True, False, True), True, "fail"),
-    ("grasp", (False, True, False), False, "fail")])
+@pytest.mark.parametrize(
+    ("grasp_type", "flags", "succeed", "outcome"),
+    [
+        ("pregrasp", (True, False, False), True, "success"),
+        ("grasp", (False, True, False), True, "success"),
+        ("postgrasp", (False, False, True), True, "success"),
+        ("grasp", (True, False, True), True, "fail"),
+        ("grasp", (False, True, False), False, "fail"),
+    ],
+)
 def test_the_flag_of_the_stage_and_the_status_decide(hand, grasp_type, flags, succeed, outcome) -> None:
     hand.flags, hand.succeed = flags, succeed
     state = Grasp(grasp_type, "g")
@@ -395,8 +421,9 @@ def test_a_hand_that_does_not_answer_in_time_is_a_failure(hand) -> None:
 def test_collisions_are_allowed_only_when_the_scene_takes_them() -> None:
     scenes = []
     answer = ApplyPlanningSceneResponse(success=True)
-    service = rospy.Service("apply_planning_scene", ApplyPlanningScene,
-                            lambda request: scenes.append(request.scene) or answer)
+    service = rospy.Service(
+        "apply_planning_scene", ApplyPlanningScene, lambda request: scenes.append(request.scene) or answer
+    )
     state = AllowManipulatorCollisions(True, "object-collision")
     assert run(state)[0] == "fail"
     assert "get_modified_acm" in state.reason
@@ -416,8 +443,11 @@ def test_collisions_are_allowed_only_when_the_scene_takes_them() -> None:
 
 def test_any_links_may_touch_objects_and_the_scene_hears_at_once_when_a_permission_ends() -> None:
     scenes = []
-    service = rospy.Service("apply_planning_scene", ApplyPlanningScene,
-                            lambda request: scenes.append(request.scene) or ApplyPlanningSceneResponse(success=True))
+    service = rospy.Service(
+        "apply_planning_scene",
+        ApplyPlanningScene,
+        lambda request: scenes.append(request.scene) or ApplyPlanningSceneResponse(success=True),
+    )
     rows = [AllowedCollisionEntry(enabled=[False, False]) for _ in range(2)]
     call("set_init_acm", srv.SetInitACM, acm=AllowedCollisionMatrix(entry_names=["arm", "palm"], entry_values=rows))
     call("update_acm_entry", srv.UpdateACMEntry, action=0, entry_name="crate")
@@ -443,8 +473,11 @@ def test_any_links_may_touch_objects_and_the_scene_hears_at_once_when_a_permissi
 
 def test_the_object_of_the_selected_grasp_is_the_only_one_that_may_be_touched() -> None:
     scenes = []
-    service = rospy.Service("apply_planning_scene", ApplyPlanningScene,
-                            lambda request: scenes.append(request.scene) or ApplyPlanningSceneResponse(success=True))
+    service = rospy.Service(
+        "apply_planning_scene",
+        ApplyPlanningScene,
+        lambda request: scenes.append(request.scene) or ApplyPlanningSceneResponse(success=True),
+    )
     rows = [AllowedCollisionEntry(enabled=[False, False]) for _ in range(2)]
     call("set_init_acm", srv.SetInitACM, acm=AllowedCollisionMatrix(entry_names=["arm", "palm"], entry_values=rows))
     for name in ("held", "beside"):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every method of moveit_commander, against a running move_group with a controlled (mock) robot."""
+
 from __future__ import annotations
 
 import math
@@ -25,8 +26,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-START = {"shoulder_pan_joint": 1.57, "shoulder_lift_joint": -1.57, "elbow_joint": 1.2, "wrist_1_joint": -1.2,
-         "wrist_2_joint": -1.57, "wrist_3_joint": 0.0}
+START = {
+    "shoulder_pan_joint": 1.57,
+    "shoulder_lift_joint": -1.57,
+    "elbow_joint": 1.2,
+    "wrist_1_joint": -1.2,
+    "wrist_2_joint": -1.57,
+    "wrist_3_joint": 0.0,
+}
 FINGER = "ezgripper_knuckle_palm_L1_1"
 PALM = "ezgripper_palm_link"
 DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
@@ -46,8 +53,10 @@ def session(ros_session: Any) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def robot(session: Any) -> RobotCommander:
     robot = RobotCommander()
-    until(lambda: len(rospy.wait_for_message("joint_states", JointState, 30.0).name) >= 7,
-          "joint states of the arm and the gripper")
+    until(
+        lambda: len(rospy.wait_for_message("joint_states", JointState, 30.0).name) >= 7,
+        "joint states of the arm and the gripper",
+    )
     return robot
 
 
@@ -199,8 +208,10 @@ def test_the_jacobian_is_the_slope_of_forward_kinematics(arm: MoveGroupCommander
         ends = []
         for shift in (-step, step):
             state = arm.get_current_state()
-            state.joint_state.position = [value + shift * (key == name) for key, value in
-                                          zip(state.joint_state.name, state.joint_state.position, strict=True)]
+            state.joint_state.position = [
+                value + shift * (key == name)
+                for key, value in zip(state.joint_state.name, state.joint_state.position, strict=True)
+            ]
             ends.append(place_of(arm._pose_of("", state))[:3])
         slope = (np.array(ends[1]) - ends[0]) / (2.0 * step)
         assert np.allclose(slope, jacobian[:3, column], atol=1e-4), name
@@ -215,8 +226,11 @@ def test_settings_are_in_the_request(arm: MoveGroupCommander) -> None:
     other.set_goal_joint_tolerance(0.001)
     other.set_goal_position_tolerance(0.002)
     other.set_goal_orientation_tolerance(0.003)
-    assert (other.get_goal_joint_tolerance(), other.get_goal_position_tolerance(),
-            other.get_goal_orientation_tolerance()) == (0.001, 0.002, 0.003)
+    assert (
+        other.get_goal_joint_tolerance(),
+        other.get_goal_position_tolerance(),
+        other.get_goal_orientation_tolerance(),
+    ) == (0.001, 0.002, 0.003)
     other.set_planning_time(3.0)
     other.set_planning_time(-1.0)
     assert other.get_planning_time() == 3.0
@@ -235,10 +249,19 @@ def test_settings_are_in_the_request(arm: MoveGroupCommander) -> None:
     other.allow_replanning(True)
     other.set_support_surface_name("table")
     request = other.construct_motion_plan_request()
-    assert (request.group_name, request.pipeline_id, request.planner_id, request.num_planning_attempts,
-            request.allowed_planning_time) == ("arm_and_manipulator", "ompl", "RRTstar", 4, 3.0)
-    assert (request.max_velocity_scaling_factor, request.max_acceleration_scaling_factor,
-            request.max_cartesian_speed, request.cartesian_speed_limited_link) == (0.5, 0.25, 0.2, "eg_manipulator")
+    assert (
+        request.group_name,
+        request.pipeline_id,
+        request.planner_id,
+        request.num_planning_attempts,
+        request.allowed_planning_time,
+    ) == ("arm_and_manipulator", "ompl", "RRTstar", 4, 3.0)
+    assert (
+        request.max_velocity_scaling_factor,
+        request.max_acceleration_scaling_factor,
+        request.max_cartesian_speed,
+        request.cartesian_speed_limited_link,
+    ) == (0.5, 0.25, 0.2, "eg_manipulator")
     assert (request.workspace_parameters.min_corner.y, request.workspace_parameters.max_corner.x) == (-2.0, 1.0)
     assert request.goal_constraints[0].joint_constraints[0].tolerance_above == 0.001
     assert request.path_constraints.name == other.get_path_constraints().name == "path"
@@ -262,8 +285,12 @@ def test_settings_out_of_range_are_refused(arm: MoveGroupCommander) -> None:
         for setter in (arm.set_max_velocity_scaling_factor, arm.set_max_acceleration_scaling_factor):
             with pytest.raises(MoveItCommanderException, match="Expected value in the range from 0 to 1"):
                 setter(wrong)
-    for setter, wrong in ((arm.limit_max_cartesian_link_speed, 0.0), (arm.set_workspace, [1.0]),
-                          (arm.set_path_constraints, "upright"), (arm.set_trajectory_constraints, "upright")):
+    for setter, wrong in (
+        (arm.limit_max_cartesian_link_speed, 0.0),
+        (arm.set_workspace, [1.0]),
+        (arm.set_path_constraints, "upright"),
+        (arm.set_trajectory_constraints, "upright"),
+    ):
         with pytest.raises(MoveItCommanderException):
             setter(wrong)
     with pytest.raises(MoveItCommanderException, match="database"):
@@ -279,9 +306,20 @@ def test_joint_targets_have_many_forms(arm: MoveGroupCommander) -> None:
     arm.set_joint_value_target("wrist_2_joint", [-1.0])
     arm.set_joint_value_target(JointState(name=["wrist_1_joint"], position=[-0.9]))
     assert arm.get_joint_value_target() == [1.5, -1.5, 1.0, -0.9, -1.0, 0.5]
-    for arguments in (([1.0],), ({"nobody": 1.0},), ("elbow_joint",), ("elbow_joint", 100.0), ("elbow_joint", [1, 2]),
-                      ("elbow_joint", 1.0, 2.0), (NEAR, 1.0), (3.5,), (GOAL, 3.5), ([math.nan] * 6,),
-                      (JointState(name=["elbow_joint"]),), (stamped(0.0, 5.0, 0.0),)):
+    for arguments in (
+        ([1.0],),
+        ({"nobody": 1.0},),
+        ("elbow_joint",),
+        ("elbow_joint", 100.0),
+        ("elbow_joint", [1, 2]),
+        ("elbow_joint", 1.0, 2.0),
+        (NEAR, 1.0),
+        (3.5,),
+        (GOAL, 3.5),
+        ([math.nan] * 6,),
+        (JointState(name=["elbow_joint"]),),
+        (stamped(0.0, 5.0, 0.0),),
+    ):
         with pytest.raises(MoveItCommanderException):
             arm.set_joint_value_target(*arguments)
     assert arm.get_joint_value_target() == [1.5, -1.5, 1.0, -0.9, -1.0, 0.5], "a refused target changes nothing"
@@ -337,8 +375,13 @@ def test_pose_targets_are_constraints(arm: MoveGroupCommander) -> None:
     lifted = goals()[0].position_constraints[0].constraint_region.primitive_poses[0].position
     assert lifted.z == pytest.approx(arm.get_current_pose().pose.position.z + 0.05, abs=1e-5)
     arm.shift_pose_target(5, 0.1)
-    for setter, value in ((arm.set_orientation_target, [1.0]), (arm.set_rpy_target, [1.0]), (arm.set_pose_target, [1]),
-                          (arm.set_position_target, [1.0]), (arm.set_pose_targets, [])):
+    for setter, value in (
+        (arm.set_orientation_target, [1.0]),
+        (arm.set_rpy_target, [1.0]),
+        (arm.set_pose_target, [1]),
+        (arm.set_position_target, [1.0]),
+        (arm.set_pose_targets, []),
+    ):
         with pytest.raises(MoveItCommanderException):
             setter(value)
     with pytest.raises(MoveItCommanderException, match="An axis value between 0 and 5"):

@@ -3,6 +3,7 @@
 
 The last test compares what was called with what the classes offer: a method added later fails here until it is driven.
 """
+
 from __future__ import annotations
 
 import functools
@@ -48,8 +49,14 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 PACKAGES = Path(__file__).parents[2] / "packages"
-CLASSES = (RobotCommander, RobotCommander.Joint, RobotCommander.Link, MoveGroupCommander, PlanningSceneInterface,
-           MoveGroupCommandInterpreter)
+CLASSES = (
+    RobotCommander,
+    RobotCommander.Joint,
+    RobotCommander.Link,
+    MoveGroupCommander,
+    PlanningSceneInterface,
+    MoveGroupCommandInterpreter,
+)
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 FINGERS = ["panda_leftfinger", "panda_rightfinger", "panda_hand"]
 DOWN = Quaternion(0.9238795, -0.3826834, 0.0, 0.0)  # the hand looks down, its fingers open along y
@@ -57,8 +64,11 @@ driven: set[tuple[str, str]] = set()
 
 
 def public_methods(kind: type) -> dict[str, Any]:
-    return {name: inspect.getattr_static(kind, name) for name in dir(kind)
-            if not name.startswith("_") and callable(getattr(kind, name)) and not inspect.isclass(getattr(kind, name))}
+    return {
+        name: inspect.getattr_static(kind, name)
+        for name in dir(kind)
+        if not name.startswith("_") and callable(getattr(kind, name)) and not inspect.isclass(getattr(kind, name))
+    }
 
 
 def recorded(kind: type, name: str, method: Any) -> Any:
@@ -226,8 +236,9 @@ def test_an_approximate_target_is_as_near_as_the_arm_gets(arm: MoveGroupCommande
     with pytest.raises(MoveItCommanderException, match="NO_IK_SOLUTION"):
         arm.set_joint_value_target(far)
     arm.set_joint_value_target(far, True)
-    tip = arm._pose_of("", arm._state.message_of(dict(zip(arm._group_names(), arm.get_joint_value_target(),
-                                                           strict=True)))).pose.position
+    tip = arm._pose_of(
+        "", arm._state.message_of(dict(zip(arm._group_names(), arm.get_joint_value_target(), strict=True)))
+    ).pose.position
     assert tip.x > 0.75 and abs(tip.y) < 0.1 and abs(tip.z - 0.333) < 0.2, "the arm is stretched toward the pose"
     within = arm.get_current_pose()
     arm.set_joint_value_target(within, True, arm.get_end_effector_link())
@@ -244,9 +255,13 @@ def test_targets(arm: MoveGroupCommander) -> None:
     arm.remember_joint_values("mine", READY)
     assert arm.get_remembered_joint_values() == {"mine": READY}
     arm.forget_joint_values("mine")
-    for setter, value in ((arm.set_pose_target, stamped(0.4, 0.0, 0.5, DOWN)), (arm.set_rpy_target, [math.pi, 0, 0]),
-                          (arm.set_pose_targets, [stamped(0.4, 0.0, 0.5, DOWN), stamped(0.4, 0.1, 0.5, DOWN)]),
-                          (arm.set_orientation_target, [1, 0, 0, 0]), (arm.set_position_target, [0.4, 0.0, 0.5])):
+    for setter, value in (
+        (arm.set_pose_target, stamped(0.4, 0.0, 0.5, DOWN)),
+        (arm.set_rpy_target, [math.pi, 0, 0]),
+        (arm.set_pose_targets, [stamped(0.4, 0.0, 0.5, DOWN), stamped(0.4, 0.1, 0.5, DOWN)]),
+        (arm.set_orientation_target, [1, 0, 0, 0]),
+        (arm.set_position_target, [0.4, 0.0, 0.5]),
+    ):
         setter(value)
         assert arm.plan()[0], setter.__name__
     arm.shift_pose_target(0, 0.05)
@@ -277,8 +292,12 @@ def test_pipelines_and_planners_with_their_parameters(arm: MoveGroupCommander) -
     tell(pipeline_id="ompl", planner_config="RRTConnect", group="panda_arm", params=params, replace=True)
     now = ask(pipeline_id="ompl", planner_config="RRTConnect", group="panda_arm").params
     assert float(dict(zip(now.keys, now.values, strict=True))["range"]) == 0.5
-    for pipeline, planner in (("ompl", "RRTConnect"), ("ompl", "KPIECE"), ("pilz_industrial_motion_planner", "PTP"),
-                              ("pilz_industrial_motion_planner", "LIN")):
+    for pipeline, planner in (
+        ("ompl", "RRTConnect"),
+        ("ompl", "KPIECE"),
+        ("pilz_industrial_motion_planner", "PTP"),
+        ("pilz_industrial_motion_planner", "LIN"),
+    ):
         arm.set_planning_pipeline_id(pipeline)
         arm.set_planner_id(planner)
         assert (arm.get_planning_pipeline_id(), arm.get_planner_id()) == (pipeline, planner)
@@ -329,8 +348,16 @@ def test_a_straight_line(arm: MoveGroupCommander) -> None:
 
 @pytest.mark.usefixtures("planning")
 def test_path_constraints_hold_on_the_way(arm: MoveGroupCommander) -> None:
-    upright = OrientationConstraint(Header(frame_id="world"), arm.get_current_pose().pose.orientation, "panda_link8",
-                                    0.2, 0.2, 2 * math.pi, OrientationConstraint.XYZ_EULER_ANGLES, 1.0)
+    upright = OrientationConstraint(
+        Header(frame_id="world"),
+        arm.get_current_pose().pose.orientation,
+        "panda_link8",
+        0.2,
+        0.2,
+        2 * math.pi,
+        OrientationConstraint.XYZ_EULER_ANGLES,
+        1.0,
+    )
     arm.set_path_constraints(Constraints(orientation_constraints=[upright]))
     assert arm.get_path_constraints().orientation_constraints
     target = arm.get_current_pose()
@@ -360,9 +387,14 @@ def test_objects_of_the_scene(scene: PlanningSceneInterface, tmp_path: Path) -> 
     scene.add_cone("cone", far, 0.2, 0.1)
     scene.add_plane("plane", far, (0, 0, 1), -1.0)
     scene.add_mesh("mesh", far, str(tmp_path / "cube.stl"))
-    made = [scene.make_box("made_box", far, (0.1, 0.1, 0.1)), scene.make_sphere("made_sphere", far, 0.1),
-            scene.make_cylinder("made_cylinder", far, 0.2, 0.1), scene.make_cone("made_cone", far, 0.2, 0.1),
-            scene.make_plane("made_plane", far), scene.make_mesh("made_mesh", far, str(tmp_path / "cube.stl"))]
+    made = [
+        scene.make_box("made_box", far, (0.1, 0.1, 0.1)),
+        scene.make_sphere("made_sphere", far, 0.1),
+        scene.make_cylinder("made_cylinder", far, 0.2, 0.1),
+        scene.make_cone("made_cone", far, 0.2, 0.1),
+        scene.make_plane("made_plane", far),
+        scene.make_mesh("made_mesh", far, str(tmp_path / "cube.stl")),
+    ]
     assert [len(item.primitives) for item in made] == [1, 1, 1, 1, 0, 0]
     scene.add_object(made[0])
     assert {"box", "sphere", "cylinder", "cone", "plane", "mesh", "made_box"} == set(scene.get_known_object_names())
@@ -399,8 +431,10 @@ def translation(frame: str, z: float) -> GripperTranslation:
 
 
 def fingers(position: float) -> JointTrajectory:
-    return JointTrajectory(joint_names=["panda_finger_joint1"], points=[
-        JointTrajectoryPoint(positions=[position], time_from_start=rospy.Duration(1.0))])
+    return JointTrajectory(
+        joint_names=["panda_finger_joint1"],
+        points=[JointTrajectoryPoint(positions=[position], time_from_start=rospy.Duration(1.0))],
+    )
 
 
 def test_an_object_is_picked_and_placed(arm: MoveGroupCommander, scene: PlanningSceneInterface) -> None:
@@ -408,9 +442,15 @@ def test_an_object_is_picked_and_placed(arm: MoveGroupCommander, scene: Planning
     scene.add_box("part", stamped(0.5, 0.0, 0.25), (0.03, 0.03, 0.1))
     arm.set_support_surface_name("table")
     arm.set_planning_time(20.0)
-    grasp = Grasp(id="above", grasp_pose=stamped(0.5, 0.0, 0.36, DOWN), pre_grasp_posture=fingers(0.035),
-                  grasp_posture=fingers(0.015), pre_grasp_approach=translation("world", -1.0),
-                  post_grasp_retreat=translation("world", 1.0), allowed_touch_objects=["part"])
+    grasp = Grasp(
+        id="above",
+        grasp_pose=stamped(0.5, 0.0, 0.36, DOWN),
+        pre_grasp_posture=fingers(0.035),
+        grasp_posture=fingers(0.015),
+        pre_grasp_approach=translation("world", -1.0),
+        post_grasp_retreat=translation("world", 1.0),
+        allowed_touch_objects=["part"],
+    )
     assert arm.pick("part", grasp) == MoveItErrorCodes.SUCCESS
     assert "part" in scene.get_attached_objects()
     assert arm.place("part", stamped(0.5, 0.15, 0.25))
@@ -449,15 +489,52 @@ def test_commands_as_text(robot: RobotCommander, tmp_path: Path) -> None:
     assert interpreter.execute("execute")[0] == MoveGroupInfoLevel.SUCCESS
     assert interpreter.execute("go home") == (MoveGroupInfoLevel.SUCCESS, "Moved to home")
     assert interpreter.execute("go up 0.02")[0] == MoveGroupInfoLevel.SUCCESS
-    for line in ("eef", "current", "group_state", "time 3", "tolerance 0.001", "tol", "record here", "vars", "show",
-                 "show here", "delete here", "planner RRTConnect", "allow replanning true", "constrain", "database",
-                 "stop", "wait 0.01", "trace on", "trace off", "ground", "help", "rec now", "rand some", "del some",
-                 "allow look T", "allow replan 0", f"database {tmp_path / 'constraints.sqlite'}",
-                 f"save {tmp_path / 'commands'}"):
+    for line in (
+        "eef",
+        "current",
+        "group_state",
+        "time 3",
+        "tolerance 0.001",
+        "tol",
+        "record here",
+        "vars",
+        "show",
+        "show here",
+        "delete here",
+        "planner RRTConnect",
+        "allow replanning true",
+        "constrain",
+        "database",
+        "stop",
+        "wait 0.01",
+        "trace on",
+        "trace off",
+        "ground",
+        "help",
+        "rec now",
+        "rand some",
+        "del some",
+        "allow look T",
+        "allow replan 0",
+        f"database {tmp_path / 'constraints.sqlite'}",
+        f"save {tmp_path / 'commands'}",
+    ):
         level, text = interpreter.execute(line)
         assert level in (MoveGroupInfoLevel.SUCCESS, MoveGroupInfoLevel.INFO, MoveGroupInfoLevel.DEBUG), (line, text)
-    for line in ("nonsense", "go", "go nowhere", "time x", "allow flying true", "side[9] = 1", "show nobody",
-                 "use nobody", "load /no/such/file", "constrain upright", "pick nobody", "home = [1]"):
+    for line in (
+        "nonsense",
+        "go",
+        "go nowhere",
+        "time x",
+        "allow flying true",
+        "side[9] = 1",
+        "show nobody",
+        "use nobody",
+        "load /no/such/file",
+        "constrain upright",
+        "pick nobody",
+        "home = [1]",
+    ):
         assert interpreter.execute(line)[0] in (MoveGroupInfoLevel.WARN, MoveGroupInfoLevel.FAIL), line
     again = MoveGroupCommandInterpreter()
     assert again.execute(f"load {tmp_path / 'commands'}") == (MoveGroupInfoLevel.DEBUG, "OK")
@@ -485,8 +562,15 @@ def test_a_file_in_the_folder_cmd_is_a_command(session: Any, tmp_path: Path, mon
 
 def test_the_terminal_executes_what_it_reads(session: Any) -> None:
     command = ["rosrun", "moveit_commander", "moveit_commander_cmdline.py", "panda_arm"]
-    run = subprocess.run(command, input="id\ngo ready\nnonsense\nquit\n", env=session.env, capture_output=True,
-                         text=True, timeout=60.0, check=False)
+    run = subprocess.run(
+        command,
+        input="id\ngo ready\nnonsense\nquit\n",
+        env=session.env,
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
     assert run.stdout.splitlines()[:2] == ["panda_arm", "Moved to ready"], run.stdout + run.stderr
     assert "Unknown command: 'nonsense'" in run.stdout and run.returncode == 1
 

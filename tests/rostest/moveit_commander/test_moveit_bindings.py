@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The public names of MoveIt's Python bindings: messages as bytes, poses as lists, refused targets as False."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
@@ -109,9 +110,14 @@ def test_a_refused_target_is_false_and_leaves_the_one_before(group: MoveGroupInt
     assert group.set_joint_value_target_from_joint_state_message(msg_to_string(state))
     target = group.get_joint_value_target()
     assert target[:2] == [0.2, -0.5]
-    for refused in (group.set_joint_value_target([9.0] * 7), group.set_joint_value_target("elbow", 0.0),
-                    group.set_named_target("nowhere"), group.set_end_effector_link("nowhere"),
-                    group.set_pose_target([0.0] * 5), group.set_path_constraints("nothing")):
+    for refused in (
+        group.set_joint_value_target([9.0] * 7),
+        group.set_joint_value_target("elbow", 0.0),
+        group.set_named_target("nowhere"),
+        group.set_end_effector_link("nowhere"),
+        group.set_pose_target([0.0] * 5),
+        group.set_path_constraints("nothing"),
+    ):
         assert refused is False
     assert group.get_joint_value_target() == target
     here = group.get_current_pose()
@@ -190,10 +196,16 @@ def test_the_robot(robot: RobotInterface) -> None:
     assert robot.get_joint_values("panda_arm", "ready")["panda_joint2"] == -0.785
     assert robot.get_joint_limits("panda_joint1") == [pytest.approx([-2.8973, 2.8973])]
     assert len(robot.get_link_pose("panda_link1")) == 7 and len(robot.get_current_joint_values("panda_joint1")) == 1
-    for empty in (robot.get_group_joint_names("x"), robot.get_group_active_joint_names("x"),
-                  robot.get_group_link_names("x"), robot.get_group_joint_tips("x"), robot.get_link_pose("x"),
-                  robot.get_group_default_states("x"), robot.get_joint_limits("x"),
-                  robot.get_current_joint_values("x")):
+    for empty in (
+        robot.get_group_joint_names("x"),
+        robot.get_group_active_joint_names("x"),
+        robot.get_group_link_names("x"),
+        robot.get_group_joint_tips("x"),
+        robot.get_link_pose("x"),
+        robot.get_group_default_states("x"),
+        robot.get_joint_limits("x"),
+        robot.get_current_joint_values("x"),
+    ):
         assert empty == []
     assert robot.get_joint_values("x", "ready") == {}
     state = robot.get_current_state()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The planning scene through moveit_commander: objects come and go, are attached, picked and placed."""
+
 from __future__ import annotations
 
 import subprocess
@@ -111,7 +112,9 @@ def test_objects_are_attached_and_detached(scene: PlanningSceneInterface, mesh_f
     scene.attach_mesh("tool0", "mesh", at(0.0, 0.0, 0.1, PALM), mesh_file, (0.01, 0.01, 0.01))
     scene.add_sphere("ball", at(0.5, 0.5, 1.5), 0.1)
     scene.attach_object("ball", PALM)
-    thing = AttachedCollisionObject(link_name="tool0", object=scene.make_box("thing", at(0, 0, 0, PALM), (.1, .1, .1)))
+    thing = AttachedCollisionObject(
+        link_name="tool0", object=scene.make_box("thing", at(0, 0, 0, PALM), (0.1, 0.1, 0.1))
+    )
     scene.attach_object(thing)
     names = {"block", "box", "sphere", "cylinder", "mesh", "ball", "thing"}
     assert set(scene.get_attached_objects()) == names
@@ -141,7 +144,8 @@ def test_a_refused_change_is_an_error(scene: PlanningSceneInterface, tmp_path: P
 
 def test_scenes_are_read_and_applied_whole(scene: PlanningSceneInterface) -> None:
     matrix: AllowedCollisionMatrix = scene.get_planning_scene(
-        PlanningSceneComponents.ALLOWED_COLLISION_MATRIX).allowed_collision_matrix
+        PlanningSceneComponents.ALLOWED_COLLISION_MATRIX
+    ).allowed_collision_matrix
     matrix.set_allowed("block")
     matrix.set_allowed("block", "forearm_link", True)
     change = PlanningScene(is_diff=True, allowed_collision_matrix=matrix)
@@ -158,8 +162,10 @@ def test_scenes_are_read_and_applied_whole(scene: PlanningSceneInterface) -> Non
 
 def test_an_asynchronous_scene_publishes(scene: PlanningSceneInterface) -> None:
     quick = PlanningSceneInterface(synchronous=False)
-    until(lambda: quick._pub_co.get_num_connections() > 0 and quick._pub_aco.get_num_connections() > 0,
-          "listeners to what it publishes")
+    until(
+        lambda: quick._pub_co.get_num_connections() > 0 and quick._pub_aco.get_num_connections() > 0,
+        "listeners to what it publishes",
+    )
     quick.add_box("block", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
     until(lambda: scene.get_known_object_names() == ["block"], "the block in the scene")
     quick.attach_object("block", PALM)
@@ -219,7 +225,8 @@ def test_a_location_of_another_type_is_refused(arm: MoveGroupCommander) -> None:
 
 
 def test_pick_and_place_name_what_is_missing_and_use_what_is_there(
-        arm: MoveGroupCommander, elsewhere: Callable[[str], None]) -> None:
+    arm: MoveGroupCommander, elsewhere: Callable[[str], None]
+) -> None:
     pose = at(0.3, 0.5, 0.9)
     locations = [None, pose, pose.pose, PlaceLocation(place_pose=pose), [pose, pose], [PlaceLocation(place_pose=pose)]]
     assert arm.pick("block", Grasp(), plan_only=True) == MoveItErrorCodes.ROBOT_STATE_STALE, "this robot has no joints"
@@ -234,8 +241,11 @@ def test_pick_and_place_name_what_is_missing_and_use_what_is_there(
         assert arm.pick("block", grasp, plan_only=True) == MoveItErrorCodes.SUCCESS
     assert [[grasp.id for grasp in goal.possible_grasps] for goal in pickup.goals] == [["one"], ["one", "two"]]
     goal = pickup.goals[0]
-    assert (goal.target_name, goal.group_name, goal.end_effector) == ("block", "arm_and_manipulator",
-                                                                      "ezgripper_finger_1_ee")
+    assert (goal.target_name, goal.group_name, goal.end_effector) == (
+        "block",
+        "arm_and_manipulator",
+        "ezgripper_finger_1_ee",
+    )
     assert goal.planning_options.plan_only and goal.allow_gripper_support_collision
     place = FakeTask("fake/place", PlaceAction, PlaceResult(error_code=success))
     assert [arm.place("block", item) for item in locations] == [True] * len(locations)
@@ -245,7 +255,8 @@ def test_pick_and_place_name_what_is_missing_and_use_what_is_there(
 
 
 def test_no_answer_of_a_server_that_is_done_at_once_is_lost(
-        arm: MoveGroupCommander, elsewhere: Callable[[str], None]) -> None:
+    arm: MoveGroupCommander, elsewhere: Callable[[str], None]
+) -> None:
     place = FakeTask("instant/place", PlaceAction, PlaceResult(error_code=MoveItErrorCodes(MoveItErrorCodes.SUCCESS)))
     elsewhere("instant")
     longest_s = 0.0
@@ -258,7 +269,8 @@ def test_no_answer_of_a_server_that_is_done_at_once_is_lost(
 
 
 def test_a_cartesian_path_asks_for_the_lines_and_answers_path_and_share(
-        arm: MoveGroupCommander, elsewhere: Callable[[str], None]) -> None:
+    arm: MoveGroupCommander, elsewhere: Callable[[str], None]
+) -> None:
     asked: list[Any] = []
     codes = [MoveItErrorCodes.SUCCESS, MoveItErrorCodes.INVALID_GROUP_NAME]
 
@@ -266,8 +278,9 @@ def test_a_cartesian_path_asks_for_the_lines_and_answers_path_and_share(
         asked.append(request)
         path = RobotTrajectory()
         path.joint_trajectory.joint_names = ["elbow_joint"]
-        return GetCartesianPathResponse(solution=path, fraction=0.75,
-                                        error_code=MoveItErrorCodes(codes[len(asked) - 1]))
+        return GetCartesianPathResponse(
+            solution=path, fraction=0.75, error_code=MoveItErrorCodes(codes[len(asked) - 1])
+        )
 
     rospy.Service("fake/compute_cartesian_path", GetCartesianPath, serve)
     elsewhere("fake")
@@ -277,14 +290,20 @@ def test_a_cartesian_path_asks_for_the_lines_and_answers_path_and_share(
     first, second = asked
     assert (first.max_step, first.jump_threshold, first.avoid_collisions) == (0.01, 2.5, False)
     assert (second.max_step, second.jump_threshold, second.avoid_collisions) == (0.02, 0.0, True)
-    assert (first.group_name, first.link_name, first.header.frame_id) == ("arm_and_manipulator", "eg_manipulator",
-                                                                          "world")
+    assert (first.group_name, first.link_name, first.header.frame_id) == (
+        "arm_and_manipulator",
+        "eg_manipulator",
+        "world",
+    )
     assert first.waypoints[1].position.z == 0.3 and first.start_state.is_diff
 
 
 def test_a_script_needs_no_node_of_its_own_and_ends(scene: PlanningSceneInterface) -> None:
-    script = ("import sys, moveit_commander as m; m.roscpp_initialize(sys.argv); r = m.RobotCommander(); "
-              "print(r.get_group_names()); m.roscpp_shutdown(); m.roscpp_shutdown()")
-    ended = subprocess.run([sys.executable, "-c", script, "__name:=other"], capture_output=True, text=True,
-                           timeout=30.0, check=False)
+    script = (
+        "import sys, moveit_commander as m; m.roscpp_initialize(sys.argv); r = m.RobotCommander(); "
+        "print(r.get_group_names()); m.roscpp_shutdown(); m.roscpp_shutdown()"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", script, "__name:=other"], capture_output=True, text=True, timeout=30.0, check=False
+    )
     assert ended.returncode == 0 and "'arm_and_manipulator'" in ended.stdout, ended.stderr

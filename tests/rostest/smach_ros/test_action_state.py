@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """SimpleActionState against a real action server."""
+
 from __future__ import annotations
 
 import subprocess
@@ -114,7 +115,9 @@ def test_a_function_with_an_interface_brings_its_keys_and_outcomes():
 def test_result_cb_gets_its_extra_arguments():
     got = []
     state = state_of(
-        goal=TestGoal(0), result_cb=lambda *values, **named: got.append((values[3:], named)), result_cb_args=[7],
+        goal=TestGoal(0),
+        result_cb=lambda *values, **named: got.append((values[3:], named)),
+        result_cb_args=[7],
         result_cb_kwargs={"eight": 8},
     )
     assert run(state)[0] == "succeeded"

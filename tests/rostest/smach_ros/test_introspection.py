@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A running machine as a viewer sees it, and the commands of a viewer."""
+
 from __future__ import annotations
 
 import base64

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ServiceState, MonitorState, ConditionState and ActionServerWrapper on the wire."""
+
 from __future__ import annotations
 
 import threading
@@ -41,8 +42,10 @@ def service(ros_session):
     def broken(request):
         raise ValueError("the switch is loose")
 
-    servers = [rospy.Service(name, SetBool, call) for name, call in
-               (("switch", answer), ("slow_switch", slow), ("broken_switch", broken))]
+    servers = [
+        rospy.Service(name, SetBool, call)
+        for name, call in (("switch", answer), ("slow_switch", slow), ("broken_switch", broken))
+    ]
     yield "switch"
     release.set()
     for server in servers:
@@ -61,8 +64,12 @@ def test_the_request_may_come_from_everywhere_and_the_response_goes_to_the_userd
     state = ServiceState(service, SetBool, request_key="ask", response_slots=["message"])
     assert run(state, ask=SetBoolRequest(False))[1].message == "no"
     state = ServiceState(
-        service, SetBool, request_cb=lambda userdata, request, value: SetBoolRequest(value), request_cb_args=[True],
-        response_cb=lambda userdata, response: response.message, outcomes=["yes"],
+        service,
+        SetBool,
+        request_cb=lambda userdata, request, value: SetBoolRequest(value),
+        request_cb_args=[True],
+        response_cb=lambda userdata, response: response.message,
+        outcomes=["yes"],
     )
     assert run(state)[0] == "yes"
 
@@ -108,9 +115,12 @@ def test_wrong_arguments_of_service_states_are_refused():
     from smach_ros import ServiceState
 
     for arguments, words in (
-        ({"request": 5}, "request is a int"), ({"request_cb": 5}, "request_cb is a int"),
-        ({"response_cb": 5}, "response_cb is a int"), ({"request_slots": ["x"]}, "no fields"),
-        ({"response_slots": ["x"]}, "no fields"), ({"server_wait_timeout": rospy.Duration(-1.0)}, "at least 0 s"),
+        ({"request": 5}, "request is a int"),
+        ({"request_cb": 5}, "request_cb is a int"),
+        ({"response_cb": 5}, "response_cb is a int"),
+        ({"request_slots": ["x"]}, "no fields"),
+        ({"response_slots": ["x"]}, "no fields"),
+        ({"server_wait_timeout": rospy.Duration(-1.0)}, "at least 0 s"),
     ):
         with pytest.raises(smach.InvalidStateError, match=words):
             ServiceState("switch", SetBool, **arguments)
@@ -252,8 +262,14 @@ def test_a_machine_is_offered_as_an_action():
     with machine:
         smach.StateMachine.add("DOUBLE", double)
     wrapper = ActionServerWrapper(
-        "double", TestAction, machine, ["done"], ["odd"], ["stopped"],
-        goal_slots_map={"goal": "number"}, result_slots_map={"result": "answer"},
+        "double",
+        TestAction,
+        machine,
+        ["done"],
+        ["odd"],
+        ["stopped"],
+        goal_slots_map={"goal": "number"},
+        result_slots_map={"result": "answer"},
     )
     wrapper.run_server()
     client = SteadyActionClient("double", TestAction)
@@ -301,7 +317,12 @@ def test_transitions_send_the_mapped_feedback_and_slots_are_expanded_and_packed(
         smach.StateMachine.add("FIRST", smach.CBState(work), {"next": "SECOND"})
         smach.StateMachine.add("SECOND", smach.CBState(finish), {"next": "done"})
     wrapper = ActionServerWrapper(
-        "staged", TestAction, machine, ["done"], feedback_slots_map={"feedback": "progress"}, expand_goal_slots=True,
+        "staged",
+        TestAction,
+        machine,
+        ["done"],
+        feedback_slots_map={"feedback": "progress"},
+        expand_goal_slots=True,
         pack_result_slots=True,
     )
     wrapper.run_server()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The grasp generator stores ranked grasps of what appears and signals it, or says why there is none."""
+
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The documents hold: links lead to pages and headings that exist, and the task of the first lesson is in order."""
+
 from __future__ import annotations
 
 import re
@@ -61,8 +62,11 @@ def test_modules_that_pages_import_or_run_exist() -> None:
     files = {str(file) for file in (ROOT / "src").rglob("*.py")}
     named = {(page.name, name) for page in documents() for name in MODULE.findall(page.read_text())}
     assert len(named) > 5
-    assert not [item for item in named if not any(
-        file.endswith(f"/{item[1].replace('.', '/')}{end}") for file in files for end in ENDS)]
+    assert not [
+        item
+        for item in named
+        if not any(file.endswith(f"/{item[1].replace('.', '/')}{end}") for file in files for end in ENDS)
+    ]
 
 
 def test_the_table_of_packages_is_complete() -> None:

@@ -3,6 +3,7 @@
 
 ``public_md5.json`` holds the sums of the public Noetic packages (moveit_msgs 0.11.4 and its contemporaries).
 """
+
 import importlib
 import json
 from pathlib import Path

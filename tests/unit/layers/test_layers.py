@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The test of layers finds every kind of import that its table forbids, and draws what it found."""
+
 from __future__ import annotations
 
 import sys
@@ -76,7 +77,7 @@ def test_an_import_that_runs_upwards_fails_in_four_parts(tmp_path: Path) -> None
     ],
 )
 def test_imports_in_functions_for_types_and_relative_ones_count(tmp_path: Path, text: str) -> None:
-    found, = faults(tmp_path, {"house.kitchen.stove": text, "house.bedroom.bed": "class Bed: pass"})
+    (found,) = faults(tmp_path, {"house.kitchen.stove": text, "house.bedroom.bed": "class Bed: pass"})
     assert f"stove.py:{len(text.splitlines())}: house's room 'kitchen' imports house.bedroom.bed" in found
 
 
@@ -87,7 +88,7 @@ def test_the_file_that_opens_a_room_may_import_its_modules(tmp_path: Path) -> No
 def test_rooms_of_a_room_have_an_order_too(tmp_path: Path) -> None:
     rules = table(rooms={"house": ["cellar", ["kitchen", "bedroom"], "roof"], "house.kitchen": [["stove", "sink"]]})
     modules = {"house.kitchen.stove.pot": "import house.kitchen.sink.tap", "house.kitchen.sink.tap": ""}
-    found, = faults(tmp_path, modules, rules)
+    (found,) = faults(tmp_path, modules, rules)
     assert "house.kitchen's room 'stove' imports house.kitchen.sink.tap; allowed: no other room" in found
 
 
@@ -95,18 +96,18 @@ def test_the_modules_directly_in_a_folder_are_a_room(tmp_path: Path) -> None:
     rules = table(rooms={"house": [".", "cellar", ["kitchen", "bedroom"], "roof"]})
     modules = {"house.walls": "", "house.doors": "import house.walls", "house.cellar.coal": "import house.doors"}
     assert faults(tmp_path, modules, rules) == []
-    found, = faults(tmp_path, modules | {"house.walls": "import house.cellar.wood", "house.cellar.wood": ""}, rules)
+    (found,) = faults(tmp_path, modules | {"house.walls": "import house.cellar.wood", "house.cellar.wood": ""}, rules)
     assert "house's room '.' imports house.cellar.wood; allowed: no other room" in found
 
 
 @pytest.mark.parametrize("text", ["import house.cellar.gold", "from house.cellar.gold import bar"])
 def test_an_import_of_a_module_that_does_not_exist_fails(tmp_path: Path, text: str) -> None:
-    found, = faults(tmp_path, {"house.kitchen.stove": text})
+    (found,) = faults(tmp_path, {"house.kitchen.stove": text})
     assert found.startswith("src/house/src/house/kitchen/stove.py:1: imports house.cellar.gold, which does not exist")
 
 
 def test_an_import_between_packages_has_to_be_in_the_table(tmp_path: Path) -> None:
-    found, = faults(tmp_path, {"ground.stone": "import house.cellar.coal", "house.cellar.coal": ""})
+    (found,) = faults(tmp_path, {"ground.stone": "import house.cellar.coal", "house.cellar.coal": ""})
     assert found == (
         "src/ground/src/ground/stone.py:1: ground imports house.cellar.coal; allowed: no package; "
         "move what is shared into a package below both, or pass it in"
@@ -115,7 +116,7 @@ def test_an_import_between_packages_has_to_be_in_the_table(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("importer", ["house.cellar.coal", "ground.stone"])
 def test_rospy_below_the_ros_interface_fails(tmp_path: Path, importer: str) -> None:
-    found, = faults(tmp_path, {importer: "def now():\n    import rospy"})
+    (found,) = faults(tmp_path, {importer: "def now():\n    import rospy"})
     assert f"{importer} imports rospy below the ROS interface" in found
     assert ".py:2: " in found
 
@@ -124,12 +125,12 @@ def test_rospy_below_the_ros_interface_fails(tmp_path: Path, importer: str) -> N
     "text", ["from sensor_msgs.msg import Image", "from ground.msg import Stone", "from ground import srv"]
 )
 def test_messages_below_the_ros_interface_fail(tmp_path: Path, text: str) -> None:
-    found, = faults(tmp_path, {"ground.stone": text}, table(ros=["*_msgs", "*.msg", "*.srv"]))
+    (found,) = faults(tmp_path, {"ground.stone": text}, table(ros=["*_msgs", "*.msg", "*.srv"]))
     assert "below the ROS interface" in found
 
 
 def test_a_module_called_ros_may_import_rospy_but_not_be_imported_from_below_the_ros_interface(tmp_path: Path) -> None:
-    found, = faults(tmp_path, {"ground.ros_clock": "import rospy", "ground.time": "import ground.ros_clock"})
+    (found,) = faults(tmp_path, {"ground.ros_clock": "import rospy", "ground.time": "import ground.ros_clock"})
     assert "ground.time imports ground.ros_clock below the ROS interface" in found
 
 
@@ -139,7 +140,7 @@ def test_a_circle_of_files_fails_inside_one_room(tmp_path: Path) -> None:
         "house.cellar.wood": "def burn():\n    import house.cellar.ash",
         "house.cellar.ash": "import house.cellar.coal",
     }
-    found, = faults(tmp_path, modules)
+    (found,) = faults(tmp_path, modules)
     assert found == (
         "src/house/src/house/cellar/ash.py:1: the circle house.cellar.ash -> house.cellar.coal -> house.cellar.wood "
         "-> house.cellar.ash; allowed: no circle of files; move what they share into a module below both, or pass it in"
@@ -147,7 +148,7 @@ def test_a_circle_of_files_fails_inside_one_room(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_too_many_modules_fails(tmp_path: Path) -> None:
-    found, = faults(tmp_path, {f"house.cellar.barrel{number}": "" for number in range(4)})
+    (found,) = faults(tmp_path, {f"house.cellar.barrel{number}": "" for number in range(4)})
     assert found.startswith("src/house/src/house/cellar: 4 modules in one folder; allowed: at most 3; ")
 
 
@@ -168,7 +169,7 @@ def test_packages_and_rooms_that_the_table_does_not_know_fail(tmp_path: Path, mo
 
 
 def test_a_room_of_the_table_that_is_gone_fails(tmp_path: Path) -> None:
-    found, = faults(tmp_path, {}, table(rooms={"house": ["vault", "cellar", "kitchen", "bedroom", "roof"]}))
+    (found,) = faults(tmp_path, {}, table(rooms={"house": ["vault", "cellar", "kitchen", "bedroom", "roof"]}))
     assert "house has no room 'vault'" in found
 
 
@@ -187,7 +188,7 @@ def test_an_exempted_import_passes_with_its_circle(tmp_path: Path) -> None:
 def test_an_exemption_that_nothing_needs_fails(tmp_path: Path) -> None:
     exemption = {"importer": "house.kitchen.stove", "imported": "house.cellar.coal", "reason": "none"}
     modules = {"house.kitchen.stove": "import house.cellar.coal", "house.cellar.coal": ""}
-    found, = faults(tmp_path, modules, table(exemptions=[exemption]))
+    (found,) = faults(tmp_path, modules, table(exemptions=[exemption]))
     assert "the exemption of house.kitchen.stove -> house.cellar.coal is no longer needed" in found
 
 

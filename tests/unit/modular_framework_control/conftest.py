@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A control loop with fake hardware, stepped by the test, for the tests of controllers."""
+
 from __future__ import annotations
 
 import threading
@@ -19,8 +20,9 @@ from modular_framework_ros.node_handle import MappingNodeHandle
 class Loop:
     """Hardware and controller manager, advanced by `step`; requests of the service side run beside it."""
 
-    def __init__(self, parameters: Mapping[str, Any], robot_hw: RobotHW | None = None,
-                 types: ControllerTypes | None = None) -> None:
+    def __init__(
+        self, parameters: Mapping[str, Any], robot_hw: RobotHW | None = None, types: ControllerTypes | None = None
+    ) -> None:
         root = MappingNodeHandle(parameters)
         self.robot_hw = robot_hw if robot_hw is not None else MockRobotHW()
         assert self.robot_hw.init(root, root.child("hw"))

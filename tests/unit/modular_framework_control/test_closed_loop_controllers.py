@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of joints that take velocities and efforts, in a loop with fake hardware that takes them."""
+
 from __future__ import annotations
 
 import math
@@ -32,15 +33,20 @@ from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
 URDF = """<robot name="r"><joint name="a" type="revolute"><limit lower="-1" upper="1" velocity="9" effort="90"/></joint>
 <joint name="b" type="revolute"><limit lower="-2" upper="2" velocity="9" effort="90"/></joint></robot>"""
 INTERFACES: dict[str, type[HardwareInterface[Any]]] = {
-    "position": PositionJointInterface, "velocity": VelocityJointInterface, "effort": EffortJointInterface}
+    "position": PositionJointInterface,
+    "velocity": VelocityJointInterface,
+    "effort": EffortJointInterface,
+}
 STIFF = {"p": 100.0, "d": 20.0}
 GAINS = {"velocity": {"p": 20.0}, "effort": STIFF}
 
 
 def parameters(family: str, controller: str, **more: Any) -> dict[str, Any]:
-    return {"robot_description": URDF,
-            "hw": {"joints": ["a", "b"], "command_interface": INTERFACES[family].__name__},
-            "c": {"type": f"{family}_controllers/{controller}", **more}}
+    return {
+        "robot_description": URDF,
+        "hw": {"joints": ["a", "b"], "command_interface": INTERFACES[family].__name__},
+        "c": {"type": f"{family}_controllers/{controller}", **more},
+    }
 
 
 @pytest.fixture
@@ -66,8 +72,13 @@ def goal(*rows: tuple[float, tuple[float, ...]]) -> TrajectoryGoal:
 def test_a_trajectory_is_followed_by_gains_and_the_goal_is_reached(start: Callable[..., Any], family: str) -> None:
     gains = {"a": GAINS[family], "b": GAINS[family]}
     tolerance = {"trajectory": 0.1, "goal": 0.01}
-    loop = start(family, "JointTrajectoryController", joints=["a", "b"], gains=gains,
-                 constraints={"goal_time": 0.5, "a": tolerance, "b": tolerance})
+    loop = start(
+        family,
+        "JointTrajectoryController",
+        joints=["a", "b"],
+        gains=gains,
+        constraints={"goal_time": 0.5, "a": tolerance, "b": tolerance},
+    )
     goal_handle = TrajectoryGoalHandle()
     loop.controllers["c"].submit(goal((1.0, (0.5, -0.4))), goal_handle)
     loop.run(2.0)
@@ -77,8 +88,13 @@ def test_a_trajectory_is_followed_by_gains_and_the_goal_is_reached(start: Callab
 
 def test_velocity_feed_forward_alone_follows_what_the_gains_would_lag_behind(start: Callable[..., Any]) -> None:
     def largest_error(velocity_ff: dict[str, float]) -> float:
-        loop = start("velocity", "JointTrajectoryController", joints=["a", "b"], velocity_ff=velocity_ff,
-                     gains={"a": {"p": 1.0}, "b": {"p": 1.0}})
+        loop = start(
+            "velocity",
+            "JointTrajectoryController",
+            joints=["a", "b"],
+            velocity_ff=velocity_ff,
+            gains={"a": {"p": 1.0}, "b": {"p": 1.0}},
+        )
         loop.controllers["c"].submit(goal((1.0, (0.5, 0.5))))
         worst = 0.0
         for _ in range(100):
@@ -92,11 +108,16 @@ def test_velocity_feed_forward_alone_follows_what_the_gains_would_lag_behind(sta
 
 @pytest.mark.parametrize("raises", [False, True])
 @pytest.mark.parametrize("family", ["PosVel", "PosVelAcc"])
-def test_what_ends_in_motion_leaves_a_position_and_nothing_that_leads_on(make_loop: Callable[..., Any], family: str,
-                                                                        raises: bool) -> None:
+def test_what_ends_in_motion_leaves_a_position_and_nothing_that_leads_on(
+    make_loop: Callable[..., Any], family: str, raises: bool
+) -> None:
     prefix = {"PosVel": "pos_vel", "PosVelAcc": "pos_vel_acc"}[family]
-    loop = make_loop({"hw": {"joints": ["a", "b"], "command_interface": f"{family}JointInterface"},
-                      "c": {"type": f"{prefix}_controllers/JointTrajectoryController", "joints": ["a", "b"]}})
+    loop = make_loop(
+        {
+            "hw": {"joints": ["a", "b"], "command_interface": f"{family}JointInterface"},
+            "c": {"type": f"{prefix}_controllers/JointTrajectoryController", "joints": ["a", "b"]},
+        }
+    )
     loop.spawn("c")
     loop.controllers["c"].submit(goal((2.0, (4.0, 4.0))))
     loop.run(0.5)
@@ -140,28 +161,77 @@ def test_missing_gains_are_named(make_loop: Callable[..., Any]) -> None:
         loop.manager.load_controller("c")
 
 
-@pytest.mark.parametrize(("family", "controller", "more", "value", "seen"), [
-    ("position", "JointPositionController", {"joint": "a"}, [0.3], lambda handle: handle.position == 0.3),
-    ("position", "JointGroupPositionController", {"joints": ["a", "b"]}, [0.3, 0.1],
-     lambda handle: handle.position == 0.3),
-    ("velocity", "JointVelocityController", {"joint": "a"}, [0.3],
-     lambda handle: handle.velocity == pytest.approx(0.3) and handle.position > 0.1),
-    ("velocity", "JointGroupVelocityController", {"joints": ["a", "b"]}, [0.3, 0.1],
-     lambda handle: handle.velocity == pytest.approx(0.3)),
-    ("velocity", "JointPositionController", {"joint": "a", "pid": {"p": 10.0}}, [0.3],
-     lambda handle: abs(handle.position - 0.3) < 0.01),
-    ("effort", "JointEffortController", {"joint": "a"}, [0.3], lambda handle: handle.effort == 0.3),
-    ("effort", "JointGroupEffortController", {"joints": ["a", "b"]}, [0.3, 0.1], lambda handle: handle.effort == 0.3),
-    ("effort", "JointPositionController", {"joint": "a", "pid": STIFF}, [0.3],
-     lambda handle: abs(handle.position - 0.3) < 0.01),
-    ("effort", "JointGroupPositionController", {"joints": ["a", "b"], "a": {"pid": STIFF}, "b": {"pid": STIFF}},
-     [0.3, 0.1], lambda handle: abs(handle.position - 0.3) < 0.01),
-    ("effort", "JointVelocityController", {"joint": "a", "pid": {"p": 20.0}}, [0.3],
-     lambda handle: abs(handle.velocity - 0.3) < 0.01),
-])
+@pytest.mark.parametrize(
+    ("family", "controller", "more", "value", "seen"),
+    [
+        ("position", "JointPositionController", {"joint": "a"}, [0.3], lambda handle: handle.position == 0.3),
+        (
+            "position",
+            "JointGroupPositionController",
+            {"joints": ["a", "b"]},
+            [0.3, 0.1],
+            lambda handle: handle.position == 0.3,
+        ),
+        (
+            "velocity",
+            "JointVelocityController",
+            {"joint": "a"},
+            [0.3],
+            lambda handle: handle.velocity == pytest.approx(0.3) and handle.position > 0.1,
+        ),
+        (
+            "velocity",
+            "JointGroupVelocityController",
+            {"joints": ["a", "b"]},
+            [0.3, 0.1],
+            lambda handle: handle.velocity == pytest.approx(0.3),
+        ),
+        (
+            "velocity",
+            "JointPositionController",
+            {"joint": "a", "pid": {"p": 10.0}},
+            [0.3],
+            lambda handle: abs(handle.position - 0.3) < 0.01,
+        ),
+        ("effort", "JointEffortController", {"joint": "a"}, [0.3], lambda handle: handle.effort == 0.3),
+        (
+            "effort",
+            "JointGroupEffortController",
+            {"joints": ["a", "b"]},
+            [0.3, 0.1],
+            lambda handle: handle.effort == 0.3,
+        ),
+        (
+            "effort",
+            "JointPositionController",
+            {"joint": "a", "pid": STIFF},
+            [0.3],
+            lambda handle: abs(handle.position - 0.3) < 0.01,
+        ),
+        (
+            "effort",
+            "JointGroupPositionController",
+            {"joints": ["a", "b"], "a": {"pid": STIFF}, "b": {"pid": STIFF}},
+            [0.3, 0.1],
+            lambda handle: abs(handle.position - 0.3) < 0.01,
+        ),
+        (
+            "effort",
+            "JointVelocityController",
+            {"joint": "a", "pid": {"p": 20.0}},
+            [0.3],
+            lambda handle: abs(handle.velocity - 0.3) < 0.01,
+        ),
+    ],
+)
 def test_a_command_controller_does_what_it_is_told_and_refuses_nonsense(
-        start: Callable[..., Any], family: str, controller: str, more: dict[str, Any], value: list[float],
-        seen: Callable[[Any], bool]) -> None:
+    start: Callable[..., Any],
+    family: str,
+    controller: str,
+    more: dict[str, Any],
+    value: list[float],
+    seen: Callable[[Any], bool],
+) -> None:
     loop = start(family, controller, **more)
     handle = joint(loop, family)
     loop.run(0.5)
@@ -174,25 +244,33 @@ def test_a_command_controller_does_what_it_is_told_and_refuses_nonsense(
     assert seen(handle), handle
 
 
-@pytest.mark.parametrize(("family", "more"), [("position", {}), ("velocity", {"pid": {"p": 20.0}}),
-                                              ("effort", {"pid": STIFF})])
-def test_a_position_that_is_not_a_number_is_never_commanded(start: Callable[..., Any], family: str,
-                                                            more: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("family", "more"), [("position", {}), ("velocity", {"pid": {"p": 20.0}}), ("effort", {"pid": STIFF})]
+)
+def test_a_position_that_is_not_a_number_is_never_commanded(
+    start: Callable[..., Any], family: str, more: dict[str, Any]
+) -> None:
     loop = start(family, "JointPositionController", joint="a", **more)
     loop.controllers["c"].submit([0.3])
     loop.run(0.5)
     handle, controller = joint(loop, family), loop.controllers["c"]
     handle.state.position = math.nan
-    for step in (lambda: controller.update(loop.time_s, 0.01), lambda: controller.stopping(loop.time_s),
-                 lambda: controller.starting(loop.time_s), lambda: controller.update(loop.time_s, 0.01)):
+    for step in (
+        lambda: controller.update(loop.time_s, 0.01),
+        lambda: controller.stopping(loop.time_s),
+        lambda: controller.starting(loop.time_s),
+        lambda: controller.update(loop.time_s, 0.01),
+    ):
         step()
         assert handle.command == pytest.approx(0.3 if family == "position" else 0.0)
 
 
-@pytest.mark.parametrize(("family", "controller"), [("velocity", "JointVelocityController"),
-                                                    ("effort", "JointEffortController")])
-def test_no_velocity_or_effort_is_left_when_a_command_controller_is_stopped(start: Callable[..., Any], family: str,
-                                                                            controller: str) -> None:
+@pytest.mark.parametrize(
+    ("family", "controller"), [("velocity", "JointVelocityController"), ("effort", "JointEffortController")]
+)
+def test_no_velocity_or_effort_is_left_when_a_command_controller_is_stopped(
+    start: Callable[..., Any], family: str, controller: str
+) -> None:
     loop = start(family, controller, joint="a")
     loop.controllers["c"].submit([0.5])
     loop.step()
@@ -228,7 +306,7 @@ def test_the_integral_is_bounded_and_forgotten() -> None:
 def test_gains_that_change_make_no_jump_of_what_was_added_up() -> None:
     pid = Pid(PidGains(0.0, i=1.0, i_clamp_min=-5.0, i_clamp_max=5.0))
     for _ in range(100):
-        pid.command(1.0, 0.0, 1.0)      # wound up to 100, of which 5 are used
+        pid.command(1.0, 0.0, 1.0)  # wound up to 100, of which 5 are used
     pid.gains = PidGains(0.0, i=0.5, i_clamp_min=-50.0, i_clamp_max=50.0)
     assert pid.command(0.0, 0.0, 1.0) == 5.0
     pid.gains = PidGains(0.0, i=0.0, i_clamp_min=-50.0, i_clamp_max=50.0)
@@ -259,9 +337,9 @@ def test_gains_are_read_with_their_bounds() -> None:
 
 
 @pytest.mark.parametrize(("max_effort", "largest"), [(0.0, 10.0), (3.0, 3.0)])
-def test_a_gripper_of_efforts_reaches_its_goal_within_the_bound_of_its_effort(start: Callable[..., Any],
-                                                                              max_effort: float,
-                                                                              largest: float) -> None:
+def test_a_gripper_of_efforts_reaches_its_goal_within_the_bound_of_its_effort(
+    start: Callable[..., Any], max_effort: float, largest: float
+) -> None:
     loop = start("effort", "GripperActionController", joint="a", gains={"a": STIFF}, goal_tolerance=0.001)
     goal_handle: GripperGoalHandle = RealtimeGoalHandle()
     handle = joint(loop, "effort")
@@ -296,8 +374,9 @@ class Waver(Controller):
         raise OSError("already gone")
 
 
-def test_what_a_controller_opened_it_can_close_when_it_is_unloaded(make_loop: Callable[..., Any],
-                                                                   caplog: pytest.LogCaptureFixture) -> None:
+def test_what_a_controller_opened_it_can_close_when_it_is_unloaded(
+    make_loop: Callable[..., Any], caplog: pytest.LogCaptureFixture
+) -> None:
     types = ControllerTypes()
     types.register("lab/Waver", Waver)
     loop = make_loop({"hw": {"joints": ["a"]}, "w": {"type": "lab/Waver"}}, types=types)
@@ -321,8 +400,11 @@ class FixedIndex(PluginIndex):
 
     def _plugins(self) -> dict[str, Plugin]:
         from pathlib import Path
-        return {f"lab/{name}": Plugin(f"lab/{name}", CONTROLLER_BASE, __name__, name, Path("/lab/plugins.xml"))
-                for name in ("Waver", "Raiser")}
+
+        return {
+            f"lab/{name}": Plugin(f"lab/{name}", CONTROLLER_BASE, __name__, name, Path("/lab/plugins.xml"))
+            for name in ("Waver", "Raiser")
+        }
 
     def load(self, name: str, expected: type[Any]) -> type[Any]:
         return {"lab/Waver": Waver, "lab/Raiser": Raiser}[name]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Two pieces of hardware combined behave as one robot, and each is asked only about what is its own."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -26,9 +27,17 @@ PARAMETERS: dict[str, Any] = {
     "robot_hardware": ["arm", "gripper"],
     "arm": {"type": MOCK, "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
     "gripper": {"type": MOCK, "joints": ["finger"]},
-    "joint_limits": {name: {"has_position_limits": True, "min_position": -1.0, "max_position": 1.0,
-                            "has_velocity_limits": True, "max_velocity": 2.0}
-                     for name in ("shoulder", "elbow", "finger")}}
+    "joint_limits": {
+        name: {
+            "has_position_limits": True,
+            "min_position": -1.0,
+            "max_position": 1.0,
+            "has_velocity_limits": True,
+            "max_velocity": 2.0,
+        }
+        for name in ("shoulder", "elbow", "finger")
+    },
+}
 
 
 def combined(parameters: dict[str, Any] = PARAMETERS, make: Callable[[str], RobotHW] | None = None) -> CombinedRobotHW:
@@ -69,14 +78,21 @@ class Recorder(RobotHW):
 
 def two(one: Recorder, other: Recorder) -> CombinedRobotHW:
     made = {"lab/One": one, "lab/Other": other}
-    return combined({"robot_hardware": ["one", "other"], "one": {"type": "lab/One"}, "other": {"type": "lab/Other"}},
-                    made.__getitem__)
+    return combined(
+        {"robot_hardware": ["one", "other"], "one": {"type": "lab/One"}, "other": {"type": "lab/Other"}},
+        made.__getitem__,
+    )
 
 
 def info(name: str, **claims: Sequence[str]) -> ControllerInfo:
-    return ControllerInfo(name, "some/Type", tuple(InterfaceResources(f"hardware_interface/{kind}JointInterface",
-                                                                      tuple(names))
-                                                   for kind, names in claims.items()))
+    return ControllerInfo(
+        name,
+        "some/Type",
+        tuple(
+            InterfaceResources(f"hardware_interface/{kind}JointInterface", tuple(names))
+            for kind, names in claims.items()
+        ),
+    )
 
 
 def test_each_part_gets_the_root_and_its_own_namespace() -> None:
@@ -128,9 +144,11 @@ def test_one_part_that_refuses_refuses_the_switch_and_is_named(caplog: pytest.Lo
 def test_a_switch_is_done_when_every_part_is(caplog: pytest.LogCaptureFixture) -> None:
     one, other = Recorder(joints=["a"]), Recorder(joints=["b"])
     robot_hw = two(one, other)
-    for results, expected in (((SwitchState.DONE, SwitchState.DONE), SwitchState.DONE),
-                              ((SwitchState.DONE, SwitchState.ONGOING), SwitchState.ONGOING),
-                              ((SwitchState.ERROR, SwitchState.ONGOING), SwitchState.ERROR)):
+    for results, expected in (
+        ((SwitchState.DONE, SwitchState.DONE), SwitchState.DONE),
+        ((SwitchState.DONE, SwitchState.ONGOING), SwitchState.ONGOING),
+        ((SwitchState.ERROR, SwitchState.ONGOING), SwitchState.ERROR),
+    ):
         one.result, other.result = results
         assert robot_hw.switch_result() is expected
         assert robot_hw.switch_result(info("c", Position=["a", "b"])) is expected
@@ -150,26 +168,39 @@ def test_two_controllers_may_not_command_one_joint_through_two_parts() -> None:
         text = robot_hw.check_for_conflict(controllers)
         assert "joint 'j' is claimed by" in text and "'p'" in text and "'v'" in text and "'k'" not in text
     assert robot_hw.check_for_conflict([info("p", Position=["k"]), by_velocity]) == ""
-    assert "joint 'j' is claimed by 'both' through hardware_interface/PositionJointInterface and through " \
-           "hardware_interface/VelocityJointInterface" in robot_hw.check_for_conflict(
-               [info("both", Position=["j"], Velocity=["j"])])
+    assert (
+        "joint 'j' is claimed by 'both' through hardware_interface/PositionJointInterface and through "
+        "hardware_interface/VelocityJointInterface"
+        in robot_hw.check_for_conflict([info("both", Position=["j"], Velocity=["j"])])
+    )
 
 
-@pytest.mark.parametrize(("parameters", "words"), [
-    ({}, ["parameter /robot_hardware: got None"]),
-    ({"robot_hardware": "arm"}, ["parameter /robot_hardware: got 'arm'; expected a list"]),
-    ({"robot_hardware": []}, ["got []"]),
-    ({"robot_hardware": ["a", "a"]}, ["may be named once"]),
-    ({"robot_hardware": ["a"]}, ["entry 'a' of robot_hardware", "parameter /a/type is None"]),
-    ({"robot_hardware": ["a"], "a": {"type": "no/Such"}},
-     ["entry 'a' of robot_hardware: type 'no/Such'", "known: modular_framework_control/CombinedRobotHW, "]),
-    ({"robot_hardware": ["a"], "a": {"type": MOCK}}, ["entry 'a' of robot_hardware", "did not initialise"]),
-    ({"robot_hardware": ["a"], "a": {"type": MOCK, "joints": ["x"]}, "robot_description": "<robot"}, ["did not init"]),
-    ({"robot_hardware": ["a", "b"], "a": {"type": MOCK, "joints": ["x"]}, "b": {"type": MOCK, "joints": ["x"]}},
-     ["joint 'x' is in hardware 'a' and in 'b'; only one of them may command it"]),
-])
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({}, ["parameter /robot_hardware: got None"]),
+        ({"robot_hardware": "arm"}, ["parameter /robot_hardware: got 'arm'; expected a list"]),
+        ({"robot_hardware": []}, ["got []"]),
+        ({"robot_hardware": ["a", "a"]}, ["may be named once"]),
+        ({"robot_hardware": ["a"]}, ["entry 'a' of robot_hardware", "parameter /a/type is None"]),
+        (
+            {"robot_hardware": ["a"], "a": {"type": "no/Such"}},
+            ["entry 'a' of robot_hardware: type 'no/Such'", "known: modular_framework_control/CombinedRobotHW, "],
+        ),
+        ({"robot_hardware": ["a"], "a": {"type": MOCK}}, ["entry 'a' of robot_hardware", "did not initialise"]),
+        (
+            {"robot_hardware": ["a"], "a": {"type": MOCK, "joints": ["x"]}, "robot_description": "<robot"},
+            ["did not init"],
+        ),
+        (
+            {"robot_hardware": ["a", "b"], "a": {"type": MOCK, "joints": ["x"]}, "b": {"type": MOCK, "joints": ["x"]}},
+            ["joint 'x' is in hardware 'a' and in 'b'; only one of them may command it"],
+        ),
+    ],
+)
 def test_a_faulty_list_is_refused_with_the_entry_the_type_and_what_is_known(
-        parameters: dict[str, Any], words: list[str], caplog: pytest.LogCaptureFixture) -> None:
+    parameters: dict[str, Any], words: list[str], caplog: pytest.LogCaptureFixture
+) -> None:
     root = MappingNodeHandle(parameters)
     assert CombinedRobotHW().init(root, root) is False
     assert all(word in caplog.text for word in words), caplog.text
@@ -181,13 +212,18 @@ def test_hardware_that_raises_is_refused_with_what_it_raised(caplog: pytest.LogC
 
     root = MappingNodeHandle(PARAMETERS)
     assert CombinedRobotHW(make).init(root, root) is False
-    assert "entry 'arm' of robot_hardware: type 'modular_framework_control/MockRobotHW' raised OSError: no such port" \
+    assert (
+        "entry 'arm' of robot_hardware: type 'modular_framework_control/MockRobotHW' raised OSError: no such port"
         in caplog.text
+    )
 
 
 def test_controllers_of_both_parts_run_on_it(make_loop: Callable[..., Any]) -> None:
-    parameters = {**PARAMETERS, "hw": PARAMETERS | {},
-                  "all": {"type": "position_controllers/JointTrajectoryController", "joints": ["shoulder", "finger"]}}
+    parameters = {
+        **PARAMETERS,
+        "hw": PARAMETERS | {},
+        "all": {"type": "position_controllers/JointTrajectoryController", "joints": ["shoulder", "finger"]},
+    }
     loop = make_loop(parameters, CombinedRobotHW())
     loop.spawn("all")
     assert loop.states() == {"all": "running"}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the control loop's node writes after its controllers stopped: cycles until nothing moves, or that is in vain."""
+
 from __future__ import annotations
 
 import threading
@@ -75,9 +76,15 @@ class Nothing:
 def make_node(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[RobotHwNode, WatchedHardware]]:
     def make(velocity: float = 0.0) -> tuple[RobotHwNode, WatchedHardware]:
         robot_hw = WatchedHardware()
-        tree = MappingNodeHandle({
-            "joints": ["a"], "command_interface": "VelocityJointInterface", "real_time": False, "rate": RATE,
-            "joint_limits": {"a": {"has_acceleration_limits": True, "max_acceleration": ACCELERATION}}})
+        tree = MappingNodeHandle(
+            {
+                "joints": ["a"],
+                "command_interface": "VelocityJointInterface",
+                "real_time": False,
+                "rate": RATE,
+                "joint_limits": {"a": {"has_acceleration_limits": True, "max_acceleration": ACCELERATION}},
+            }
+        )
         monkeypatch.setattr(robot_hw_node, "RosNodeHandle", lambda namespace: tree)
         monkeypatch.setattr(robot_hw_node, "robot_hw_of_type", lambda name: robot_hw)
         monkeypatch.setattr(robot_hw_node, "prepare_interpreter", lambda: None)
@@ -127,8 +134,9 @@ def test_a_robot_whose_velocities_are_never_0_is_believed_after_a_while(make_nod
     assert 10 < len(robot_hw.written) <= robot_hw_node.RESTLESS_S * RATE + 2
 
 
-def test_a_robot_that_does_not_stop_is_not_waited_for_without_end(make_node: Callable[..., Any],
-                                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_does_not_stop_is_not_waited_for_without_end(
+    make_node: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(robot_hw_node, "LONGEST_END_S", 0.3)
     node, robot_hw = make_node(1.0)
     robot_hw.noise = 1.0

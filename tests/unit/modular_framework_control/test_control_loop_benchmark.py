@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`benchmarks/control_loop` measures controllers of every type there is."""
+
 from __future__ import annotations
 
 import importlib.machinery

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What it takes to bring a group of controllers into force."""
+
 from __future__ import annotations
 
 import pytest
@@ -10,15 +11,25 @@ from modular_framework_control.ros.controller_manager_client import ControllerMa
 GROUPS = {"follow": ["states", "arm", "gripper"], "teach": ["states", "gravity"], "empty": []}
 
 
-@pytest.mark.parametrize(("group", "states", "plan"), [
-    ("follow", {}, GroupPlan(("states", "arm", "gripper"), ("states", "arm", "gripper"), ())),
-    ("follow", {"states": "running", "gravity": "running", "arm": "stopped", "stranger": "running"},
-     GroupPlan(("gripper",), ("arm", "gripper"), ("gravity",))),
-    ("teach", {"states": "running", "arm": "running", "gripper": "initialized", "gravity": "initialized"},
-     GroupPlan((), ("gravity",), ("arm",))),
-])
-def test_what_is_shared_goes_on_and_what_is_others_only_stops(group: str, states: dict[str, str],
-                                                              plan: GroupPlan) -> None:
+@pytest.mark.parametrize(
+    ("group", "states", "plan"),
+    [
+        ("follow", {}, GroupPlan(("states", "arm", "gripper"), ("states", "arm", "gripper"), ())),
+        (
+            "follow",
+            {"states": "running", "gravity": "running", "arm": "stopped", "stranger": "running"},
+            GroupPlan(("gripper",), ("arm", "gripper"), ("gravity",)),
+        ),
+        (
+            "teach",
+            {"states": "running", "arm": "running", "gripper": "initialized", "gravity": "initialized"},
+            GroupPlan((), ("gravity",), ("arm",)),
+        ),
+    ],
+)
+def test_what_is_shared_goes_on_and_what_is_others_only_stops(
+    group: str, states: dict[str, str], plan: GroupPlan
+) -> None:
     assert plan_group(GROUPS, group, states) == plan
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loading, switching and unloading controllers, by the rules of ros_control."""
+
 from __future__ import annotations
 
 import threading
@@ -27,8 +28,11 @@ JOINTS = {"left": "a", "right": "b", "both": ["a", "b"], "left_too": "a"}
 PARAMETERS: dict[str, Any] = {
     "hw": {"joints": ["a", "b"]},
     **{name: {"type": "test/Recorder", "joint": joint} for name, joint in JOINTS.items()},
-    "typeless": {"joint": "a"}, "unknown": {"type": "test/Nothing"}, "jointless": {"type": "test/Recorder"},
-    "elsewhere": {"type": "test/Recorder", "joint": "c"}, "refusing": {"type": "test/Refusing"},
+    "typeless": {"joint": "a"},
+    "unknown": {"type": "test/Nothing"},
+    "jointless": {"type": "test/Recorder"},
+    "elsewhere": {"type": "test/Recorder", "joint": "c"},
+    "refusing": {"type": "test/Refusing"},
     "missing_module": {"type": "test/MissingModule"},
 }
 
@@ -106,30 +110,34 @@ def test_a_loaded_controller_is_initialized_then_running_then_stopped(loop: Any)
 
 
 # "left" runs, "right" and "both" do not; "both" and "left_too" share joint a with "left".
-@pytest.mark.parametrize(("start", "stop", "strictness", "words", "running"), [
-    (["right"], [], STRICT, None, {"left", "right"}),
-    (["right"], ["left"], STRICT, None, {"right"}),
-    ([], [], STRICT, None, {"left"}),
-    (["absent"], [], STRICT, "cannot start 'absent': no controller", {"left"}),
-    ([], ["absent"], STRICT, "cannot stop 'absent': no controller", {"left"}),
-    (["left"], [], STRICT, "already running", {"left"}),
-    ([], ["right"], STRICT, "cannot stop 'right': it is initialized", {"left"}),
-    (["right"], ["right"], STRICT, "cannot stop 'right'", {"left"}),
-    (["left"], ["left"], STRICT, None, {"left"}),
-    (["right", "absent"], [], BEST_EFFORT, None, {"left", "right"}),
-    (["right"], ["absent"], BEST_EFFORT, None, {"left", "right"}),
-    (["left", "right"], [], BEST_EFFORT, None, {"left", "right"}),
-    (["right"], ["right"], BEST_EFFORT, None, {"left", "right"}),
-    (["right"], ["right", "left"], BEST_EFFORT, None, {"right"}),
-    (["right", "absent"], [], 0, None, {"left", "right"}),
-    (["left_too"], [], STRICT, "joint 'a' is claimed by 'left' and by 'left_too'", {"left"}),
-    (["left_too"], [], BEST_EFFORT, "joint 'a' is claimed", {"left"}),
-    (["both"], ["left"], STRICT, None, {"both"}),
-    (["both", "right"], ["left"], STRICT, "joint 'b' is claimed", {"left"}),
-    (["right"], [], 7, "strictness 7 is not known", {"left"}),
-])
-def test_switch_rules(loop: Any, start: list[str], stop: list[str], strictness: int, words: str | None,
-                      running: set[str]) -> None:
+@pytest.mark.parametrize(
+    ("start", "stop", "strictness", "words", "running"),
+    [
+        (["right"], [], STRICT, None, {"left", "right"}),
+        (["right"], ["left"], STRICT, None, {"right"}),
+        ([], [], STRICT, None, {"left"}),
+        (["absent"], [], STRICT, "cannot start 'absent': no controller", {"left"}),
+        ([], ["absent"], STRICT, "cannot stop 'absent': no controller", {"left"}),
+        (["left"], [], STRICT, "already running", {"left"}),
+        ([], ["right"], STRICT, "cannot stop 'right': it is initialized", {"left"}),
+        (["right"], ["right"], STRICT, "cannot stop 'right'", {"left"}),
+        (["left"], ["left"], STRICT, None, {"left"}),
+        (["right", "absent"], [], BEST_EFFORT, None, {"left", "right"}),
+        (["right"], ["absent"], BEST_EFFORT, None, {"left", "right"}),
+        (["left", "right"], [], BEST_EFFORT, None, {"left", "right"}),
+        (["right"], ["right"], BEST_EFFORT, None, {"left", "right"}),
+        (["right"], ["right", "left"], BEST_EFFORT, None, {"right"}),
+        (["right", "absent"], [], 0, None, {"left", "right"}),
+        (["left_too"], [], STRICT, "joint 'a' is claimed by 'left' and by 'left_too'", {"left"}),
+        (["left_too"], [], BEST_EFFORT, "joint 'a' is claimed", {"left"}),
+        (["both"], ["left"], STRICT, None, {"both"}),
+        (["both", "right"], ["left"], STRICT, "joint 'b' is claimed", {"left"}),
+        (["right"], [], 7, "strictness 7 is not known", {"left"}),
+    ],
+)
+def test_switch_rules(
+    loop: Any, start: list[str], stop: list[str], strictness: int, words: str | None, running: set[str]
+) -> None:
     raised = loop.switch(start, stop, strictness)
     assert (words is None) == (raised is None), raised
     if words is not None:
@@ -159,12 +167,19 @@ def test_a_restart_stops_and_starts_in_one_cycle(loop: Any) -> None:
     assert calls[calls.index("stopping") + 1] == "starting"
 
 
-@pytest.mark.parametrize(("name", "words"), [
-    ("left", "already loaded"), ("typeless", "/typeless/type is None"), ("absent", "Is the controller file loaded?"),
-    ("unknown", "known types: test/MissingModule, test/Recorder"), ("jointless", "/jointless/joint"),
-    ("elsewhere", "no joint 'c'; it has: a, b"), ("refusing", "init() returned False"),
-    ("missing_module", "no_such_module"),
-])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("left", "already loaded"),
+        ("typeless", "/typeless/type is None"),
+        ("absent", "Is the controller file loaded?"),
+        ("unknown", "known types: test/MissingModule, test/Recorder"),
+        ("jointless", "/jointless/joint"),
+        ("elsewhere", "no joint 'c'; it has: a, b"),
+        ("refusing", "init() returned False"),
+        ("missing_module", "no_such_module"),
+    ],
+)
 def test_a_controller_that_cannot_be_loaded_is_explained(loop: Any, name: str, words: str) -> None:
     before = loop.states()
     with pytest.raises(ControllerError) as caught:
@@ -214,7 +229,8 @@ def test_without_a_control_loop_a_switch_says_so_and_does_not_happen_later(loop:
 def test_hardware_may_take_longer_to_get_ready_than_a_loop_for_its_next_cycle(loop: Any) -> None:
     ready_s = time.monotonic() + 3.0 * loop.manager._update_wait_s
     loop.robot_hw.switch_result = lambda controller=None: (
-        SwitchState.DONE if time.monotonic() > ready_s else SwitchState.ONGOING)
+        SwitchState.DONE if time.monotonic() > ready_s else SwitchState.ONGOING
+    )
     assert loop.switch(["right"], []) is None
     assert loop.states()["right"] == "running"
     assert time.monotonic() > ready_s
@@ -268,10 +284,14 @@ class TwoInterfaceHardware(RobotHW):
 def two_interfaces(make_loop: Callable[..., Any]) -> Any:
     known = types()
     known.register("test/TwoInterfaces", TwoInterfaces)
-    made = make_loop({
-        "apart": {"type": "test/TwoInterfaces", "position_joints": ["c"], "velocity_joints": ["b", "a"]},
-        "at_once": {"type": "test/TwoInterfaces", "position_joints": ["a"], "velocity_joints": ["b", "a"]},
-    }, robot_hw=TwoInterfaceHardware(), types=known)
+    made = make_loop(
+        {
+            "apart": {"type": "test/TwoInterfaces", "position_joints": ["c"], "velocity_joints": ["b", "a"]},
+            "at_once": {"type": "test/TwoInterfaces", "position_joints": ["a"], "velocity_joints": ["b", "a"]},
+        },
+        robot_hw=TwoInterfaceHardware(),
+        types=known,
+    )
     for name in ("apart", "at_once"):
         made.manager.load_controller(name)
     return made
@@ -281,13 +301,16 @@ def test_claims_are_listed_in_the_order_of_the_controller(two_interfaces: Any) -
     claims = two_interfaces.manager.list_controllers()[0].info.claimed_resources
     assert [(claim.hardware_interface, claim.resources) for claim in claims] == [
         ("hardware_interface/VelocityJointInterface", ("b", "a")),
-        ("hardware_interface/PositionJointInterface", ("c",))]
+        ("hardware_interface/PositionJointInterface", ("c",)),
+    ]
 
 
 def test_a_controller_that_claims_a_joint_through_two_interfaces_is_not_started(two_interfaces: Any) -> None:
     raised = two_interfaces.switch(["at_once"], [], STRICT)
-    assert "joint 'a' is claimed by 'at_once' through hardware_interface/VelocityJointInterface and through " \
-           "hardware_interface/PositionJointInterface" in str(raised)
+    assert (
+        "joint 'a' is claimed by 'at_once' through hardware_interface/VelocityJointInterface and through "
+        "hardware_interface/PositionJointInterface" in str(raised)
+    )
     assert two_interfaces.switch(["apart"], [], STRICT) is None
     assert two_interfaces.states() == {"apart": "running", "at_once": "initialized"}
 
@@ -377,8 +400,9 @@ def test_a_controller_hears_each_cycle_that_it_waits_and_once_that_it_is_aborted
 
 
 @pytest.mark.parametrize(("raises_in", "state"), [("waiting", "stopped"), ("aborting", "aborted")])
-def test_a_controller_that_raises_while_it_waits_or_is_aborted_holds_nobody_up(slow: Any, raises_in: str,
-                                                                               state: str) -> None:
+def test_a_controller_that_raises_while_it_waits_or_is_aborted_holds_nobody_up(
+    slow: Any, raises_in: str, state: str
+) -> None:
     slow.controllers["left"].raises_in = raises_in
     slow.robot_hw.asks.update(left=10**6, right=0)
     assert slow.switch(["left", "right"], [], STRICT, True, 0.1) is not None

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a controller's updates cost is measured, and who made the loop late is told."""
+
 from __future__ import annotations
 
 import statistics

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The beat of the control loop: fixed times, cycles left out are counted, and no memory is used up."""
+
 from __future__ import annotations
 
 import gc
@@ -37,8 +38,9 @@ class Clock:
 
 
 @given(st.lists(st.floats(0.0, 0.05), min_size=1, max_size=50), st.floats(0.0, 0.003))
-def test_cycles_begin_at_multiples_of_the_period_and_what_is_left_out_is_counted(work_s: list[float],
-                                                                                oversleep_s: float) -> None:
+def test_cycles_begin_at_multiples_of_the_period_and_what_is_left_out_is_counted(
+    work_s: list[float], oversleep_s: float
+) -> None:
     clock = Clock()
     clock.oversleep_s = oversleep_s
     begun: list[tuple[float, float, int]] = []
@@ -111,8 +113,9 @@ def test_a_late_start_after_sleep_counts_as_no_processor_and_one_after_long_work
     assert statistics.figures().no_processor_max_s == 0.0
 
 
-def test_a_request_that_processors_stay_awake_is_held_and_a_refusal_is_said(tmp_path: Path,
-                                                                         monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_that_processors_stay_awake_is_held_and_a_refusal_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     device = tmp_path / "latency"
     monkeypatch.setattr(scheduling, "_LATENCY_DEVICE", str(device))
     assert "No such file" in scheduling.keep_processors_awake()[0]
@@ -188,13 +191,17 @@ def test_where_the_loop_itself_may_not_be_urgent_nothing_else_is(monkeypatch: py
 
 def test_ten_thousand_cycles_with_moving_controllers_use_up_no_memory(make_loop: Callable[..., Any]) -> None:
     names = [f"j{i}" for i in range(12)]
-    loop = make_loop({"hw": {"joints": names},
-                      "one": {"type": "position_controllers/JointTrajectoryController", "joints": names[:6]},
-                      "two": {"type": "position_controllers/JointTrajectoryController", "joints": names[6:]},
-                      "states": {"type": "joint_state_controller/JointStateController"}})
+    loop = make_loop(
+        {
+            "hw": {"joints": names},
+            "one": {"type": "position_controllers/JointTrajectoryController", "joints": names[:6]},
+            "two": {"type": "position_controllers/JointTrajectoryController", "joints": names[6:]},
+            "states": {"type": "joint_state_controller/JointStateController"},
+        }
+    )
     loop.spawn("one", "two", "states")
     for part, controller in (("j0", "one"), ("j6", "two")):
-        joints = tuple(names[int(part[1:]):int(part[1:]) + 6])
+        joints = tuple(names[int(part[1:]) : int(part[1:]) + 6])
         points = tuple(TrajectoryPoint(float(i), (0.1 * (i % 2),) * 6, (0.0,) * 6) for i in range(1, 400))
         loop.controllers[controller].submit(TrajectoryGoal(JointTrajectory(joints, points)))
         loop.controllers[controller].on_state = lambda snapshot: None

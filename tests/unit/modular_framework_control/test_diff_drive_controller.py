@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The controller of a base with wheels on its left and on its right, in a loop with fake hardware."""
+
 from __future__ import annotations
 
 import math
@@ -23,12 +24,22 @@ class Base:
 
     def __init__(self, make_loop: Callable[..., Any], wheels: list[str] = WHEELS, **more: Any) -> None:
         half = len(wheels) // 2
-        parameters = {"type": "diff_drive_controller/DiffDriveController", "left_wheel": wheels[:half],
-                      "right_wheel": wheels[half:], "wheel_separation": SEPARATION, "wheel_radius": RADIUS,
-                      "pose_covariance_diagonal": [1, 2, 3, 4, 5, 6.0],
-                      "twist_covariance_diagonal": [0.1] * 6, **more}
-        self.loop = make_loop({"hw": {"joints": wheels, "command_interface": "VelocityJointInterface"},
-                               "base": {key: value for key, value in parameters.items() if value is not None}})
+        parameters = {
+            "type": "diff_drive_controller/DiffDriveController",
+            "left_wheel": wheels[:half],
+            "right_wheel": wheels[half:],
+            "wheel_separation": SEPARATION,
+            "wheel_radius": RADIUS,
+            "pose_covariance_diagonal": [1, 2, 3, 4, 5, 6.0],
+            "twist_covariance_diagonal": [0.1] * 6,
+            **more,
+        }
+        self.loop = make_loop(
+            {
+                "hw": {"joints": wheels, "command_interface": "VelocityJointInterface"},
+                "base": {key: value for key, value in parameters.items() if value is not None},
+            }
+        )
         self.loop.manager.load_controller("base")
         self.controller: DiffDriveController = self.loop.controllers["base"]
         self.odometry: list[OdometrySnapshot] = []
@@ -86,8 +97,9 @@ def test_a_command_that_grows_old_is_no_longer_in_force(make_base: Callable[...,
 
 
 @pytest.mark.parametrize("command", [(math.nan, 0.0), (0.0, math.nan), (math.inf, 0.0)])
-def test_a_command_that_is_not_finite_is_refused_and_the_one_before_stays(make_base: Callable[..., Base],
-                                                                         command: tuple[float, float]) -> None:
+def test_a_command_that_is_not_finite_is_refused_and_the_one_before_stays(
+    make_base: Callable[..., Base], command: tuple[float, float]
+) -> None:
     base = make_base()
     base.drive(0.2, 0.0, 0.1)
     with pytest.raises(ControllerError, match="expected finite numbers"):
@@ -121,15 +133,21 @@ def test_a_dropped_command_brings_the_base_to_rest_within_its_limits(make_base: 
 
 
 def test_the_published_command_is_the_limited_one(make_base: Callable[..., Base]) -> None:
-    base = make_base(linear={"x": {"has_velocity_limits": True, "max_velocity": 0.4}},
-                     angular={"z": {"has_velocity_limits": True, "max_velocity": 2.0, "min_velocity": -1.0}})
+    base = make_base(
+        linear={"x": {"has_velocity_limits": True, "max_velocity": 0.4}},
+        angular={"z": {"has_velocity_limits": True, "max_velocity": 2.0, "min_velocity": -1.0}},
+    )
     base.drive(9.0, -9.0, 0.1)
     assert base.commands[-1] == BaseVelocity(0.4, -1.0)
 
 
 def test_calibration_factors_take_part_in_commands_and_in_odometry(make_base: Callable[..., Base]) -> None:
-    base = make_base(cmd_vel_timeout=60.0, wheel_separation_multiplier=2.0, left_wheel_radius_multiplier=1.25,
-                     right_wheel_radius_multiplier=0.8)
+    base = make_base(
+        cmd_vel_timeout=60.0,
+        wheel_separation_multiplier=2.0,
+        left_wheel_radius_multiplier=1.25,
+        right_wheel_radius_multiplier=0.8,
+    )
     base.drive(0.5, 0.5, 4.0)
     assert base.joint("left").velocity == pytest.approx((0.5 - 0.25) / 0.125)
     assert base.joint("right").velocity == pytest.approx((0.5 + 0.25) / 0.08)
@@ -138,16 +156,19 @@ def test_calibration_factors_take_part_in_commands_and_in_odometry(make_base: Ca
 
 def test_one_factor_for_both_radii_stands_before_those_of_the_sides(make_base: Callable[..., Base]) -> None:
     base = make_base(wheel_radius_multiplier=2.0, left_wheel_radius_multiplier=9.0)
-    assert (base.controller.settings.left_wheel_radius_multiplier,
-            base.controller.settings.right_wheel_radius_multiplier) == (2.0, 2.0)
+    assert (
+        base.controller.settings.left_wheel_radius_multiplier,
+        base.controller.settings.right_wheel_radius_multiplier,
+    ) == (2.0, 2.0)
 
 
 def test_factors_that_change_under_way_do_not_move_the_base(make_base: Callable[..., Base]) -> None:
     base = make_base(cmd_vel_timeout=60.0)
     base.drive(0.5, 0.0, 5.0)
     before = base.controller.odometry.x
-    base.controller.settings = replace(base.controller.settings, left_wheel_radius_multiplier=1.5,
-                                       right_wheel_radius_multiplier=1.5, publish_rate=0.0)
+    base.controller.settings = replace(
+        base.controller.settings, left_wheel_radius_multiplier=1.5, right_wheel_radius_multiplier=1.5, publish_rate=0.0
+    )
     base.loop.step(1)
     assert base.controller.odometry.x - before < 0.01
     published = len(base.odometry)
@@ -166,7 +187,8 @@ def test_wheels_that_stand_anywhere_at_the_start_have_not_moved_the_base(make_ba
 
 
 def test_a_wheel_whose_position_is_not_known_leaves_the_odometry_and_stops_the_base(
-        make_base: Callable[..., Base]) -> None:
+    make_base: Callable[..., Base],
+) -> None:
     base = make_base(cmd_vel_timeout=60.0)
     base.drive(0.5, 0.0, 1.0)
     before = base.controller.odometry.x
@@ -210,7 +232,8 @@ def test_states_of_the_wheels_hold_measured_and_commanded_motion(make_base: Call
 
 
 def test_while_the_hardware_has_a_fault_the_wheels_stand_and_commands_are_refused(
-        make_base: Callable[..., Base], monkeypatch: pytest.MonkeyPatch) -> None:
+    make_base: Callable[..., Base], monkeypatch: pytest.MonkeyPatch
+) -> None:
     base = make_base(cmd_vel_timeout=60.0)
     base.drive(0.5, 0.0, 0.2)
     monkeypatch.setattr(base.loop.robot_hw, "fault", lambda: "protective stop")
@@ -226,7 +249,8 @@ def test_while_the_hardware_has_a_fault_the_wheels_stand_and_commands_are_refuse
 
 
 def test_a_command_that_comes_just_as_the_fault_does_is_gone_when_the_fault_is_over(
-        make_base: Callable[..., Base]) -> None:
+    make_base: Callable[..., Base],
+) -> None:
     base = make_base(cmd_vel_timeout=60.0)
 
     class FaultMeanwhile(BaseVelocity):
@@ -255,21 +279,26 @@ def test_odometry_comes_at_the_rate_that_is_set_while_the_controller_runs(make_b
         assert len(base.odometry) == pytest.approx(rate, abs=1)
 
 
-@pytest.mark.parametrize(("parameters", "fault"), [
-    ({"right_wheel": []}, "expected a list of joint names"),
-    ({"left_wheel": None}, "/base/left_wheel: got None"),
-    ({"left_wheel": ["left", "right"]}, "as many joints on either side"),
-    ({"left_wheel": "nobody"}, "no joint 'nobody'; it has: left, right"),
-    ({"wheel_radius": 0.0}, "wheel_radius: got 0.0; expected a number above 0"),
-    ({"wheel_radius": None}, "robot_description is not set, and wheel_radius is looked up there"),
-    ({"wheel_separation": None}, "wheel_separation is looked up there"),
-    ({"wheel_separation_multiplier": -1.0}, "wheel_separation_multiplier: got -1.0"),
-    ({"pose_covariance_diagonal": None}, "pose_covariance_diagonal: got None; expected six numbers"),
-    ({"twist_covariance_diagonal": [1, 2, 3]}, "expected six numbers"),
-    ({"odom_frame_id": 5}, "odom_frame_id: got 5; expected a frame's name"),
-    ({"velocity_rolling_window_size": 0}, "at least 1"),
-    ({"open_loop": "no"}, "open_loop: got 'no'; expected true or false")])
-def test_parameters_that_make_no_sense_are_refused_with_their_name(make_base: Callable[..., Base],
-                                                                  parameters: dict[str, Any], fault: str) -> None:
+@pytest.mark.parametrize(
+    ("parameters", "fault"),
+    [
+        ({"right_wheel": []}, "expected a list of joint names"),
+        ({"left_wheel": None}, "/base/left_wheel: got None"),
+        ({"left_wheel": ["left", "right"]}, "as many joints on either side"),
+        ({"left_wheel": "nobody"}, "no joint 'nobody'; it has: left, right"),
+        ({"wheel_radius": 0.0}, "wheel_radius: got 0.0; expected a number above 0"),
+        ({"wheel_radius": None}, "robot_description is not set, and wheel_radius is looked up there"),
+        ({"wheel_separation": None}, "wheel_separation is looked up there"),
+        ({"wheel_separation_multiplier": -1.0}, "wheel_separation_multiplier: got -1.0"),
+        ({"pose_covariance_diagonal": None}, "pose_covariance_diagonal: got None; expected six numbers"),
+        ({"twist_covariance_diagonal": [1, 2, 3]}, "expected six numbers"),
+        ({"odom_frame_id": 5}, "odom_frame_id: got 5; expected a frame's name"),
+        ({"velocity_rolling_window_size": 0}, "at least 1"),
+        ({"open_loop": "no"}, "open_loop: got 'no'; expected true or false"),
+    ],
+)
+def test_parameters_that_make_no_sense_are_refused_with_their_name(
+    make_base: Callable[..., Base], parameters: dict[str, Any], fault: str
+) -> None:
     with pytest.raises(ControllerError, match=fault):
         make_base(**parameters)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the control loop's node does last: the robot is brought to rest before anything waits for the network."""
+
 from __future__ import annotations
 
 import threading
@@ -56,8 +57,12 @@ def run_node(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], list[str]]:
         monkeypatch.setattr(robot_hw_node, "RosNodeHandle", lambda namespace: tree)
         monkeypatch.setattr(robot_hw_node, "robot_hw_of_type", lambda name: NotingHardware(notes, raises))
         monkeypatch.setattr(robot_hw_node, "prepare_interpreter", lambda: None)
-        for attribute, name in (("HardwareReadiness", "readiness"), ("RosControllerManager", "manager"),
-                                ("LoopReport", "report")):
+        for attribute, name in (
+            ("HardwareReadiness", "readiness"),
+            ("RosControllerManager", "manager"),
+            ("LoopReport", "report"),
+        ):
+
             def make(*arguments: Any, _name: str = name, **more: Any) -> Noted:
                 return Noted(notes, _name, raises)
 
@@ -74,5 +79,6 @@ def run_node(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], list[str]]:
 
 @pytest.mark.parametrize("raises", [False, True])
 def test_controllers_stop_and_the_robot_is_written_to_before_anything_is_closed(
-        run_node: Callable[[bool], list[str]], raises: bool) -> None:
+    run_node: Callable[[bool], list[str]], raises: bool
+) -> None:
     assert run_node(raises) == ["controllers stop", "write", "readiness closes", "manager closes", "report closes"]

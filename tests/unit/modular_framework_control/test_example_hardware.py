@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The hardware of docs/examples, which users copy: it passes its own tests and is found under its name."""
+
 from __future__ import annotations
 
 import subprocess
@@ -15,8 +16,13 @@ PACKAGE = Path(__file__).resolve().parents[3] / "docs" / "examples" / "my_arm"
 
 
 def test_it_passes_its_own_tests() -> None:
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", str(PACKAGE / "test_my_arm.py")],
-                          capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", str(PACKAGE / "test_my_arm.py")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What controllers do while their hardware cannot follow, and while it lets itself be moved slowly or not at all."""
+
 from __future__ import annotations
 
 import math
@@ -27,9 +28,13 @@ from modular_framework_control.trajectory.trajectory_goal import (
 )
 from modular_framework_ros.node_handle import NodeHandle
 
-FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
-            "effort": "EffortJointInterface", "pos_vel": "PosVelJointInterface",
-            "pos_vel_acc": "PosVelAccJointInterface"}
+FAMILIES = {
+    "position": "PositionJointInterface",
+    "velocity": "VelocityJointInterface",
+    "effort": "EffortJointInterface",
+    "pos_vel": "PosVelJointInterface",
+    "pos_vel_acc": "PosVelAccJointInterface",
+}
 GAINS = {"velocity": {"p": 20.0}, "effort": {"p": 100.0, "d": 20.0}}
 ZEROS = (0.0, 0.0)
 
@@ -67,9 +72,18 @@ class FaultyRobotHW(MockRobotHW):
 @pytest.fixture
 def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     def starter(family: str = "position", controller: str = "JointTrajectoryController", **more: Any) -> Any:
-        loop = make_loop({"hw": {"joints": ["a", "b"], "command_interface": FAMILIES[family]},
-                          "c": {"type": f"{family}_controllers/{controller}", "joints": ["a", "b"],
-                                "gains": {"a": GAINS.get(family), "b": GAINS.get(family)}, **more}}, FaultyRobotHW())
+        loop = make_loop(
+            {
+                "hw": {"joints": ["a", "b"], "command_interface": FAMILIES[family]},
+                "c": {
+                    "type": f"{family}_controllers/{controller}",
+                    "joints": ["a", "b"],
+                    "gains": {"a": GAINS.get(family), "b": GAINS.get(family)},
+                    **more,
+                },
+            },
+            FaultyRobotHW(),
+        )
         loop.spawn("c")
         return loop
 
@@ -101,7 +115,8 @@ def test_a_fault_ends_the_goal_in_the_same_cycle_and_says_why(start: Callable[..
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 def test_after_a_fault_the_joints_are_held_where_they_are_then_and_new_goals_begin_there(
-        start: Callable[..., Any], family: str) -> None:
+    start: Callable[..., Any], family: str
+) -> None:
     loop = start(family, constraints={"goal_time": 0.5})
     send(loop, (1.0, (1.0, -1.0)))
     loop.run(0.5)
@@ -164,10 +179,13 @@ def test_a_gripper_drops_its_goal_in_a_fault_and_holds_where_it_is(start: Callab
     assert joint.position == pytest.approx(0.4, abs=1e-3)
 
 
-@pytest.mark.parametrize(("family", "kind", "rest"), [("position", "Position", 0.4), ("velocity", "Velocity", 0.0),
-                                                       ("effort", "Effort", 0.0)])
-def test_commands_before_and_during_a_fault_are_not_followed_after_it(start: Callable[..., Any], family: str, kind: str,
-                                                                      rest: float) -> None:
+@pytest.mark.parametrize(
+    ("family", "kind", "rest"),
+    [("position", "Position", 0.4), ("velocity", "Velocity", 0.0), ("effort", "Effort", 0.0)],
+)
+def test_commands_before_and_during_a_fault_are_not_followed_after_it(
+    start: Callable[..., Any], family: str, kind: str, rest: float
+) -> None:
     loop = start(family, f"JointGroup{kind}Controller")
     loop.controllers["c"].submit([0.1, 0.1])
     loop.step(2)
@@ -256,8 +274,9 @@ def test_the_velocity_wanted_of_a_slowed_robot_is_as_much_lower(start: Callable[
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.25, 1.0])
-def test_what_a_robot_is_asked_to_do_later_allows_for_how_slowly_it_moves(start: Callable[..., Any],
-                                                                          factor: float) -> None:
+def test_what_a_robot_is_asked_to_do_later_allows_for_how_slowly_it_moves(
+    start: Callable[..., Any], factor: float
+) -> None:
     loop = start("pos_vel_acc")
     send(loop, (1.0, (1.0, 0.0)))
     loop.run(0.2)
@@ -270,8 +289,9 @@ def test_what_a_robot_is_asked_to_do_later_allows_for_how_slowly_it_moves(start:
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.5])
-def test_cancel_of_a_slowed_goal_does_not_move_the_robot_further_than_it_would_roll(start: Callable[..., Any],
-                                                                                    factor: float) -> None:
+def test_cancel_of_a_slowed_goal_does_not_move_the_robot_further_than_it_would_roll(
+    start: Callable[..., Any], factor: float
+) -> None:
     loop = start(stop_trajectory_duration=0.2)
     goal_handle = send(loop, (1.0, (1.0, 0.0)))
     loop.run(0.5)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The gripper controller: reached, stalled, canceled, replaced, refused."""
+
 from __future__ import annotations
 
 import math
@@ -18,9 +19,17 @@ URDF = """<robot name="r"><joint name="finger" type="revolute">
 
 
 def parameters(**more: Any) -> dict[str, Any]:
-    return {"robot_description": URDF, "hw": {"joints": ["finger"]},
-            "gripper": {"type": "position_controllers/GripperActionController", "joint": "finger",
-                        "stall_timeout": 0.3, "max_effort": 2.0, **more}}
+    return {
+        "robot_description": URDF,
+        "hw": {"joints": ["finger"]},
+        "gripper": {
+            "type": "position_controllers/GripperActionController",
+            "joint": "finger",
+            "stall_timeout": 0.3,
+            "max_effort": 2.0,
+            **more,
+        },
+    }
 
 
 @pytest.fixture
@@ -90,7 +99,7 @@ def test_the_effort_of_the_goal_is_passed_on_and_none_means_the_default(loop: An
     send(loop, 0.2)
     loop.step()
     assert handle(loop).max_effort == 2.0
-    send(loop, 0.1, -3.0)   # as the PR2's clients do
+    send(loop, 0.1, -3.0)  # as the PR2's clients do
     loop.step()
     assert handle(loop).max_effort == 3.0
 
@@ -145,7 +154,8 @@ def test_a_finger_that_is_measured_at_no_position_stays_where_it_was_and_nothing
 
 
 def test_a_gripper_does_not_start_on_a_finger_that_is_measured_at_no_position(
-        loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert loop.switch([], ["gripper"]) is None
     state = handle(loop).state
     with monkeypatch.context() as patched:
@@ -218,7 +228,8 @@ def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any
 
 
 def test_a_gripper_on_its_way_stops_with_its_controller_and_one_that_holds_something_goes_on_squeezing(
-        loop: Any) -> None:
+    loop: Any,
+) -> None:
     moving = send(loop, 0.4)
     loop.run(0.2)
     assert loop.switch([], ["gripper"]) is None

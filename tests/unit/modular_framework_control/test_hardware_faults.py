@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Hardware that cannot follow: those controllers are told whose joints it has, once, and again when it can."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -23,8 +24,11 @@ from modular_framework_ros.node_handle import NodeHandle, read_names
 
 LAB = "lab/Fragile"
 PARAMETERS: dict[str, Any] = {
-    "hw": {"robot_hardware": ["arm", "gripper"], "arm": {"type": LAB, "joints": ["shoulder", "elbow"]},
-           "gripper": {"type": LAB, "joints": ["finger"]}},
+    "hw": {
+        "robot_hardware": ["arm", "gripper"],
+        "arm": {"type": LAB, "joints": ["shoulder", "elbow"]},
+        "gripper": {"type": LAB, "joints": ["finger"]},
+    },
     "arm_controller": {"type": "lab/Listener", "joint": ["shoulder", "elbow"]},
     "gripper_controller": {"type": "lab/Listener", "joint": "finger"},
     "joint_states": {"type": "joint_state_controller/JointStateController"},
@@ -120,8 +124,11 @@ def test_another_fault_and_the_recovery_are_told(loop: Any, caplog: pytest.LogCa
     caplog.set_level("INFO")
     for loop.arm.text in ("protective stop", "link lost", ""):
         loop.step(2)
-    assert heard(loop, "arm_controller") == ["hardware 'arm': protective stop", "hardware 'arm': link lost",
-                                             "recovered"]
+    assert heard(loop, "arm_controller") == [
+        "hardware 'arm': protective stop",
+        "hardware 'arm': link lost",
+        "recovered",
+    ]
     assert caplog.text.count("hardware fault: hardware 'arm': protective stop") == 1
     assert caplog.text.count("the hardware follows again (it did not for: hardware 'arm': link lost)") == 1
 
@@ -185,7 +192,8 @@ def test_single_hardware_tells_of_all_its_commanded_joints() -> None:
 
 
 def test_a_controller_finds_further_interfaces_and_its_claims_on_all_of_them_are_listed(
-        make_loop: Callable[..., Any]) -> None:
+    make_loop: Callable[..., Any],
+) -> None:
     class Rich(MockRobotHW):
         def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
             scaling, sensors = SpeedScalingInterface(), ForceTorqueSensorInterface()
@@ -211,5 +219,7 @@ def test_a_controller_finds_further_interfaces_and_its_claims_on_all_of_them_are
     assert loop.controllers["c"].factors == [0.5]
     (report,) = loop.manager.list_controllers()
     assert {claim.hardware_interface: set(claim.resources) for claim in report.info.claimed_resources} == {
-        "hardware_interface/ForceTorqueSensorInterface": set(), "hardware_interface/PositionJointInterface": {"elbow"}}
+        "hardware_interface/ForceTorqueSensorInterface": set(),
+        "hardware_interface/PositionJointInterface": {"elbow"},
+    }
     assert speed_scaling_handles(loop.robot_hw, ["finger"]) == speed_scaling_handles(RobotHW(), ["elbow"]) == ()

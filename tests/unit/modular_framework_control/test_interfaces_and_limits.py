@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Handles, claims, parameters, joint limits, controller types and the joint state controller."""
+
 from __future__ import annotations
 
 import math
@@ -89,19 +90,35 @@ def test_limits_come_from_the_urdf() -> None:
     assert "stiff" not in limits
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("<robot", "not well-formed"), (URDF.replace('"0.5"', '"fast"'), ":3: <limit> of joint 'bend': velocity is 'fast'"),
-    (URDF.replace('"-1"', '"nan"'), "'bend': lower is 'nan'; expected a number")])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<robot", "not well-formed"),
+        (URDF.replace('"0.5"', '"fast"'), ":3: <limit> of joint 'bend': velocity is 'fast'"),
+        (URDF.replace('"-1"', '"nan"'), "'bend': lower is 'nan'; expected a number"),
+    ],
+)
 def test_a_faulty_urdf_is_explained(text: str, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         limits_from_urdf(text)
 
 
 def test_parameters_replace_limits_one_by_one() -> None:
-    root = MappingNodeHandle({"joint_limits": {"bend": {"has_velocity_limits": True, "max_velocity": 0.2,
-                                                        "has_position_limits": True, "min_position": -0.5,
-                                                        "max_position": 1.5,
-                                                        "has_effort_limits": True, "max_effort": 1}}})
+    root = MappingNodeHandle(
+        {
+            "joint_limits": {
+                "bend": {
+                    "has_velocity_limits": True,
+                    "max_velocity": 0.2,
+                    "has_position_limits": True,
+                    "min_position": -0.5,
+                    "max_position": 1.5,
+                    "has_effort_limits": True,
+                    "max_effort": 1,
+                }
+            }
+        }
+    )
     assert limits_with_parameters("bend", JointLimits(-1.0, 2.0, 0.5, 7.0), root) == JointLimits(-0.5, 1.5, 0.2, 1.0)
     assert limits_with_parameters("turn", JointLimits(), root) == JointLimits()
 
@@ -166,9 +183,16 @@ def test_every_built_in_type_can_be_made() -> None:
 
 
 def test_joint_states_are_reported_at_their_rate_with_extra_joints(make_loop: Callable[..., Any]) -> None:
-    loop = make_loop({"hw": {"joints": ["b", "a"], "initial_positions": {"a": 0.25}},
-                      "states": {"type": "joint_state_controller/JointStateController", "publish_rate": 20.0,
-                                 "extra_joints": [{"name": "wheel", "position": 1.5}, {"name": "a", "position": 9.0}]}})
+    loop = make_loop(
+        {
+            "hw": {"joints": ["b", "a"], "initial_positions": {"a": 0.25}},
+            "states": {
+                "type": "joint_state_controller/JointStateController",
+                "publish_rate": 20.0,
+                "extra_joints": [{"name": "wheel", "position": 1.5}, {"name": "a", "position": 9.0}],
+            },
+        }
+    )
     loop.spawn("states")
     seen: list[Any] = []
     loop.controllers["states"].on_state = seen.append

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whatever a controller commands, the hardware gets what the limits allow: hard and soft, by parameter and by URDF."""
+
 from __future__ import annotations
 
 import math
@@ -62,8 +63,9 @@ def test_positions_near_a_soft_end_slow_down_and_never_pass_it(wanted: list[floa
 
 @pytest.mark.parametrize(("limiter_class", "allowed"), [(VelocityJointSaturation, 0.0), (EffortJointSaturation, -2.0)])
 @pytest.mark.parametrize("wanted", [9.0, 0.0, -9.0])
-def test_a_joint_whose_position_is_not_a_number_is_braked_within_soft_limits(limiter_class: type[Any], allowed: float,
-                                                                           wanted: float) -> None:
+def test_a_joint_whose_position_is_not_a_number_is_braked_within_soft_limits(
+    limiter_class: type[Any], allowed: float, wanted: float
+) -> None:
     joint = handle(math.nan, 0.5, wanted)
     limiter_class(joint, LIMITS, SOFT).enforce_limits(0.01)
     assert joint.command == pytest.approx(allowed)
@@ -100,20 +102,38 @@ def test_a_joint_beyond_its_soft_end_is_led_back_at_once() -> None:
     assert joint.command == pytest.approx(0.9 - 10.0 * 0.1 * 0.01)
 
 
-@pytest.mark.parametrize(("position", "velocity", "command", "expected"), [
-    (0.0, 0.0, 9.0, 2.0), (0.0, 0.0, -9.0, -2.0), (0.75, 0.0, 9.0, 0.5), (0.85, 0.0, 9.0, -0.5),
-    (-0.75, 0.0, -9.0, -0.5), (0.0, 0.0, math.nan, 0.0)])
+@pytest.mark.parametrize(
+    ("position", "velocity", "command", "expected"),
+    [
+        (0.0, 0.0, 9.0, 2.0),
+        (0.0, 0.0, -9.0, -2.0),
+        (0.75, 0.0, 9.0, 0.5),
+        (0.85, 0.0, 9.0, -0.5),
+        (-0.75, 0.0, -9.0, -0.5),
+        (0.0, 0.0, math.nan, 0.0),
+    ],
+)
 def test_velocities_near_a_soft_end_shrink(position: float, velocity: float, command: float, expected: float) -> None:
     joint = handle(position, velocity, command)
     VelocityJointSaturation(joint, LIMITS, SOFT).enforce_limits(0.01)
     assert joint.command == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("position", "velocity", "command", "expected"), [
-    (0.0, 0.0, 9.0, 0.1), (0.0, 0.5, 9.0, 0.6), (0.0, 0.5, -9.0, 0.4), (0.0, 1.95, 9.0, 2.0), (1.0, 0.0, 9.0, 0.0),
-    (-1.1, 0.0, -9.0, 0.0), (1.0, 0.0, -9.0, -0.1)])
+@pytest.mark.parametrize(
+    ("position", "velocity", "command", "expected"),
+    [
+        (0.0, 0.0, 9.0, 0.1),
+        (0.0, 0.5, 9.0, 0.6),
+        (0.0, 0.5, -9.0, 0.4),
+        (0.0, 1.95, 9.0, 2.0),
+        (1.0, 0.0, 9.0, 0.0),
+        (-1.1, 0.0, -9.0, 0.0),
+        (1.0, 0.0, -9.0, -0.1),
+    ],
+)
 def test_velocities_change_no_faster_than_the_acceleration_allows_and_stop_at_the_ends(
-        position: float, velocity: float, command: float, expected: float) -> None:
+    position: float, velocity: float, command: float, expected: float
+) -> None:
     joint = handle(position, velocity, command)
     VelocityJointSaturation(joint, JointLimits(-1.0, 1.0, 2.0, max_acceleration=10.0)).enforce_limits(0.01)
     assert joint.command == pytest.approx(expected)
@@ -122,7 +142,7 @@ def test_velocities_change_no_faster_than_the_acceleration_allows_and_stop_at_th
 def test_velocities_grow_from_command_to_command_whatever_is_measured() -> None:
     joint = handle()
     limiter = VelocityJointSaturation(joint, JointLimits(max_velocity=2.0, max_acceleration=2.0))
-    for cycle in range(1, 101):     # a drive that sticks at small commands, or does not tell its velocity
+    for cycle in range(1, 101):  # a drive that sticks at small commands, or does not tell its velocity
         joint.command = 1.0
         limiter.enforce_limits(0.01)
         assert joint.command == pytest.approx(min(1.0, 0.02 * cycle))
@@ -170,17 +190,38 @@ def test_a_position_that_is_given_in_place_of_a_command_is_where_the_joint_stays
         assert joint.command == 0.02, "whoever commanded 0.5 has stopped and left it alone"
 
 
-@pytest.mark.parametrize(("interface", "controller", "wanted"), [
-    ("VelocityJointInterface", "velocity_controllers/JointVelocityController", 1.0),
-    ("EffortJointInterface", "effort_controllers/JointEffortController", 5.0)])
-def test_a_joint_comes_to_rest_after_its_controller_stopped(make_loop: Callable[..., Any], interface: str,
-                                                            controller: str, wanted: float) -> None:
-    values = {"has_acceleration_limits": True, "max_acceleration": 2.0, "has_velocity_limits": True,
-              "max_velocity": 1.0, "has_effort_limits": True, "max_effort": 5.0}
-    soft = {"has_soft_limits": True, "soft_lower_limit": -9.0, "soft_upper_limit": 9.0, "k_position": 10.0,
-            "k_velocity": 10.0}
-    loop = make_loop({"joint_limits": {"j": {**values, **(soft if "Effort" in interface else {})}},
-                      "hw": {"joints": ["j"], "command_interface": interface}, "c": {"type": controller, "joint": "j"}})
+@pytest.mark.parametrize(
+    ("interface", "controller", "wanted"),
+    [
+        ("VelocityJointInterface", "velocity_controllers/JointVelocityController", 1.0),
+        ("EffortJointInterface", "effort_controllers/JointEffortController", 5.0),
+    ],
+)
+def test_a_joint_comes_to_rest_after_its_controller_stopped(
+    make_loop: Callable[..., Any], interface: str, controller: str, wanted: float
+) -> None:
+    values = {
+        "has_acceleration_limits": True,
+        "max_acceleration": 2.0,
+        "has_velocity_limits": True,
+        "max_velocity": 1.0,
+        "has_effort_limits": True,
+        "max_effort": 5.0,
+    }
+    soft = {
+        "has_soft_limits": True,
+        "soft_lower_limit": -9.0,
+        "soft_upper_limit": 9.0,
+        "k_position": 10.0,
+        "k_velocity": 10.0,
+    }
+    loop = make_loop(
+        {
+            "joint_limits": {"j": {**values, **(soft if "Effort" in interface else {})}},
+            "hw": {"joints": ["j"], "command_interface": interface},
+            "c": {"type": controller, "joint": "j"},
+        }
+    )
     loop.spawn("c")
     loop.controllers["c"].submit([wanted])
     loop.run(2.0)
@@ -189,18 +230,30 @@ def test_a_joint_comes_to_rest_after_its_controller_stopped(make_loop: Callable[
     assert loop.switch([], ["c"]) is None
     loop.run(1.0)
     assert joint.command == 0.0
-    if "Velocity" in interface:     # a body without friction goes on
+    if "Velocity" in interface:  # a body without friction goes on
         assert joint.velocity == 0.0
 
 
-@pytest.mark.parametrize(("position", "velocity", "command", "soft", "expected"), [
-    (0.0, 0.0, 9.0, None, 5.0), (1.01, 0.0, 9.0, None, 0.0), (1.01, 0.0, -9.0, None, -5.0),
-    (-1.01, 0.0, -9.0, None, 0.0),
-    (0.0, 2.1, 9.0, None, 0.0), (0.0, -2.1, -9.0, None, 0.0), (0.0, 2.1, -9.0, None, -5.0),
-    (0.0, 0.0, math.nan, None, 0.0),
-    (0.0, 0.0, 9.0, SOFT, 5.0), (0.0, 1.5, 9.0, SOFT, 2.0), (0.75, 0.0, 9.0, SOFT, 2.0), (0.8, 0.5, 9.0, SOFT, -2.0)])
-def test_efforts_drive_no_joint_out_of_its_range_or_speed(position: float, velocity: float, command: float,
-                                                          soft: SoftJointLimits | None, expected: float) -> None:
+@pytest.mark.parametrize(
+    ("position", "velocity", "command", "soft", "expected"),
+    [
+        (0.0, 0.0, 9.0, None, 5.0),
+        (1.01, 0.0, 9.0, None, 0.0),
+        (1.01, 0.0, -9.0, None, -5.0),
+        (-1.01, 0.0, -9.0, None, 0.0),
+        (0.0, 2.1, 9.0, None, 0.0),
+        (0.0, -2.1, -9.0, None, 0.0),
+        (0.0, 2.1, -9.0, None, -5.0),
+        (0.0, 0.0, math.nan, None, 0.0),
+        (0.0, 0.0, 9.0, SOFT, 5.0),
+        (0.0, 1.5, 9.0, SOFT, 2.0),
+        (0.75, 0.0, 9.0, SOFT, 2.0),
+        (0.8, 0.5, 9.0, SOFT, -2.0),
+    ],
+)
+def test_efforts_drive_no_joint_out_of_its_range_or_speed(
+    position: float, velocity: float, command: float, soft: SoftJointLimits | None, expected: float
+) -> None:
     joint = handle(position, velocity, command)
     EffortJointSaturation(joint, LIMITS, soft).enforce_limits(0.01)
     assert joint.command == pytest.approx(expected)
@@ -218,8 +271,13 @@ def test_soft_limits_are_read_from_the_description_and_replaced_as_a_whole_by_pa
     known = soft_limits_from_urdf(URDF)
     assert known["j"] == SOFT
     assert (known["wheel"].min_position, known["wheel"].max_position) == (-math.inf, math.inf)
-    values = {"has_soft_limits": True, "soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 1.0,
-              "k_velocity": 2.0}
+    values = {
+        "has_soft_limits": True,
+        "soft_lower_limit": -0.5,
+        "soft_upper_limit": 0.5,
+        "k_position": 1.0,
+        "k_velocity": 2.0,
+    }
     root = MappingNodeHandle({"joint_limits": {"j": values}})
     assert soft_limits_with_parameters("j", SOFT, root) == SoftJointLimits(-0.5, 0.5, 1.0, 2.0)
     assert soft_limits_with_parameters("other", SOFT, root) == SOFT
@@ -227,44 +285,80 @@ def test_soft_limits_are_read_from_the_description_and_replaced_as_a_whole_by_pa
 
 
 def test_a_limit_said_to_be_absent_is_removed() -> None:
-    root = MappingNodeHandle({"joint_limits": {"j": {
-        "has_position_limits": False, "angle_wraparound": True, "has_velocity_limits": False,
-        "has_effort_limits": False,
-        "has_acceleration_limits": True, "max_acceleration": 3.0, "has_jerk_limits": True, "max_jerk": 9.0}}})
+    root = MappingNodeHandle(
+        {
+            "joint_limits": {
+                "j": {
+                    "has_position_limits": False,
+                    "angle_wraparound": True,
+                    "has_velocity_limits": False,
+                    "has_effort_limits": False,
+                    "has_acceleration_limits": True,
+                    "max_acceleration": 3.0,
+                    "has_jerk_limits": True,
+                    "max_jerk": 9.0,
+                }
+            }
+        }
+    )
     assert limits_with_parameters("j", LIMITS, root) == JointLimits(continuous=True, max_acceleration=3.0)
 
 
 SOFT_VALUES = {"soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 1.0, "k_velocity": 2.0}
 
 
-@pytest.mark.parametrize(("values", "words"), [
-    ({"has_position_limits": True, "max_position": 0.1}, "only max_position are set"),
-    ({"has_position_limits": True}, "of min_position, max_position only none are set"),
-    ({"has_velocity_limits": True}, "of max_velocity only none are set"),
-    ({"min_position": -0.1, "max_position": 0.1}, "min_position, max_position without has_position_limits: true"),
-    ({"has_soft_limits": True, "k_position": 1.0}, "only k_position are set"),
-    (SOFT_VALUES, "k_velocity without has_soft_limits: true"),
-    ({"has_soft_limits": False, **SOFT_VALUES}, ""),
-])
-def test_limits_that_are_not_complete_or_not_in_force_change_nothing(values: dict[str, Any], words: str,
-                                                                     caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"has_position_limits": True, "max_position": 0.1}, "only max_position are set"),
+        ({"has_position_limits": True}, "of min_position, max_position only none are set"),
+        ({"has_velocity_limits": True}, "of max_velocity only none are set"),
+        ({"min_position": -0.1, "max_position": 0.1}, "min_position, max_position without has_position_limits: true"),
+        ({"has_soft_limits": True, "k_position": 1.0}, "only k_position are set"),
+        (SOFT_VALUES, "k_velocity without has_soft_limits: true"),
+        ({"has_soft_limits": False, **SOFT_VALUES}, ""),
+    ],
+)
+def test_limits_that_are_not_complete_or_not_in_force_change_nothing(
+    values: dict[str, Any], words: str, caplog: pytest.LogCaptureFixture
+) -> None:
     root = MappingNodeHandle({"joint_limits": {"j": values}})
     assert limits_with_parameters("j", LIMITS, root) == LIMITS
     assert soft_limits_with_parameters("j", SOFT, root) == SOFT
     assert words in caplog.text and bool(words) == ("/joint_limits/j" in caplog.text)
 
 
-@pytest.mark.parametrize(("values", "words"), [
-    ({"has_position_limits": True, "min_position": 2.0, "max_position": 1.0}, "must not exceed"),
-    ({"has_position_limits": "yes"}, "/joint_limits/j/has_position_limits: got 'yes'"),
-    ({"has_velocity_limits": True, "max_velocity": -1.0}, "/joint_limits/j/max_velocity: got -1.0"),
-    ({"has_soft_limits": True, "soft_lower_limit": 1.0, "soft_upper_limit": 1.0, "k_position": 1.0, "k_velocity": 1.0},
-     "must be below"),
-    ({"has_soft_limits": True, "soft_lower_limit": 0.0, "soft_upper_limit": 1.0, "k_position": -1.0, "k_velocity": 1.0},
-     "neither may be negative"),
-])
-def test_limits_that_make_no_sense_refuse_the_hardware(values: dict[str, Any], words: str,
-                                                       caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"has_position_limits": True, "min_position": 2.0, "max_position": 1.0}, "must not exceed"),
+        ({"has_position_limits": "yes"}, "/joint_limits/j/has_position_limits: got 'yes'"),
+        ({"has_velocity_limits": True, "max_velocity": -1.0}, "/joint_limits/j/max_velocity: got -1.0"),
+        (
+            {
+                "has_soft_limits": True,
+                "soft_lower_limit": 1.0,
+                "soft_upper_limit": 1.0,
+                "k_position": 1.0,
+                "k_velocity": 1.0,
+            },
+            "must be below",
+        ),
+        (
+            {
+                "has_soft_limits": True,
+                "soft_lower_limit": 0.0,
+                "soft_upper_limit": 1.0,
+                "k_position": -1.0,
+                "k_velocity": 1.0,
+            },
+            "neither may be negative",
+        ),
+    ],
+)
+def test_limits_that_make_no_sense_refuse_the_hardware(
+    values: dict[str, Any], words: str, caplog: pytest.LogCaptureFixture
+) -> None:
     root = MappingNodeHandle({"joint_limits": {"j": values}, "hw": {"joints": ["j"]}})
     assert MockRobotHW().init(root, root.child("hw")) is False
     assert words in caplog.text
@@ -275,14 +369,24 @@ def test_a_number_of_the_description_that_is_none_is_named() -> None:
         soft_limits_from_urdf(URDF.replace('k_position="10"', 'k_position="ten"'))
 
 
-@pytest.mark.parametrize(("interface", "controller", "command"), [
-    ("PositionJointInterface", "position_controllers/JointPositionController", 9.0),
-    ("VelocityJointInterface", "velocity_controllers/JointVelocityController", 9.0),
-    ("EffortJointInterface", "effort_controllers/JointEffortController", 9.0)])
-def test_between_controller_and_hardware_the_limits_hold(make_loop: Callable[..., Any], interface: str, controller: str,
-                                                         command: float) -> None:
-    loop = make_loop({"robot_description": URDF, "hw": {"joints": ["j"], "command_interface": interface},
-                      "c": {"type": controller, "joint": "j"}})
+@pytest.mark.parametrize(
+    ("interface", "controller", "command"),
+    [
+        ("PositionJointInterface", "position_controllers/JointPositionController", 9.0),
+        ("VelocityJointInterface", "velocity_controllers/JointVelocityController", 9.0),
+        ("EffortJointInterface", "effort_controllers/JointEffortController", 9.0),
+    ],
+)
+def test_between_controller_and_hardware_the_limits_hold(
+    make_loop: Callable[..., Any], interface: str, controller: str, command: float
+) -> None:
+    loop = make_loop(
+        {
+            "robot_description": URDF,
+            "hw": {"joints": ["j"], "command_interface": interface},
+            "c": {"type": controller, "joint": "j"},
+        }
+    )
     loop.spawn("c")
     loop.controllers["c"].submit([command])
     joint = loop.robot_hw.interfaces[1].handles[0]
@@ -300,8 +404,12 @@ def test_between_controller_and_hardware_the_limits_hold(make_loop: Callable[...
 
 def test_a_guard_forgets_the_joints_it_is_told_to_forget() -> None:
     robot_hw = MockRobotHW()
-    root = MappingNodeHandle({"hw": {"joints": ["a", "b"]}, "joint_limits": {
-        name: {"has_velocity_limits": True, "max_velocity": 1.0} for name in ("a", "b")}})
+    root = MappingNodeHandle(
+        {
+            "hw": {"joints": ["a", "b"]},
+            "joint_limits": {name: {"has_velocity_limits": True, "max_velocity": 1.0} for name in ("a", "b")},
+        }
+    )
     assert robot_hw.init(root, root.child("hw"))
     guard = JointLimitGuard(robot_hw, root)
     handles = robot_hw.get(PositionJointInterface).handles

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The trajectory controller in a loop with fake hardware: following, tolerances, stops, splices, refusals."""
+
 from __future__ import annotations
 
 import math
@@ -32,10 +33,16 @@ ZEROS = (0.0, 0.0, 0.0)
 
 
 def parameters(**more: Any) -> dict[str, Any]:
-    return {"robot_description": URDF, "hw": {"joints": ["a", "b", "c"]},
-            "arm": {"type": "position_controllers/JointTrajectoryController", "joints": ["a", "b", "c"],
-                    "constraints": {"goal_time": 0.2, "a": {"goal": 0.01}, "b": {"trajectory": 0.1, "goal": 0.01}},
-                    **more}}
+    return {
+        "robot_description": URDF,
+        "hw": {"joints": ["a", "b", "c"]},
+        "arm": {
+            "type": "position_controllers/JointTrajectoryController",
+            "joints": ["a", "b", "c"],
+            "constraints": {"goal_time": 0.2, "a": {"goal": 0.01}, "b": {"trajectory": 0.1, "goal": 0.01}},
+            **more,
+        },
+    }
 
 
 class SluggishRobotHW(MockRobotHW):
@@ -68,8 +75,13 @@ def points(*rows: tuple[float, tuple[float, ...]]) -> tuple[TrajectoryPoint, ...
     return tuple(TrajectoryPoint(time_s, row, (0.0,) * len(row), (0.0,) * len(row)) for time_s, row in rows)
 
 
-def send(loop: Any, *rows: tuple[float, tuple[float, ...]], names: tuple[str, ...] = ("a", "b", "c"),
-         stamp_s: float = 0.0, **more: Any) -> TrajectoryGoalHandle:
+def send(
+    loop: Any,
+    *rows: tuple[float, tuple[float, ...]],
+    names: tuple[str, ...] = ("a", "b", "c"),
+    stamp_s: float = 0.0,
+    **more: Any,
+) -> TrajectoryGoalHandle:
     goal_handle = TrajectoryGoalHandle()
     trajectory = JointTrajectory(names, points(*rows), stamp_s)
     loop.controllers["arm"].submit(TrajectoryGoal(trajectory, **more), goal_handle)
@@ -150,8 +162,9 @@ def test_the_goal_may_lengthen_goal_time_widen_and_erase_tolerances(loop: Any) -
 
 
 def test_a_goal_with_no_goal_time_at_all_must_be_there_at_once(loop: Any) -> None:
-    goal_handle = send(loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)},
-                       goal_time_tolerance_s=-1.0)
+    goal_handle = send(
+        loop, (0.5, (0.3, 0.6, 0.1)), path_tolerance={"b": JointTolerance(-1.0)}, goal_time_tolerance_s=-1.0
+    )
     loop.run(0.52)
     assert goal_handle.result is TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED
 
@@ -164,20 +177,29 @@ def test_a_joint_that_still_moves_has_not_reached_its_goal(start: Callable[..., 
     assert "joint 'b': velocity error" in goal_handle.text
 
 
-@pytest.mark.parametrize(("names", "rows", "more", "code", "words"), [
-    (("a", "b", "x"), [(1.0, ZEROS)], {}, -2, "unknown joint 'x'"),
-    (("a", "b"), [(1.0, (0.0, 0.0))], {}, -2, "joints missing: c (allow_partial_joints_goal is false)"),
-    (("a", "b", "b"), [(1.0, ZEROS)], {}, -2, "joint 'b' is named twice"),
-    ((), [], {}, -2, "joints missing: a, b, c"),
-    (("a", "b", "c"), [(1.0, (0.0, math.nan, 0.0))], {}, -1,
-     "point 0: position of joint 'b' (index 1) is nan; expected a finite number"),
-    (("a", "b", "c"), [(1.0, (0.0,))], {}, -1, "has 1 positions; expected 3"),
-    (("a", "b", "c"), [(1.0, ZEROS), (1.0, ZEROS)], {}, -1, "must increase strictly"),
-    (("a", "b", "c"), [(1.0, ZEROS)], {"path_tolerance": {"a": JointTolerance(math.nan)}}, -1, "is not a number"),
-    (("a", "b", "c"), [(1.0, ZEROS)], {"goal_time_tolerance_s": math.nan}, -1, "goal_time_tolerance"),
-])
+@pytest.mark.parametrize(
+    ("names", "rows", "more", "code", "words"),
+    [
+        (("a", "b", "x"), [(1.0, ZEROS)], {}, -2, "unknown joint 'x'"),
+        (("a", "b"), [(1.0, (0.0, 0.0))], {}, -2, "joints missing: c (allow_partial_joints_goal is false)"),
+        (("a", "b", "b"), [(1.0, ZEROS)], {}, -2, "joint 'b' is named twice"),
+        ((), [], {}, -2, "joints missing: a, b, c"),
+        (
+            ("a", "b", "c"),
+            [(1.0, (0.0, math.nan, 0.0))],
+            {},
+            -1,
+            "point 0: position of joint 'b' (index 1) is nan; expected a finite number",
+        ),
+        (("a", "b", "c"), [(1.0, (0.0,))], {}, -1, "has 1 positions; expected 3"),
+        (("a", "b", "c"), [(1.0, ZEROS), (1.0, ZEROS)], {}, -1, "must increase strictly"),
+        (("a", "b", "c"), [(1.0, ZEROS)], {"path_tolerance": {"a": JointTolerance(math.nan)}}, -1, "is not a number"),
+        (("a", "b", "c"), [(1.0, ZEROS)], {"goal_time_tolerance_s": math.nan}, -1, "goal_time_tolerance"),
+    ],
+)
 def test_a_malformed_goal_is_refused_with_code_and_reason(
-        loop: Any, names: tuple[str, ...], rows: list[Any], more: dict[str, Any], code: int, words: str) -> None:
+    loop: Any, names: tuple[str, ...], rows: list[Any], more: dict[str, Any], code: int, words: str
+) -> None:
     with pytest.raises(GoalRejectedError) as caught:
         send(loop, *rows, names=names, **more)
     assert caught.value.code == code
@@ -187,7 +209,8 @@ def test_a_malformed_goal_is_refused_with_code_and_reason(
 
 
 def test_a_tolerance_of_a_joint_that_the_controller_does_not_have_is_left_out_with_a_warning(
-        loop: Any, caplog: pytest.LogCaptureFixture) -> None:
+    loop: Any, caplog: pytest.LogCaptureFixture
+) -> None:
     goal_handle = send(loop, (0.5, (0.3, 0.1, 0.1)), goal_tolerance={"x": JointTolerance(1e-9)})
     loop.run(0.6)
     assert goal_handle.status is GoalStatus.SUCCEEDED
@@ -304,8 +327,9 @@ def test_a_partial_goal_moves_its_joints_and_lets_the_others_finish(start: Calla
     assert commands(loop) == pytest.approx([0.0, 0.3, 0.2], abs=1e-9)
 
 
-def test_a_partial_goal_may_have_values_for_more_joints_than_it_names(start: Callable[..., Any],
-                                                                      caplog: pytest.LogCaptureFixture) -> None:
+def test_a_partial_goal_may_have_values_for_more_joints_than_it_names(
+    start: Callable[..., Any], caplog: pytest.LogCaptureFixture
+) -> None:
     loop = start(allow_partial_joints_goal=True)
     goal_handle = send(loop, (0.5, (0.1, 0.4)), (1.0, (0.2, 0.3)), names=("b",))
     loop.run(1.1)
@@ -314,10 +338,12 @@ def test_a_partial_goal_may_have_values_for_more_joints_than_it_names(start: Cal
     assert "points have 2 values each, only the first 1 are used, for: b" in caplog.text
 
 
-@pytest.mark.parametrize("points", [
-    [(0.3, (0.4, 0.1)), (0.6, (0.2,))], [(0.3, (0.4,)), (0.6, (0.2, 0.1))], [(0.3, ()), (0.6, ())]])
-def test_partial_goals_with_points_of_different_or_too_small_sizes_are_refused(start: Callable[..., Any],
-                                                                               points: list[Any]) -> None:
+@pytest.mark.parametrize(
+    "points", [[(0.3, (0.4, 0.1)), (0.6, (0.2,))], [(0.3, (0.4,)), (0.6, (0.2, 0.1))], [(0.3, ()), (0.6, ())]]
+)
+def test_partial_goals_with_points_of_different_or_too_small_sizes_are_refused(
+    start: Callable[..., Any], points: list[Any]
+) -> None:
     loop = start(allow_partial_joints_goal=True)
     with pytest.raises(GoalRejectedError, match="positions; expected 1"):
         send(loop, *points, names=("b",))
@@ -375,12 +401,17 @@ def test_after_a_reset_of_time_the_arm_holds_and_its_goal_has_ended(loop: Any) -
     assert commands(loop) == pytest.approx(held, abs=0.03)
 
 
-@pytest.mark.parametrize(("more", "words"), [
-    ({"joints": []}, "/arm/joints"), ({"joints": ["a", "a"]}, "once"), ({"joints": ["a", "z"]}, "no joint 'z'"),
-    ({"state_publish_rate": "fast"}, "/arm/state_publish_rate: got 'fast'"),
-    ({"constraints": {"goal_time": -1.0}}, "/arm/constraints/goal_time"),
-    ({"allow_partial_joints_goal": 1}, "expected true or false"),
-])
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"joints": []}, "/arm/joints"),
+        ({"joints": ["a", "a"]}, "once"),
+        ({"joints": ["a", "z"]}, "no joint 'z'"),
+        ({"state_publish_rate": "fast"}, "/arm/state_publish_rate: got 'fast'"),
+        ({"constraints": {"goal_time": -1.0}}, "/arm/constraints/goal_time"),
+        ({"allow_partial_joints_goal": 1}, "expected true or false"),
+    ],
+)
 def test_a_faulty_parameter_is_named(make_loop: Callable[..., Any], more: dict[str, Any], words: str) -> None:
     with pytest.raises(ControllerError) as caught:
         make_loop(parameters(**more)).manager.load_controller("arm")
@@ -406,7 +437,8 @@ def test_a_goal_that_ends_with_the_cycle_it_arrives_in_does_no_harm(loop: Any) -
 
 
 def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_lost(
-        loop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     validate_goal = joint_trajectory_controller.validate_goal
 
     def stop_meanwhile(*arguments: Any) -> Any:
@@ -422,8 +454,9 @@ def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_l
     assert commands(loop) == before
 
 
-def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any,
-                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(
+    loop: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     active = send(loop, (0.5, (0.3, 0.1, 0.1)))
     loop.run(0.1)
 

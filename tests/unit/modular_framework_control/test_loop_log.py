@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The control loop logs without waiting for whoever writes the log."""
+
 from __future__ import annotations
 
 import logging
@@ -77,7 +78,8 @@ def fail_again() -> None:
 
 @pytest.mark.parametrize("complaint", [fail_again, lambda: LOGGER.error("cannot write"), lambda: None])
 def test_a_log_that_cannot_be_written_at_all_is_tried_once_and_the_others_get_theirs(
-        terminal: StuckTerminal, complaint: Callable[[], None]) -> None:
+    terminal: StuckTerminal, complaint: Callable[[], None]
+) -> None:
     terminal.go_on.set()
     rosout, broken, log = logging.getLogger("rosout"), BrokenTerminal(complaint), LoopLog()
     rosout.handlers.insert(0, broken)
@@ -94,8 +96,9 @@ def test_a_log_that_cannot_be_written_at_all_is_tried_once_and_the_others_get_th
     assert broken.complaints == 2
 
 
-def test_words_that_do_not_fit_together_disturb_nobody(terminal: StuckTerminal,
-                                                       capsys: pytest.CaptureFixture[str]) -> None:
+def test_words_that_do_not_fit_together_disturb_nobody(
+    terminal: StuckTerminal, capsys: pytest.CaptureFixture[str]
+) -> None:
     terminal.go_on.set()
     log = LoopLog()
     log.begin()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The time of the control loop: steps of the system's clock do not reach it, only the stamps of messages."""
+
 from __future__ import annotations
 
 import logging
@@ -31,7 +32,8 @@ class Clocks:
 
 @given(st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-1e6, 1e6)), min_size=1, max_size=20))
 def test_time_passes_as_on_the_steady_clock_and_stamps_follow_the_one_that_is_set(
-        cycles: list[tuple[float, float]]) -> None:
+    cycles: list[tuple[float, float]],
+) -> None:
     clocks = Clocks()
     loop_time = LoopTime(clocks.system, clocks.steady)
     before_s = loop_time.now()
@@ -55,7 +57,7 @@ def test_a_loop_that_is_held_up_between_its_two_clocks_does_not_take_that_for_a_
 def test_time_stands_still_while_the_loop_is_held_up(caplog: pytest.LogCaptureFixture) -> None:
     clocks = Clocks()
     loop_time = LoopTime(clocks.system, clocks.steady)
-    clocks.steady_s += 3.0      # before the loop begins nothing is held up
+    clocks.steady_s += 3.0  # before the loop begins nothing is held up
     loop_time.longest_step_s = 0.05
     begun_s = loop_time.now()
     for passed_s in (0.008, 0.05, 0.9, 0.008):
@@ -64,7 +66,8 @@ def test_time_stands_still_while_the_loop_is_held_up(caplog: pytest.LogCaptureFi
         assert time_s + loop_time.ahead_s == pytest.approx(clocks.system(), abs=1e-6)
     assert time_s - begun_s == pytest.approx(0.008 + 0.05 + 0.05 + 0.008, abs=1e-6)
     assert [record.getMessage() for record in caplog.records] == [
-        "the control loop was held up for 0.900 s: motions go on as much later"]
+        "the control loop was held up for 0.900 s: motions go on as much later"
+    ]
 
 
 def test_a_step_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
@@ -75,7 +78,8 @@ def test_a_step_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
         loop_time.now()
         loop_time.now()
     assert [record.getMessage() for record in caplog.records if "was set by -3600.000 s" in record.getMessage()] == [
-        record.getMessage() for record in caplog.records] and len(caplog.records) == 1
+        record.getMessage() for record in caplog.records
+    ] and len(caplog.records) == 1
 
 
 def test_stamps_of_messages_differ_from_the_time_of_the_loop_by_what_the_clock_is_ahead() -> None:

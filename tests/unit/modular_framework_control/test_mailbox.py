@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The mailbox between other threads and the control loop: nothing is lost, nothing is taken twice."""
+
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Odometry, limits of velocities and wheel geometry of mobile bases, against closed forms."""
+
 from __future__ import annotations
 
 import math
@@ -35,7 +36,8 @@ def test_a_full_circle_ends_where_it_began_however_coarse_the_steps(steps: int) 
         odometry.move(radius * turn, turn, 0.01 * step)
         angle = turn * step
         assert (odometry.x, odometry.y) == pytest.approx(
-            (radius * math.sin(angle), radius * (1.0 - math.cos(angle))), abs=1e-12)
+            (radius * math.sin(angle), radius * (1.0 - math.cos(angle))), abs=1e-12
+        )
     assert odometry.heading == pytest.approx(2.0 * math.pi)
 
 
@@ -64,6 +66,7 @@ def test_a_base_that_drifts_sideways_while_it_turns_goes_round_a_centre_ahead_or
 
 # ---- limits ----
 
+
 def ramp(limiter: SpeedLimiter, wanted: float, cycles: int, period_s: float = 0.01) -> list[float]:
     speeds = [0.0, 0.0]
     for _ in range(cycles):
@@ -79,13 +82,14 @@ def test_a_base_speeds_up_no_faster_than_its_acceleration_and_no_further_than_it
 
 
 @given(st.floats(-10.0, 10.0), st.floats(0.5, 20.0), st.floats(0.1, 5.0))
-def test_velocity_acceleration_and_jerk_of_a_start_keep_to_their_limits(wanted: float, jerk: float,
-                                                                       acceleration: float) -> None:
+def test_velocity_acceleration_and_jerk_of_a_start_keep_to_their_limits(
+    wanted: float, jerk: float, acceleration: float
+) -> None:
     speeds = np.array(ramp(SpeedLimiter((-2.0, 2.0), (-acceleration, acceleration), (-jerk, jerk)), wanted, 60))
     changes = np.diff(speeds) / 0.01
     assert np.all(np.abs(speeds) <= 2.0 + 1e-9)
     assert np.all(np.abs(changes) <= acceleration + 1e-6)
-    before_limit = np.abs(speeds[1:]) < min(2.0, abs(wanted)) - 1e-9    # what cuts a ramp off is no jerk of it
+    before_limit = np.abs(speeds[1:]) < min(2.0, abs(wanted)) - 1e-9  # what cuts a ramp off is no jerk of it
     jerks = np.diff(np.concatenate([[0.0], changes])) / 0.01
     assert np.all(np.abs(jerks[before_limit & (np.abs(changes) < acceleration - 1e-9)]) <= 2.0 * jerk + 1e-3)
 
@@ -102,20 +106,33 @@ def test_without_limits_or_time_commands_pass_or_stand() -> None:
     assert SpeedLimiter(acceleration=(-1.0, 1.0), jerk=(-1.0, 1.0)).limit(7.0, 1.0, 1.0, 0.0) == 1.0
 
 
-@pytest.mark.parametrize(("parameters", "fault"), [
-    ({"has_velocity_limits": True}, "/x/max_velocity is not set although has_velocity_limits is true"),
-    ({"has_jerk_limits": True, "max_jerk": -2.0}, "must be at least 0"),
-    ({"has_acceleration_limits": True, "max_acceleration": 1.0, "min_acceleration": 0.5}, "could not stand still"),
-    ({"has_velocity_limits": "yes"}, "expected true or false")])
+@pytest.mark.parametrize(
+    ("parameters", "fault"),
+    [
+        ({"has_velocity_limits": True}, "/x/max_velocity is not set although has_velocity_limits is true"),
+        ({"has_jerk_limits": True, "max_jerk": -2.0}, "must be at least 0"),
+        ({"has_acceleration_limits": True, "max_acceleration": 1.0, "min_acceleration": 0.5}, "could not stand still"),
+        ({"has_velocity_limits": "yes"}, "expected true or false"),
+    ],
+)
 def test_limits_that_make_no_sense_are_refused(parameters: dict[str, Any], fault: str) -> None:
     with pytest.raises(ParameterError, match=fault):
         read_speed_limiter(MappingNodeHandle(parameters, "/x"))
 
 
 def test_the_smallest_value_is_minus_the_largest_unless_it_is_given() -> None:
-    limiter = read_speed_limiter(MappingNodeHandle({"has_velocity_limits": True, "max_velocity": 2.0,
-                                                    "has_jerk_limits": True, "max_jerk": 3.0, "min_jerk": -1.0,
-                                                    "max_acceleration": 9.0}))
+    limiter = read_speed_limiter(
+        MappingNodeHandle(
+            {
+                "has_velocity_limits": True,
+                "max_velocity": 2.0,
+                "has_jerk_limits": True,
+                "max_jerk": 3.0,
+                "min_jerk": -1.0,
+                "max_acceleration": 9.0,
+            }
+        )
+    )
     assert limiter == SpeedLimiter(velocity=(-2.0, 2.0), jerk=(-1.0, 3.0))
 
 
@@ -139,7 +156,7 @@ def geometry(origin: str = "", description: Any = None) -> WheelGeometry:
 
 def test_distances_hold_also_between_wheels_of_different_parents() -> None:
     assert geometry().between("left", "right") == pytest.approx([0.0, -0.5, 0.0])
-    assert geometry().between("right", "left") == pytest.approx([0.5, 0.0, 0.0])    # in the frame of the turned axle
+    assert geometry().between("right", "left") == pytest.approx([0.5, 0.0, 0.0])  # in the frame of the turned axle
     assert geometry().distance("left", "right") == pytest.approx(0.5)
 
 
@@ -148,17 +165,29 @@ def test_the_radius_is_that_of_the_cylinder_or_sphere_of_the_wheel() -> None:
     assert geometry().radius("right") == 0.2
 
 
-@pytest.mark.parametrize(("ask", "fault"), [
-    (lambda: geometry().radius("square"), "wheel link 'cube' is <box>; expected <cylinder> or <sphere>"),
-    (lambda: geometry().radius("none"), "there is no joint 'none'; joints: left, right, square, turned"),
-    (lambda: geometry('<origin xyz="1 2"/>').distance("left", "square"), "<origin xyz> of joint 'square' is '1 2'"),
-    (lambda: geometry(description="<robot"), "not well-formed XML"),
-    (lambda: geometry(description=""), "is not set, and wheel_radius is looked up there"),
-    (lambda: geometry(description='<robot name="r"><joint name="a"><parent link="x"/><child link="x"/></joint></robot>')
-     .distance("a", "a"), "never ends; expected a tree"),
-    (lambda: geometry(description='<robot name="r"><link name="l"><collision><geometry><sphere radius="-1"/></geometry>'
-                      '</collision></link><joint name="a"><child link="l"/></joint></robot>').radius("a"),
-     "is '-1'; expected a number above 0")])
+@pytest.mark.parametrize(
+    ("ask", "fault"),
+    [
+        (lambda: geometry().radius("square"), "wheel link 'cube' is <box>; expected <cylinder> or <sphere>"),
+        (lambda: geometry().radius("none"), "there is no joint 'none'; joints: left, right, square, turned"),
+        (lambda: geometry('<origin xyz="1 2"/>').distance("left", "square"), "<origin xyz> of joint 'square' is '1 2'"),
+        (lambda: geometry(description="<robot"), "not well-formed XML"),
+        (lambda: geometry(description=""), "is not set, and wheel_radius is looked up there"),
+        (
+            lambda: geometry(
+                description='<robot name="r"><joint name="a"><parent link="x"/><child link="x"/></joint></robot>'
+            ).distance("a", "a"),
+            "never ends; expected a tree",
+        ),
+        (
+            lambda: geometry(
+                description='<robot name="r"><link name="l"><collision><geometry><sphere radius="-1"/></geometry>'
+                '</collision></link><joint name="a"><child link="l"/></joint></robot>'
+            ).radius("a"),
+            "is '-1'; expected a number above 0",
+        ),
+    ],
+)
 def test_a_description_that_does_not_answer_is_an_error_that_says_why(ask: Any, fault: str) -> None:
     with pytest.raises(ParameterError, match=fault):
         ask()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fake hardware does exactly what it is told."""
+
 from __future__ import annotations
 
 import pytest
@@ -11,9 +12,11 @@ from modular_framework_ros.node_handle import MappingNodeHandle
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>
 <joint name="elbow" type="continuous"><limit velocity="3" effort="10"/></joint></robot>"""
-PARAMETERS = {"robot_description": URDF,
-              "hw": {"joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
-              "joint_limits": {"elbow": {"has_position_limits": True, "min_position": -2.0, "max_position": 2.0}}}
+PARAMETERS = {
+    "robot_description": URDF,
+    "hw": {"joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
+    "joint_limits": {"elbow": {"has_position_limits": True, "min_position": -2.0, "max_position": 2.0}},
+}
 
 
 def make_robot_hw() -> MockRobotHW:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """However a motion ends, the joints stop within their braking distance, and the next valid goal succeeds."""
+
 from __future__ import annotations
 
 import math
@@ -21,11 +22,20 @@ from modular_framework_control.trajectory.trajectory_goal import (
 )
 
 FASTEST = 3.15
-LIMITS = {"has_velocity_limits": True, "max_velocity": FASTEST, "has_position_limits": True, "min_position": -6.28,
-          "max_position": 6.28}
-FAMILIES = {"position": "PositionJointInterface", "velocity": "VelocityJointInterface",
-            "effort": "EffortJointInterface", "pos_vel": "PosVelJointInterface",
-            "pos_vel_acc": "PosVelAccJointInterface"}
+LIMITS = {
+    "has_velocity_limits": True,
+    "max_velocity": FASTEST,
+    "has_position_limits": True,
+    "min_position": -6.28,
+    "max_position": 6.28,
+}
+FAMILIES = {
+    "position": "PositionJointInterface",
+    "velocity": "VelocityJointInterface",
+    "effort": "EffortJointInterface",
+    "pos_vel": "PosVelJointInterface",
+    "pos_vel_acc": "PosVelAccJointInterface",
+}
 GAINS = {"velocity": {"p": 20.0}, "effort": {"p": 100.0, "d": 20.0}}
 GOAL = {"trajectory": 0.1, "goal": 0.02}
 JOINTS = ("pan", "lift")
@@ -56,16 +66,33 @@ class WalledRobotHW(MockRobotHW):
 
 @pytest.fixture
 def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
-    def starter(family: str = "position", limits: dict[str, Any] | None = LIMITS, stop_s: float = 0.0,
-                tolerance: dict[str, float] | None = None, hw: Any = None) -> Any:
-        controller = {"type": f"{family}_controllers/JointTrajectoryController", "joints": list(JOINTS),
-                      "gains": dict.fromkeys(JOINTS, GAINS.get(family)), "stop_trajectory_duration": stop_s,
-                      "velocity_ff": dict.fromkeys(JOINTS, 1.0 if family == "velocity" else 0.0),
-                      "constraints": {"goal_time": 0.6, "stopped_velocity_tolerance": 0.05,
-                                      **dict.fromkeys(JOINTS, GOAL if tolerance is None else tolerance)}}
-        loop = make_loop({"hw": {"joints": list(JOINTS), "command_interface": FAMILIES[family]}, "c": controller,
-                          "joint_limits": dict.fromkeys(JOINTS, limits) if limits else {}},
-                         WalledRobotHW() if hw is None else hw)
+    def starter(
+        family: str = "position",
+        limits: dict[str, Any] | None = LIMITS,
+        stop_s: float = 0.0,
+        tolerance: dict[str, float] | None = None,
+        hw: Any = None,
+    ) -> Any:
+        controller = {
+            "type": f"{family}_controllers/JointTrajectoryController",
+            "joints": list(JOINTS),
+            "gains": dict.fromkeys(JOINTS, GAINS.get(family)),
+            "stop_trajectory_duration": stop_s,
+            "velocity_ff": dict.fromkeys(JOINTS, 1.0 if family == "velocity" else 0.0),
+            "constraints": {
+                "goal_time": 0.6,
+                "stopped_velocity_tolerance": 0.05,
+                **dict.fromkeys(JOINTS, GOAL if tolerance is None else tolerance),
+            },
+        }
+        loop = make_loop(
+            {
+                "hw": {"joints": list(JOINTS), "command_interface": FAMILIES[family]},
+                "c": controller,
+                "joint_limits": dict.fromkeys(JOINTS, limits) if limits else {},
+            },
+            WalledRobotHW() if hw is None else hw,
+        )
         loop.spawn("c")
         return loop
 
@@ -75,8 +102,10 @@ def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
 def send(loop: Any, *points: tuple[float, Sequence[float], Sequence[float]]) -> TrajectoryGoalHandle:
     """Send a goal and let a cycle pass; a goal that is refused at once ends as rejected, too."""
     goal_handle: TrajectoryGoalHandle = RealtimeGoalHandle()
-    rows = tuple(TrajectoryPoint(time_s, tuple(position), tuple(velocity), (0.0, 0.0) if velocity else ())
-                 for time_s, position, velocity in points)
+    rows = tuple(
+        TrajectoryPoint(time_s, tuple(position), tuple(velocity), (0.0, 0.0) if velocity else ())
+        for time_s, position, velocity in points
+    )
     try:
         loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(JOINTS, rows)), goal_handle)
     except GoalRejectedError as error:
@@ -107,16 +136,21 @@ def assert_next_goal_succeeds(loop: Any) -> None:
 
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))
-@pytest.mark.parametrize(("points", "words"), [
-    ([(0.05, (-1.5, 0.0), ())],
-     "on the way to point 0 joint 'pan' reaches the velocity -30; its limit is 3.15"),
-    ([(1.0, (0.5, 0.0), (30.0, 0.0))], "point 0: velocity of joint 'pan' is 30; its limit is 3.15"),
-    ([(1.0, (0.5, 0.5), (1e6, -1e6))], "point 0: velocity of joint 'lift' is -1e+06; its limit is 3.15"),
-    ([(0.5, (0.5, 0.0), (0.0, 0.0)), (1.0, (0.5, 9.0), (0.0, 0.0))],
-     "point 1: position of joint 'lift' is 9; its limits are -6.28 to 6.28"),
-])
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        ([(0.05, (-1.5, 0.0), ())], "on the way to point 0 joint 'pan' reaches the velocity -30; its limit is 3.15"),
+        ([(1.0, (0.5, 0.0), (30.0, 0.0))], "point 0: velocity of joint 'pan' is 30; its limit is 3.15"),
+        ([(1.0, (0.5, 0.5), (1e6, -1e6))], "point 0: velocity of joint 'lift' is -1e+06; its limit is 3.15"),
+        (
+            [(0.5, (0.5, 0.0), (0.0, 0.0)), (1.0, (0.5, 9.0), (0.0, 0.0))],
+            "point 1: position of joint 'lift' is 9; its limits are -6.28 to 6.28",
+        ),
+    ],
+)
 def test_a_goal_beyond_known_limits_is_refused_with_point_and_joint_and_nothing_moves(
-        start: Callable[..., Any], family: str, points: list[Any], words: str) -> None:
+    start: Callable[..., Any], family: str, points: list[Any], words: str
+) -> None:
     loop = start(family, stop_s=0.5)
     goal_handle = send(loop, *points)
     assert (goal_handle.status, goal_handle.result) == (GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL)
@@ -128,8 +162,9 @@ def test_a_goal_beyond_known_limits_is_refused_with_point_and_joint_and_nothing_
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 @pytest.mark.parametrize("stop_s", [0.0, 0.3])
 @pytest.mark.parametrize("end", ["cancel", "empty goal", "empty command", "switch"])
-def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(start: Callable[..., Any], family: str,
-                                                                       stop_s: float, end: str) -> None:
+def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(
+    start: Callable[..., Any], family: str, stop_s: float, end: str
+) -> None:
     loop = start(family, stop_s=stop_s, tolerance={"goal": 0.02})
     goal_handle = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
     loop.run(0.5)
@@ -144,9 +179,9 @@ def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(start: Cal
         goal = TrajectoryGoal(JointTrajectory(names, ()))
         loop.controllers["c"].submit(goal, RealtimeGoalHandle() if end == "empty goal" else None)
     if family == "effort" and end == "switch":
-        return      # a body without friction rolls on when nothing brakes it
+        return  # a body without friction rolls on when nothing brakes it
     way = way_after(loop)
-    lag_s = 0.1 if family in GAINS else 0.03     # gains follow later
+    lag_s = 0.1 if family in GAINS else 0.03  # gains follow later
     assert way <= speed * (0.5 * stop_s + lag_s) + 1e-3
     assert goal_handle.status is GoalStatus.CANCELED
     if end == "switch":
@@ -156,8 +191,9 @@ def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(start: Cal
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 @pytest.mark.parametrize("end", ["cancel", "path", "goal", "switch"])
-def test_at_a_wall_the_actual_position_is_held_and_nothing_pushes(start: Callable[..., Any], family: str,
-                                                                   end: str) -> None:
+def test_at_a_wall_the_actual_position_is_held_and_nothing_pushes(
+    start: Callable[..., Any], family: str, end: str
+) -> None:
     loop = start(family, tolerance=GOAL if end == "path" else {"goal": 0.02})
     loop.robot_hw.wall = 0.2
     goal_handle = send(loop, (1.0, (1.0, 0.1), (0.0, 0.0)))
@@ -167,9 +203,10 @@ def test_at_a_wall_the_actual_position_is_held_and_nothing_pushes(start: Callabl
     elif end == "switch":
         assert loop.switch([], ["c"]) is None
     loop.run(1.5)
-    assert goal_handle.result is {"path": TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
-                             "goal": TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED}.get(
-                                 end, TrajectoryErrorCode.INVALID_GOAL)
+    assert goal_handle.result is {
+        "path": TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
+        "goal": TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
+    }.get(end, TrajectoryErrorCode.INVALID_GOAL)
     rest = 0.0 if family in GAINS else 0.2
     assert loop.robot_hw.joints[0].command == pytest.approx(rest, abs=1e-6)
     if end != "switch":
@@ -196,7 +233,8 @@ def test_no_goal_makes_a_controller_forget_where_its_joints_are(start: Callable[
 
 
 def test_a_preempting_goal_that_the_present_motion_makes_too_fast_is_refused_and_the_motion_goes_on(
-        start: Callable[..., Any]) -> None:
+    start: Callable[..., Any],
+) -> None:
     loop = start()
     first = send(loop, (1.0, (1.5, 0.0), (0.0, 0.0)))
     loop.run(0.5)
@@ -208,10 +246,14 @@ def test_a_preempting_goal_that_the_present_motion_makes_too_fast_is_refused_and
 
 
 def test_a_joint_outside_its_range_may_come_back(make_loop: Callable[..., Any]) -> None:
-    loop = make_loop({"hw": {"joints": list(JOINTS), "initial_positions": {"pan": 6.4}},
-                      "joint_limits": dict.fromkeys(JOINTS, LIMITS),
-                      "c": {"type": "position_controllers/JointTrajectoryController", "joints": list(JOINTS)}},
-                     WalledRobotHW())
+    loop = make_loop(
+        {
+            "hw": {"joints": list(JOINTS), "initial_positions": {"pan": 6.4}},
+            "joint_limits": dict.fromkeys(JOINTS, LIMITS),
+            "c": {"type": "position_controllers/JointTrajectoryController", "joints": list(JOINTS)},
+        },
+        WalledRobotHW(),
+    )
     loop.spawn("c")
     loop.robot_hw.joints[0].state.position = 6.4
     further = send(loop, (1.0, (6.5, 0.0), (0.0, 0.0)))
@@ -246,7 +288,8 @@ class BlindRobotHW(WalledRobotHW):
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 @pytest.mark.parametrize("stop_s", [0.0, 0.3])
 def test_a_joint_that_is_measured_at_no_position_stops_and_takes_no_goals_until_it_is_measured_again(
-        start: Callable[..., Any], family: str, stop_s: float) -> None:
+    start: Callable[..., Any], family: str, stop_s: float
+) -> None:
     hw = BlindRobotHW()
     loop = start(family, stop_s=stop_s, tolerance={"goal": 0.02}, hw=hw)
     goal_handle = send(loop, (1.0, (1.5, -1.0), (0.0, 0.0)))
@@ -259,7 +302,7 @@ def test_a_joint_that_is_measured_at_no_position_stops_and_takes_no_goals_until_
     for _ in range(50):
         loop.step()
         assert all(math.isfinite(joint.command) for joint in hw.joints)
-    if family != "effort":      # a body without friction rolls on when nothing brakes it
+    if family != "effort":  # a body without friction rolls on when nothing brakes it
         assert abs(hw.position - before) <= speed * (0.5 * stop_s + 0.03) + 1e-3
     hw.blind = False
     loop.run(1.0)
@@ -268,8 +311,9 @@ def test_a_joint_that_is_measured_at_no_position_stops_and_takes_no_goals_until_
 
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))
-def test_a_controller_does_not_start_on_a_joint_that_is_measured_at_no_position(start: Callable[..., Any],
-                                                                                family: str) -> None:
+def test_a_controller_does_not_start_on_a_joint_that_is_measured_at_no_position(
+    start: Callable[..., Any], family: str
+) -> None:
     hw = BlindRobotHW()
     loop = start(family, hw=hw)
     assert loop.switch([], ["c"]) is None
@@ -300,12 +344,27 @@ class LateRobotHW(WalledRobotHW):
 
 @pytest.fixture
 def late_loop(make_loop: Callable[..., Any]) -> Any:
-    endless = {"has_position_limits": False, "angle_wraparound": True, "has_velocity_limits": True,
-               "max_velocity": FASTEST}
-    loop = make_loop({"hw": {"joints": list(JOINTS)}, "joint_limits": dict.fromkeys(JOINTS, endless),
-                      **{name: {"type": "position_controllers/JointTrajectoryController", "joints": list(JOINTS),
-                                "stop_trajectory_duration": stop_s} for name, stop_s in (("c", 0.1), ("hold", 0.0))}},
-                     LateRobotHW())
+    endless = {
+        "has_position_limits": False,
+        "angle_wraparound": True,
+        "has_velocity_limits": True,
+        "max_velocity": FASTEST,
+    }
+    loop = make_loop(
+        {
+            "hw": {"joints": list(JOINTS)},
+            "joint_limits": dict.fromkeys(JOINTS, endless),
+            **{
+                name: {
+                    "type": "position_controllers/JointTrajectoryController",
+                    "joints": list(JOINTS),
+                    "stop_trajectory_duration": stop_s,
+                }
+                for name, stop_s in (("c", 0.1), ("hold", 0.0))
+            },
+        },
+        LateRobotHW(),
+    )
     loop.manager.load_controller("hold")
     loop.spawn("c")
     return loop

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Classes of other packages are found under the name they offer them by, and what is wrong is told."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
@@ -38,8 +39,9 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..
 
     def make(*classes: tuple[str, str, str], module: str = "lab_arms_hw", base: str = ROBOT_HW_BASE) -> PluginIndex:
         entries = "".join(CLASS.format(name=name, cls=cls, base=kind) for name, cls, kind in classes)
-        (tmp_path / "package.xml").write_text('<package><export><modular_framework_control plugin="${prefix}/p.xml"/>'
-                                              "</export></package>")
+        (tmp_path / "package.xml").write_text(
+            '<package><export><modular_framework_control plugin="${prefix}/p.xml"/></export></package>'
+        )
         (tmp_path / "p.xml").write_text(f'<library path="{module}">{entries}</library>')
         return PluginIndex(base, lambda: {"lab_arms": tmp_path, "nothing_here": tmp_path / "absent"})
 
@@ -53,8 +55,9 @@ def test_a_class_is_found_under_the_name_its_package_offers(lab: Callable[..., P
     assert isinstance(hardware, RobotHW) and type(hardware).__name__ == "LabArm"
 
 
-def test_an_unknown_name_is_answered_with_the_known_ones_and_the_faults(lab: Callable[..., PluginIndex],
-                                                                       tmp_path: Path) -> None:
+def test_an_unknown_name_is_answered_with_the_known_ones_and_the_faults(
+    lab: Callable[..., PluginIndex], tmp_path: Path
+) -> None:
     index = lab(("lab_arms/LabArm", "LabArm", ROBOT_HW_BASE))
     with pytest.raises(PluginError, match="'lab_arms/Leg'; known: lab_arms/LabArm. A package offers one by <export>"):
         index.load("lab_arms/Leg", RobotHW)
@@ -64,8 +67,9 @@ def test_an_unknown_name_is_answered_with_the_known_ones_and_the_faults(lab: Cal
         index.load("lab_arms/LabArm", RobotHW)
 
 
-def test_a_module_that_was_changed_is_imported_anew_after_a_reload(lab: Callable[..., PluginIndex],
-                                                                  tmp_path: Path) -> None:
+def test_a_module_that_was_changed_is_imported_anew_after_a_reload(
+    lab: Callable[..., PluginIndex], tmp_path: Path
+) -> None:
     index = lab(("lab_arms/Tool", "Tool", ROBOT_HW_BASE), module="lab_arms_tool")
     for length in ("short", "a good deal longer"):
         (tmp_path / "lab_arms_tool.py").write_text(f"{MODULE}\nclass Tool(RobotHW):\n    length = {length!r}\n")
@@ -74,14 +78,21 @@ def test_a_module_that_was_changed_is_imported_anew_after_a_reload(lab: Callable
         assert index.load("lab_arms/Tool", RobotHW) is index.load("lab_arms/Tool", RobotHW)
 
 
-@pytest.mark.parametrize(("cls", "module", "words"), [
-    ("Absent", "lab_arms_hw", "AttributeError"),
-    ("LabArm", "lab_arms_absent", "ModuleNotFoundError"),
-    ("NoArm", "lab_arms_hw", "is no RobotHW; derive it from "
-     "modular_framework_control.hardware_interface.robot_hw.RobotHW"),
-])
-def test_a_class_that_cannot_be_loaded_is_told_with_its_origin(lab: Callable[..., PluginIndex], cls: str, module: str,
-                                                               words: str) -> None:
+@pytest.mark.parametrize(
+    ("cls", "module", "words"),
+    [
+        ("Absent", "lab_arms_hw", "AttributeError"),
+        ("LabArm", "lab_arms_absent", "ModuleNotFoundError"),
+        (
+            "NoArm",
+            "lab_arms_hw",
+            "is no RobotHW; derive it from modular_framework_control.hardware_interface.robot_hw.RobotHW",
+        ),
+    ],
+)
+def test_a_class_that_cannot_be_loaded_is_told_with_its_origin(
+    lab: Callable[..., PluginIndex], cls: str, module: str, words: str
+) -> None:
     index = lab(("lab_arms/LabArm", cls, ROBOT_HW_BASE), module=module)
     with pytest.raises(PluginError, match=words) as caught:
         index.load("lab_arms/LabArm", RobotHW)
@@ -90,8 +101,10 @@ def test_a_class_that_cannot_be_loaded_is_told_with_its_origin(lab: Callable[...
 
 def test_all_faults_of_a_description_are_told_at_once(tmp_path: Path) -> None:
     path = tmp_path / "p.xml"
-    path.write_text('<plugins><library path="m"><class name="a/A"/><class name="B" type="B" base_class_type="c"/>'
-                    "</library></plugins>")
+    path.write_text(
+        '<plugins><library path="m"><class name="a/A"/><class name="B" type="B" base_class_type="c"/>'
+        "</library></plugins>"
+    )
     with pytest.raises(PluginError, match="'a/A': no type, base_class_type; class 'B': its name must have the form"):
         read_description(path)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The witnesses of `benchmarks/control_loop` tell when processors were away, and which cycles nobody could have run."""
+
 from __future__ import annotations
 
 import os

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One suite over every hardware: fake, simulated, a UR arm and an EZGripper against their emulators, and two as one."""
+
 from __future__ import annotations
 
 import threading
@@ -36,8 +37,13 @@ URDF = """<robot name="r">
 <joint name="elbow" type="continuous"><limit velocity="3" effort="10"/></joint></robot>"""
 SLIDE = """<robot name="r">
 <joint name="finger" type="prismatic"><limit lower="0" upper="0.04" velocity="0.2" effort="10"/></joint></robot>"""
-LIMITED = {"has_position_limits": True, "min_position": -1.0, "max_position": 1.0, "has_velocity_limits": True,
-           "max_velocity": 2.0}
+LIMITED = {
+    "has_position_limits": True,
+    "min_position": -1.0,
+    "max_position": 1.0,
+    "has_velocity_limits": True,
+    "max_velocity": 2.0,
+}
 KNUCKLE = {"has_velocity_limits": True, "max_velocity": 2.0}
 ROBOT = """<robot name="lab"><link name="base"/>
 {links}
@@ -58,9 +64,13 @@ class TestMock(RobotHWConformance):
 
     def make_robot_hw(self) -> MockRobotHW:
         robot_hw = MockRobotHW()
-        root = MappingNodeHandle({
-            "robot_description": URDF, "joint_limits": {"elbow": {**LIMITED, "max_velocity": 3.0}},
-            "hw": {"joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}}})
+        root = MappingNodeHandle(
+            {
+                "robot_description": URDF,
+                "joint_limits": {"elbow": {**LIMITED, "max_velocity": 3.0}},
+                "hw": {"joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
+            }
+        )
         assert robot_hw.init(root, root.child("hw"))
         return robot_hw
 
@@ -84,8 +94,9 @@ class TestPyBullet(RobotHWConformance):
     def make_robot_hw(self) -> PyBulletRobotHW:
         joints = (("lift", "prismatic"), ("turn", "revolute"))
         links = "".join(LINK.format(name=name, kind=kind) for name, kind in joints)
-        body = RobotBody(self._world, read_robot(ROBOT.format(links=links), no_packages, self._parts, False), "lab",
-                         Pose(), {})
+        body = RobotBody(
+            self._world, read_robot(ROBOT.format(links=links), no_packages, self._parts, False), "lab", Pose(), {}
+        )
         robot_hw = PyBulletRobotHW(body)
         assert robot_hw.init(MappingNodeHandle(), MappingNodeHandle())
         return robot_hw
@@ -167,11 +178,14 @@ class TestCombination(TestEzGripper):
 
     @classmethod
     def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
-        root = MappingNodeHandle({
-            "robot_hardware": ["arm", "hand"],
-            "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
-            "hand": {"type": "lab/Hand", **gripper},
-            "joint_limits": {**dict.fromkeys(("shoulder", "elbow"), LIMITED), JOINT: KNUCKLE}})
+        root = MappingNodeHandle(
+            {
+                "robot_hardware": ["arm", "hand"],
+                "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
+                "hand": {"type": "lab/Hand", **gripper},
+                "joint_limits": {**dict.fromkeys(("shoulder", "elbow"), LIMITED), JOINT: KNUCKLE},
+            }
+        )
         kinds: dict[str, type[RobotHW]] = {"lab/Mock": MockRobotHW, "lab/Hand": EzGripperRobotHW}
         robot_hw = CombinedRobotHW(lambda name: kinds[name]())
         assert robot_hw.init(root, root)
@@ -261,7 +275,8 @@ def failures(suite: RobotHWConformance) -> set[str]:
 def test_hardware_without_limits_fails() -> None:
     assert failures(LimitlessMock()) == {
         "test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows",
-        "test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them"}
+        "test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them",
+    }
 
 
 def test_hardware_whose_connection_belongs_to_one_thread_passes() -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of bases that steer like a car or with four wheels, in a loop with fake hardware, and their geometry."""
+
 from __future__ import annotations
 
 import math
@@ -36,9 +37,11 @@ ANGLES = st.floats(-1.2, 1.2)
 
 # ---- geometry of four wheels ----
 
+
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.0, 0.3))
-def test_the_motion_of_a_base_is_found_again_from_its_wheels(linear: float, lateral: float, angular: float,
-                                                            offset: float) -> None:
+def test_the_motion_of_a_base_is_found_again_from_its_wheels(
+    linear: float, lateral: float, angular: float, offset: float
+) -> None:
     assume(abs(linear) > 1e-3)
     geometry = FourWheelGeometry(TRACK, WHEEL_BASE, RADIUS, offset)
     found = geometry.twist(*geometry.wheels(PlanarTwist(linear, lateral, angular)))
@@ -68,8 +71,9 @@ def test_wheels_of_a_car_like_turn_stand_by_ackermanns_rule() -> None:
     angles, _ = GEOMETRY.wheels(GEOMETRY.twist_of_axles(1.0, 0.4, 0.0))
     half = TRACK / 2.0 - OFFSET
     radius = WHEEL_BASE / math.tan(0.4)
-    assert angles == pytest.approx([math.atan(WHEEL_BASE / (radius - half)), math.atan(WHEEL_BASE / (radius + half)),
-                                    0.0, 0.0])
+    assert angles == pytest.approx(
+        [math.atan(WHEEL_BASE / (radius - half)), math.atan(WHEEL_BASE / (radius + half)), 0.0, 0.0]
+    )
 
 
 def test_in_a_crab_walk_all_wheels_are_parallel_and_as_fast_as_the_base() -> None:
@@ -104,6 +108,7 @@ def test_the_angle_of_an_axle_is_between_those_of_its_wheels() -> None:
 
 # ---- controllers ----
 
+
 class Cart(RobotHW):
     """Wheels that turn as fast, and steering joints that stand, as they are commanded."""
 
@@ -111,10 +116,14 @@ class Cart(RobotHW):
         super().__init__()
         self.reason = ""
         states, velocities, positions = JointStateInterface(), VelocityJointInterface(), PositionJointInterface()
-        self.wheels = {name: velocities.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
-                       for name in wheels}
-        self.steerings = {name: positions.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
-                          for name in steerings}
+        self.wheels = {
+            name: velocities.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
+            for name in wheels
+        }
+        self.steerings = {
+            name: positions.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
+            for name in steerings
+        }
         for interface in (states, velocities, positions):
             self.register_interface(interface)
 
@@ -145,8 +154,10 @@ URDF = """<robot name="r"><link name="base"/>
 def car(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     def make(**more: Any) -> Any:
         parameters = {"type": "ackermann_steering_controller/AckermannSteeringController", **COMMON, **more}
-        loop = make_loop({"robot_description": parameters.pop("robot_description", URDF), "c": parameters},
-                         Cart(["rear_wheel_joint"], ["front_steer_joint"]))
+        loop = make_loop(
+            {"robot_description": parameters.pop("robot_description", URDF), "c": parameters},
+            Cart(["rear_wheel_joint"], ["front_steer_joint"]),
+        )
         loop.spawn("c")
         return loop
 
@@ -159,13 +170,23 @@ FOUR = ["front_left", "front_right", "rear_left", "rear_right"]
 @pytest.fixture
 def rover(make_loop: Callable[..., Any]) -> Callable[..., Any]:
     def make(**more: Any) -> Any:
-        parameters = {"type": "four_wheel_steering_controller/FourWheelSteeringController", **COMMON,
-                      "front_wheel": FOUR[:2], "rear_wheel": FOUR[2:], "track": TRACK, "wheel_base": WHEEL_BASE,
-                      "front_steering": ["s_" + name for name in FOUR[:2]],
-                      "rear_steering": ["s_" + name for name in FOUR[2:]],
-                      "wheel_radius": RADIUS, "wheel_steering_y_offset": OFFSET, **more}
-        loop = make_loop({"c": {key: value for key, value in parameters.items() if value is not None}},
-                         Cart(FOUR, ["s_" + name for name in FOUR]))
+        parameters = {
+            "type": "four_wheel_steering_controller/FourWheelSteeringController",
+            **COMMON,
+            "front_wheel": FOUR[:2],
+            "rear_wheel": FOUR[2:],
+            "track": TRACK,
+            "wheel_base": WHEEL_BASE,
+            "front_steering": ["s_" + name for name in FOUR[:2]],
+            "rear_steering": ["s_" + name for name in FOUR[2:]],
+            "wheel_radius": RADIUS,
+            "wheel_steering_y_offset": OFFSET,
+            **more,
+        }
+        loop = make_loop(
+            {"c": {key: value for key, value in parameters.items() if value is not None}},
+            Cart(FOUR, ["s_" + name for name in FOUR]),
+        )
         loop.spawn("c")
         return loop
 
@@ -183,17 +204,23 @@ def drive(loop: Any, command: Any, duration_s: float) -> Any:
 def test_a_car_drives_the_circle_of_its_steering_angle(car: Callable[..., Any], open_loop: bool) -> None:
     loop = car(open_loop=open_loop)
     pose = drive(loop, BaseVelocity(0.5, 0.3), 4.0)
-    radius = 0.4 / math.tan(0.3)    # axles 0.4 m apart by the description
+    radius = 0.4 / math.tan(0.3)  # axles 0.4 m apart by the description
     assert pose.heading == pytest.approx(0.5 * 4.0 / radius, abs=0.03)
-    assert (pose.x, pose.y) == pytest.approx((radius * math.sin(pose.heading), radius * (1 - math.cos(pose.heading))),
-                                             abs=1e-2)
+    assert (pose.x, pose.y) == pytest.approx(
+        (radius * math.sin(pose.heading), radius * (1 - math.cos(pose.heading))), abs=1e-2
+    )
     assert loop.robot_hw.wheels["rear_wheel_joint"].command == pytest.approx(0.5 / 0.11)
     assert (pose.linear, pose.angular) == pytest.approx((0.5, 0.5 / radius))
 
 
 def test_factors_of_a_car_take_part_in_commands_and_odometry(car: Callable[..., Any]) -> None:
-    loop = car(wheel_radius=0.2, wheel_radius_multiplier=0.5, wheel_separation_h=1.0, wheel_separation_h_multiplier=0.8,
-               steer_pos_multiplier=2.0)
+    loop = car(
+        wheel_radius=0.2,
+        wheel_radius_multiplier=0.5,
+        wheel_separation_h=1.0,
+        wheel_separation_h_multiplier=0.8,
+        steer_pos_multiplier=2.0,
+    )
     pose = drive(loop, BaseVelocity(0.5, 0.2), 1.0)
     assert loop.robot_hw.wheels["rear_wheel_joint"].command == pytest.approx(5.0)
     assert (pose.linear, pose.angular) == pytest.approx((0.5, 0.5 * math.tan(0.4) / 0.8))
@@ -228,8 +255,9 @@ def test_a_rover_asked_for_a_velocity_turns_with_both_axles(rover: Callable[...,
     assert steer[0] > steer[1] > 0.0, "the inner wheels steer more"
     assert pose.heading == pytest.approx(1.0, abs=0.02)
     assert (pose.linear, pose.lateral, pose.angular) == pytest.approx((0.5, 0.0, 0.25), abs=1e-9)
-    assert (pose.x, pose.y) == pytest.approx((2.0 * math.sin(pose.heading), 2.0 * (1 - math.cos(pose.heading))),
-                                             abs=1e-2)
+    assert (pose.x, pose.y) == pytest.approx(
+        (2.0 * math.sin(pose.heading), 2.0 * (1 - math.cos(pose.heading))), abs=1e-2
+    )
 
 
 def test_a_rover_asked_to_turn_on_the_spot_stands(rover: Callable[..., Any]) -> None:
@@ -287,7 +315,8 @@ def test_both_kinds_of_joints_are_claimed(rover: Callable[..., Any]) -> None:
     (report,) = rover().manager.list_controllers()
     assert {claim.hardware_interface: set(claim.resources) for claim in report.info.claimed_resources} == {
         "hardware_interface/VelocityJointInterface": set(FOUR),
-        "hardware_interface/PositionJointInterface": {"s_" + name for name in FOUR}}
+        "hardware_interface/PositionJointInterface": {"s_" + name for name in FOUR},
+    }
 
 
 def test_a_fault_of_the_hardware_leaves_the_steering_where_it_is(rover: Callable[..., Any]) -> None:
@@ -314,30 +343,42 @@ def test_a_rover_whose_wheels_are_not_known_comes_to_rest(rover: Callable[..., A
     assert (pose.x, pose.y, pose.heading) == before
 
 
-@pytest.mark.parametrize("command", [SteeringCommand(math.nan, 0.0, 0.0), SteeringCommand(0.1, math.inf, 0.0),
-                                     SteeringCommand(0.1, 0.0, math.nan)])
+@pytest.mark.parametrize(
+    "command",
+    [SteeringCommand(math.nan, 0.0, 0.0), SteeringCommand(0.1, math.inf, 0.0), SteeringCommand(0.1, 0.0, math.nan)],
+)
 def test_a_steering_command_that_is_not_finite_is_refused(rover: Callable[..., Any], command: SteeringCommand) -> None:
     with pytest.raises(ControllerError, match="expected finite numbers"):
         rover().controllers["c"].submit(command)
 
 
-@pytest.mark.parametrize(("parameters", "fault"), [
-    ({"front_wheel": FOUR[0]}, "front_wheel: got .*; expected two joints, the left one and the right one"),
-    ({"rear_steering": None}, "rear_steering: got None"),
-    ({"wheel_steering_y_offset": 0.6}, "wheel_steering_y_offset below half the track"),
-    ({"wheel_radius": 0.0}, "wheel_radius above 0"),
-    ({"track": None}, "robot_description is not set, and track is looked up there")])
+@pytest.mark.parametrize(
+    ("parameters", "fault"),
+    [
+        ({"front_wheel": FOUR[0]}, "front_wheel: got .*; expected two joints, the left one and the right one"),
+        ({"rear_steering": None}, "rear_steering: got None"),
+        ({"wheel_steering_y_offset": 0.6}, "wheel_steering_y_offset below half the track"),
+        ({"wheel_radius": 0.0}, "wheel_radius above 0"),
+        ({"track": None}, "robot_description is not set, and track is looked up there"),
+    ],
+)
 def test_a_rover_that_cannot_be_is_refused(rover: Callable[..., Any], parameters: dict[str, Any], fault: str) -> None:
     with pytest.raises(ControllerError, match=fault):
         rover(**parameters)
 
 
-@pytest.mark.parametrize(("parameters", "fault"), [
-    ({"front_steer": 3}, "front_steer: got 3; expected a joint's name"),
-    ({"rear_wheel": "front_steer_joint"}, "is not ahead of joint"),
-    ({"rear_wheel": "none"}, "there is no joint 'none'"),
-    ({"robot_description": URDF.replace('<cylinder radius="0.11" length="0.1"/>', '<sphere radius="0.11"/>')},
-     "wheel link 'w' is <sphere>; expected <cylinder>, whose radius")])
+@pytest.mark.parametrize(
+    ("parameters", "fault"),
+    [
+        ({"front_steer": 3}, "front_steer: got 3; expected a joint's name"),
+        ({"rear_wheel": "front_steer_joint"}, "is not ahead of joint"),
+        ({"rear_wheel": "none"}, "there is no joint 'none'"),
+        (
+            {"robot_description": URDF.replace('<cylinder radius="0.11" length="0.1"/>', '<sphere radius="0.11"/>')},
+            "wheel link 'w' is <sphere>; expected <cylinder>, whose radius",
+        ),
+    ],
+)
 def test_a_car_that_cannot_be_is_refused(car: Callable[..., Any], parameters: dict[str, Any], fault: str) -> None:
     with pytest.raises(ControllerError, match=fault):
         car(**parameters)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The curves between trajectory points, against SciPy, and what is wrong with a trajectory."""
+
 from __future__ import annotations
 
 import math
@@ -32,9 +33,13 @@ def random_states(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 def trajectory_of(times: np.ndarray, states: np.ndarray, rows: int) -> JointTrajectory:
     """Points giving the first `rows` of position, velocity and acceleration."""
-    return JointTrajectory(NAMES, tuple(
-        TrajectoryPoint(float(time_s), *(tuple(state[row]) for row in range(rows)))
-        for time_s, state in zip(times, states, strict=True)))
+    return JointTrajectory(
+        NAMES,
+        tuple(
+            TrajectoryPoint(float(time_s), *(tuple(state[row]) for row in range(rows)))
+            for time_s, state in zip(times, states, strict=True)
+        ),
+    )
 
 
 def track_of(trajectory: JointTrajectory, start: np.ndarray) -> Track:
@@ -120,16 +125,28 @@ def test_a_track_without_some_joints_keeps_the_others() -> None:
 
 
 def test_all_faults_of_a_trajectory_are_listed() -> None:
-    trajectory = JointTrajectory(("a", "b"), (
-        TrajectoryPoint(-math.inf, (0.0, math.nan)), TrajectoryPoint(1.0, (0.0,)),
-        TrajectoryPoint(1.0, (0.0, 0.0), (1.0,)), TrajectoryPoint(2.0, (), (), (1.0, -math.inf))), math.inf)
+    trajectory = JointTrajectory(
+        ("a", "b"),
+        (
+            TrajectoryPoint(-math.inf, (0.0, math.nan)),
+            TrajectoryPoint(1.0, (0.0,)),
+            TrajectoryPoint(1.0, (0.0, 0.0), (1.0,)),
+            TrajectoryPoint(2.0, (), (), (1.0, -math.inf)),
+        ),
+        math.inf,
+    )
     with pytest.raises(InvalidTrajectoryError) as caught:
         check_points(trajectory)
-    for words in ("point 0: position of joint 'b' (index 1) is nan; expected a finite number",
-                  "point 0: time_from_start is -inf s; expected a time", "point 1: has 1 positions; expected 2",
-                  "point 2: has 1 velocities; expected 2 or none", "point 3: has 0 positions; expected 2",
-                  "point 2: time_from_start 1 s does not come after 1 s of point 1",
-                  "point 3: acceleration of joint 'b' (index 1) is -inf", "header stamp is inf"):
+    for words in (
+        "point 0: position of joint 'b' (index 1) is nan; expected a finite number",
+        "point 0: time_from_start is -inf s; expected a time",
+        "point 1: has 1 positions; expected 2",
+        "point 2: has 1 velocities; expected 2 or none",
+        "point 3: has 0 positions; expected 2",
+        "point 2: time_from_start 1 s does not come after 1 s of point 1",
+        "point 3: acceleration of joint 'b' (index 1) is -inf",
+        "header stamp is inf",
+    ):
         assert words in str(caught.value)
 
 
@@ -142,6 +159,9 @@ def test_of_very_many_faults_the_first_are_told_and_the_others_counted() -> None
 def test_values_so_large_that_the_curve_would_not_be_finite_are_refused() -> None:
     with pytest.raises(InvalidTrajectoryError, match=r"position of joint 'a' \(index 0\) is 2e\+09; expected"):
         check_points(JointTrajectory(("a",), (TrajectoryPoint(1.0, (2e9,)),)))
-    largest = Spline(JointTrajectory(("a",), (TrajectoryPoint(0.0, (1e9,), (1e9,), (1e9,)),
-                                              TrajectoryPoint(1e-9, (-1e9,), (-1e9,), (-1e9,)))))
+    largest = Spline(
+        JointTrajectory(
+            ("a",), (TrajectoryPoint(0.0, (1e9,), (1e9,), (1e9,)), TrajectoryPoint(1e-9, (-1e9,), (-1e9,), (-1e9,)))
+        )
+    )
     assert np.isfinite(largest.coefficients).all()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Transmissions between actuators and joints: formulas, the robot description, and hardware that has them."""
+
 from __future__ import annotations
 
 import math
@@ -37,54 +38,107 @@ PAIRS = st.tuples(REDUCTIONS, REDUCTIONS)
 TRANSMISSIONS = st.one_of(
     st.builds(SimpleTransmission, REDUCTIONS, NUMBERS),
     st.builds(DifferentialTransmission, PAIRS, PAIRS, st.tuples(NUMBERS, NUMBERS)),
-    st.builds(FourBarLinkageTransmission, PAIRS, PAIRS, st.tuples(NUMBERS, NUMBERS)))
+    st.builds(FourBarLinkageTransmission, PAIRS, PAIRS, st.tuples(NUMBERS, NUMBERS)),
+)
 
 
 @given(TRANSMISSIONS, st.tuples(NUMBERS, NUMBERS))
-def test_the_way_to_the_actuators_is_the_inverse_of_the_way_to_the_joints(transmission: Transmission,
-                                                                         values: tuple[float, float]) -> None:
-    joints = values[:transmission.size]
-    for there, back in ((transmission.actuator_positions, transmission.joint_positions),
-                        (transmission.actuator_velocities, transmission.joint_velocities),
-                        (transmission.actuator_efforts, transmission.joint_efforts)):
+def test_the_way_to_the_actuators_is_the_inverse_of_the_way_to_the_joints(
+    transmission: Transmission, values: tuple[float, float]
+) -> None:
+    joints = values[: transmission.size]
+    for there, back in (
+        (transmission.actuator_positions, transmission.joint_positions),
+        (transmission.actuator_velocities, transmission.joint_velocities),
+        (transmission.actuator_efforts, transmission.joint_efforts),
+    ):
         assert back(there(joints)) == pytest.approx(joints, rel=1e-6, abs=1e-6)
 
 
-@given(st.one_of(st.builds(SimpleTransmission, REDUCTIONS), st.builds(DifferentialTransmission, PAIRS, PAIRS)),
-       st.tuples(NUMBERS, NUMBERS), st.tuples(NUMBERS, NUMBERS))
-def test_no_power_is_lost_in_gears_and_differentials(transmission: Transmission, velocities: tuple[float, float],
-                                                     efforts: tuple[float, float]) -> None:
-    speeds, pushes = velocities[:transmission.size], efforts[:transmission.size]
+@given(
+    st.one_of(st.builds(SimpleTransmission, REDUCTIONS), st.builds(DifferentialTransmission, PAIRS, PAIRS)),
+    st.tuples(NUMBERS, NUMBERS),
+    st.tuples(NUMBERS, NUMBERS),
+)
+def test_no_power_is_lost_in_gears_and_differentials(
+    transmission: Transmission, velocities: tuple[float, float], efforts: tuple[float, float]
+) -> None:
+    speeds, pushes = velocities[: transmission.size], efforts[: transmission.size]
     taken = sum(v * e for v, e in zip(speeds, pushes, strict=True))
-    given_ = sum(v * e for v, e in zip(transmission.joint_velocities(speeds), transmission.joint_efforts(pushes),
-                                       strict=True))
+    given_ = sum(
+        v * e for v, e in zip(transmission.joint_velocities(speeds), transmission.joint_efforts(pushes), strict=True)
+    )
     assert given_ == pytest.approx(taken, rel=1e-6, abs=1e-3)
 
 
-@pytest.mark.parametrize(("transmission", "inputs", "positions", "velocities", "efforts"), [
-    # the values of transmission_interface's own tests
-    (SimpleTransmission(10.0, 1.0), ((1.0,), (1.0,), (1.0,)), (1.1,), (0.1,), (10.0,)),
-    (DifferentialTransmission((10.0, 10.0), (2.0, 2.0), (1.0, 1.0)), ((0.0, 0.0),) * 3, (1.0, 1.0), (0.0, 0.0),
-     (0.0, 0.0)),
-    (DifferentialTransmission((10.0, 10.0), (2.0, 2.0)), ((10.0, 10.0),) * 3, (0.5, 0.0), (0.5, 0.0), (400.0, 0.0)),
-    (DifferentialTransmission((10.0, 10.0), (2.0, 2.0)), ((10.0, -10.0),) * 3, (0.0, 0.5), (0.0, 0.5), (0.0, 400.0)),
-    (DifferentialTransmission((10.0, -20.0), (-2.0, 4.0), (-2.0, 4.0)), ((3.0, 5.0),) * 3, (-2.0125, 4.06875),
-     (-0.0125, 0.06875), (140.0, 520.0)),
-    (FourBarLinkageTransmission((10.0, 10.0), (2.0, 2.0)), ((10.0, 5.0), (10.0, 5.0), (5.0, 10.0)), (0.5, 0.0),
-     (0.5, 0.0), (100.0, 0.0)),
-    (FourBarLinkageTransmission((10.0, 10.0), (2.0, 2.0)), ((0.0, 10.0),) * 3, (0.0, 0.5), (0.0, 0.5), (0.0, 200.0)),
-    (FourBarLinkageTransmission((10.0, -20.0), (-2.0, 4.0), (-2.0, 4.0)), ((3.0, 5.0),) * 3, (-2.15, 3.975),
-     (-0.15, -0.025), (-60.0, -160.0))])
-def test_joints_move_as_in_ros_control(transmission: Transmission, inputs: Any, positions: Any, velocities: Any,
-                                       efforts: Any) -> None:
+@pytest.mark.parametrize(
+    ("transmission", "inputs", "positions", "velocities", "efforts"),
+    [
+        # the values of transmission_interface's own tests
+        (SimpleTransmission(10.0, 1.0), ((1.0,), (1.0,), (1.0,)), (1.1,), (0.1,), (10.0,)),
+        (
+            DifferentialTransmission((10.0, 10.0), (2.0, 2.0), (1.0, 1.0)),
+            ((0.0, 0.0),) * 3,
+            (1.0, 1.0),
+            (0.0, 0.0),
+            (0.0, 0.0),
+        ),
+        (DifferentialTransmission((10.0, 10.0), (2.0, 2.0)), ((10.0, 10.0),) * 3, (0.5, 0.0), (0.5, 0.0), (400.0, 0.0)),
+        (
+            DifferentialTransmission((10.0, 10.0), (2.0, 2.0)),
+            ((10.0, -10.0),) * 3,
+            (0.0, 0.5),
+            (0.0, 0.5),
+            (0.0, 400.0),
+        ),
+        (
+            DifferentialTransmission((10.0, -20.0), (-2.0, 4.0), (-2.0, 4.0)),
+            ((3.0, 5.0),) * 3,
+            (-2.0125, 4.06875),
+            (-0.0125, 0.06875),
+            (140.0, 520.0),
+        ),
+        (
+            FourBarLinkageTransmission((10.0, 10.0), (2.0, 2.0)),
+            ((10.0, 5.0), (10.0, 5.0), (5.0, 10.0)),
+            (0.5, 0.0),
+            (0.5, 0.0),
+            (100.0, 0.0),
+        ),
+        (
+            FourBarLinkageTransmission((10.0, 10.0), (2.0, 2.0)),
+            ((0.0, 10.0),) * 3,
+            (0.0, 0.5),
+            (0.0, 0.5),
+            (0.0, 200.0),
+        ),
+        (
+            FourBarLinkageTransmission((10.0, -20.0), (-2.0, 4.0), (-2.0, 4.0)),
+            ((3.0, 5.0),) * 3,
+            (-2.15, 3.975),
+            (-0.15, -0.025),
+            (-60.0, -160.0),
+        ),
+    ],
+)
+def test_joints_move_as_in_ros_control(
+    transmission: Transmission, inputs: Any, positions: Any, velocities: Any, efforts: Any
+) -> None:
     assert transmission.joint_positions(inputs[0]) == pytest.approx(positions)
     assert transmission.joint_velocities(inputs[1]) == pytest.approx(velocities)
     assert transmission.joint_efforts(inputs[2]) == pytest.approx(efforts)
 
 
-@pytest.mark.parametrize("make", [
-    lambda: SimpleTransmission(0.0), lambda: SimpleTransmission(math.nan), lambda: SimpleTransmission(1.0, math.inf),
-    lambda: DifferentialTransmission((1.0, 0.0)), lambda: FourBarLinkageTransmission((1.0, 1.0), (0.0, 1.0))])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: SimpleTransmission(0.0),
+        lambda: SimpleTransmission(math.nan),
+        lambda: SimpleTransmission(1.0, math.inf),
+        lambda: DifferentialTransmission((1.0, 0.0)),
+        lambda: FourBarLinkageTransmission((1.0, 1.0), (0.0, 1.0)),
+    ],
+)
 def test_ratios_of_nothing_are_refused(make: Callable[[], Transmission]) -> None:
     with pytest.raises(TransmissionError, match="expected numbers"):
         make()
@@ -123,8 +177,13 @@ def robot(*transmissions: str) -> str:
     return head + "\n".join(transmissions) + "</robot>"
 
 
-@pytest.mark.parametrize(("kind", "expected"), [("DifferentialTransmission", DifferentialTransmission),
-                                                ("FourBarLinkageTransmission", FourBarLinkageTransmission)])
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        ("DifferentialTransmission", DifferentialTransmission),
+        ("FourBarLinkageTransmission", FourBarLinkageTransmission),
+    ],
+)
 def test_roles_say_which_joint_and_actuator_is_which(kind: str, expected: Any) -> None:
     (info,) = read_transmissions(robot(pair(kind)))
     assert info.transmission == expected((50.0, -50.0), (2.0, 1.0), (0.0, -0.5))
@@ -137,32 +196,49 @@ def test_a_simple_transmission_has_one_of_each() -> None:
     assert info.transmission == SimpleTransmission(50.0, 0.5)
 
 
-TWICE = 'transmission_interface/SimpleTransmission has 1'
+TWICE = "transmission_interface/SimpleTransmission has 1"
 
 
-@pytest.mark.parametrize(("text", "fault"), [
-    (simple().replace(' name="t"', ""), r"robot_description:3: <transmission> has no name"),
-    (simple().replace("SimpleTransmission", "WormDrive"),
-     r":3: transmission 't': <type> is 'transmission_interface/WormDrive'; allowed: .*FourBarLinkageTransmission"),
-    (simple().replace("<type>transmission_interface/SimpleTransmission</type>", ""), "it has no <type>; allowed"),
-    (simple().replace("<joint", "<joint name='x'/><joint", 1), f"it has 2 <joint>; {TWICE}"),
-    (simple().replace('<actuator name="m"', "<actuator"), r":8: transmission 't': <actuator> has no name"),
-    (simple().replace("50", "fifty"), r":8: .*<mechanicalReduction> of actuator 'm' is 'fifty'; expected a number "
-     "other than 0"),
-    (simple().replace("50", "0"), "is '0'; expected a number other than 0"),
-    (simple().replace("<mechanicalReduction>50</mechanicalReduction>", ""),
-     "<mechanicalReduction> of actuator 'm' is missing"),
-    (simple().replace("0.5", "zero"), r":6: .*<offset> of joint 'j' is 'zero'; expected a number$"),
-    (simple(interface="lab/Tea"), r":6: .*<hardwareInterface> of joint 'j' is 'lab/Tea'; allowed: .*Velocity"),
-    (simple().replace(f"<hardwareInterface>{POSITION}</hardwareInterface>", ""), "is missing; give one of"),
-    (simple() + simple("u", "j", "n"), r":9: transmission 'u': joint 'j' is named by another transmission too"),
-    (simple() + simple("t", "k", "m"), "transmission 't' is named by another.*actuator 'm' is named by another"),
-    (pair("DifferentialTransmission", ("joint1", "joint1", "actuator1", "actuator2")),
-     r"the roles of its <joint> are 'joint1', 'joint1'; expected <role>joint1</role> in one and <role>joint2</role>"),
-    (pair("FourBarLinkageTransmission", ("joint1", "joint2", "", "actuator2")), "<actuator> are '', 'actuator2'"),
-    (pair("DifferentialTransmission").replace(">PositionJoint", ">EffortJoint"), "different hardware interfaces"),
-    (simple().replace("50", "x") + pair("DifferentialTransmission").replace(">2<", ">0<"),
-     "actuator 'm' is 'x'.*joint 'pitch' is '0'")])
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        (simple().replace(' name="t"', ""), r"robot_description:3: <transmission> has no name"),
+        (
+            simple().replace("SimpleTransmission", "WormDrive"),
+            r":3: transmission 't': <type> is 'transmission_interface/WormDrive'; "
+            r"allowed: .*FourBarLinkageTransmission",
+        ),
+        (simple().replace("<type>transmission_interface/SimpleTransmission</type>", ""), "it has no <type>; allowed"),
+        (simple().replace("<joint", "<joint name='x'/><joint", 1), f"it has 2 <joint>; {TWICE}"),
+        (simple().replace('<actuator name="m"', "<actuator"), r":8: transmission 't': <actuator> has no name"),
+        (
+            simple().replace("50", "fifty"),
+            r":8: .*<mechanicalReduction> of actuator 'm' is 'fifty'; expected a number "
+            "other than 0",
+        ),
+        (simple().replace("50", "0"), "is '0'; expected a number other than 0"),
+        (
+            simple().replace("<mechanicalReduction>50</mechanicalReduction>", ""),
+            "<mechanicalReduction> of actuator 'm' is missing",
+        ),
+        (simple().replace("0.5", "zero"), r":6: .*<offset> of joint 'j' is 'zero'; expected a number$"),
+        (simple(interface="lab/Tea"), r":6: .*<hardwareInterface> of joint 'j' is 'lab/Tea'; allowed: .*Velocity"),
+        (simple().replace(f"<hardwareInterface>{POSITION}</hardwareInterface>", ""), "is missing; give one of"),
+        (simple() + simple("u", "j", "n"), r":9: transmission 'u': joint 'j' is named by another transmission too"),
+        (simple() + simple("t", "k", "m"), "transmission 't' is named by another.*actuator 'm' is named by another"),
+        (
+            pair("DifferentialTransmission", ("joint1", "joint1", "actuator1", "actuator2")),
+            r"the roles of its <joint> are 'joint1', 'joint1'; "
+            r"expected <role>joint1</role> in one and <role>joint2</role>",
+        ),
+        (pair("FourBarLinkageTransmission", ("joint1", "joint2", "", "actuator2")), "<actuator> are '', 'actuator2'"),
+        (pair("DifferentialTransmission").replace(">PositionJoint", ">EffortJoint"), "different hardware interfaces"),
+        (
+            simple().replace("50", "x") + pair("DifferentialTransmission").replace(">2<", ">0<"),
+            "actuator 'm' is 'x'.*joint 'pitch' is '0'",
+        ),
+    ],
+)
 def test_a_fault_of_a_transmission_is_reported_with_its_line_and_what_is_allowed(text: str, fault: str) -> None:
     with pytest.raises(TransmissionError, match=fault):
         read_transmissions(robot(text))
@@ -179,12 +255,15 @@ def test_a_description_with_a_doctype_is_refused_before_its_entities_are_read() 
 
 
 def test_limits_are_found_in_a_description_with_a_default_namespace() -> None:
-    limits = limits_from_urdf('<robot name="r" xmlns="http://www.ros.org"><joint name="a" type="revolute">'
-                              '<limit lower="-1" upper="2" velocity="3" effort="4"/></joint></robot>')
+    limits = limits_from_urdf(
+        '<robot name="r" xmlns="http://www.ros.org"><joint name="a" type="revolute">'
+        '<limit lower="-1" upper="2" velocity="3" effort="4"/></joint></robot>'
+    )
     assert (limits["a"].min_position, limits["a"].max_velocity) == (-1.0, 3.0)
 
 
 # ---- hardware ----
+
 
 class Motors(RobotHW):
     """Motors that are at once where they are commanded."""
@@ -208,9 +287,13 @@ class Motors(RobotHW):
 
 
 def test_a_controller_moves_joints_through_their_transmission(make_loop: Callable[..., Any]) -> None:
-    loop = make_loop({"robot_description": robot(pair("FourBarLinkageTransmission")),
-                      "c": {"type": "position_controllers/JointGroupPositionController", "joints": ["roll", "pitch"]}},
-                     Motors())
+    loop = make_loop(
+        {
+            "robot_description": robot(pair("FourBarLinkageTransmission")),
+            "c": {"type": "position_controllers/JointGroupPositionController", "joints": ["roll", "pitch"]},
+        },
+        Motors(),
+    )
     motors = loop.robot_hw.transmissions.actuators
     loop.step(3)
     assert (motors["m1"].position, motors["m2"].position) == pytest.approx((10.0, 20.0)), "nothing moves by itself"
@@ -223,9 +306,14 @@ def test_a_controller_moves_joints_through_their_transmission(make_loop: Callabl
 
 
 def test_each_interface_of_a_joint_has_its_command_of_the_actuator() -> None:
-    hardware, text = Motors(), simple(actuator="m1").replace(
-        "</joint>", "<hardwareInterface>VelocityJointInterface</hardwareInterface>"
-        "<hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>")
+    hardware, text = (
+        Motors(),
+        simple(actuator="m1").replace(
+            "</joint>",
+            "<hardwareInterface>VelocityJointInterface</hardwareInterface>"
+            "<hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>",
+        ),
+    )
     hardware.names = ["m1"]
     states = JointStateInterface()
     states.register_handle(JointStateHandle("other"))
@@ -245,13 +333,19 @@ def test_each_interface_of_a_joint_has_its_command_of_the_actuator() -> None:
     assert states.names == ["other", "j"]
 
 
-@pytest.mark.parametrize(("actuators", "description", "fault"), [
-    (["m1"], robot(pair("DifferentialTransmission")),
-     r":3: transmission 'wrist': actuator 'm2' is not there; this hardware has: m1"),
-    (["m", "spare"], robot(simple()), "actuator 'spare' has no <transmission>; actuators that have one: m$"),
-    (["m"], None, "robot_description is not set")])
-def test_actuators_and_description_must_fit_together(actuators: list[str], description: str | None,
-                                                     fault: str) -> None:
+@pytest.mark.parametrize(
+    ("actuators", "description", "fault"),
+    [
+        (
+            ["m1"],
+            robot(pair("DifferentialTransmission")),
+            r":3: transmission 'wrist': actuator 'm2' is not there; this hardware has: m1",
+        ),
+        (["m", "spare"], robot(simple()), "actuator 'spare' has no <transmission>; actuators that have one: m$"),
+        (["m"], None, "robot_description is not set"),
+    ],
+)
+def test_actuators_and_description_must_fit_together(actuators: list[str], description: str | None, fault: str) -> None:
     parameters = {} if description is None else {"robot_description": description}
     with pytest.raises((TransmissionError, ParameterError), match=fault):
         RobotTransmissions(RobotHW(), MappingNodeHandle(parameters), actuators)
@@ -259,6 +353,7 @@ def test_actuators_and_description_must_fit_together(actuators: list[str], descr
 
 def test_transmissions_of_other_hardware_are_left_to_it() -> None:
     hardware = RobotHW()
-    RobotTransmissions(hardware, MappingNodeHandle({"robot_description": robot(
-        simple(), pair("DifferentialTransmission"))}), ["m"])
+    RobotTransmissions(
+        hardware, MappingNodeHandle({"robot_description": robot(simple(), pair("DifferentialTransmission"))}), ["m"]
+    )
     assert hardware.get(PositionJointInterface).names == ["j"]

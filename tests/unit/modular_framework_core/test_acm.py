@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The allowed collision matrix: only the pairs that were asked for change, and forbidding restores the reference."""
+
 from __future__ import annotations
 
 import pytest
@@ -27,8 +28,12 @@ def manager() -> AcmManager:
 
 
 def test_without_a_reference_every_question_is_refused() -> None:
-    for ask in (AcmManager().current, AcmManager().reinitialise, lambda: AcmManager().allow_self_collision(True),
-                lambda: AcmManager().allow_object_collision([], True)):
+    for ask in (
+        AcmManager().current,
+        AcmManager().reinitialise,
+        lambda: AcmManager().allow_self_collision(True),
+        lambda: AcmManager().allow_object_collision([], True),
+    ):
         with pytest.raises(AcmError, match="set_init_acm"):
             ask()
 
@@ -132,8 +137,14 @@ def test_wrong_indices_and_matrices_are_refused() -> None:
         manager().add_object("")
 
 
-@given(st.lists(st.tuples(st.sampled_from(["add", "delete", "allow", "forbid", "self", "reinit"]),
-                          st.sampled_from(["a", "b", "c__d"])), max_size=25))
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["add", "delete", "allow", "forbid", "self", "reinit"]), st.sampled_from(["a", "b", "c__d"])
+        ),
+        max_size=25,
+    )
+)
 def test_after_any_history_the_matrix_is_square_symmetric_and_forbidding_restores_it(history) -> None:
     made = manager()
     objects: set[str] = set()
@@ -173,8 +184,10 @@ def test_any_links_may_be_chosen_instead_of_the_manipulators() -> None:
 
 
 def test_links_that_are_not_there_are_named_with_those_that_are() -> None:
-    for ask in (lambda: manager().allow_self_collision(True, ["plam"]),
-                lambda: manager().allow_object_collision([], True, ["plam"])):
+    for ask in (
+        lambda: manager().allow_self_collision(True, ["plam"]),
+        lambda: manager().allow_object_collision([], True, ["plam"]),
+    ):
         with pytest.raises(AcmError, match="no link 'plam'; it has base, arm, palm.*did you mean 'palm'"):
             ask()
 

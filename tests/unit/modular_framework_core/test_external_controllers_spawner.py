@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A manipulator whose hardware brings the action server needs no node of its own: the launch goes on without one."""
+
 from __future__ import annotations
 
 import pytest

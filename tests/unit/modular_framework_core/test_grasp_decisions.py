@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the grasp server makes of a command, and when it says that a stage was reached."""
+
 from __future__ import annotations
 
 import pytest
@@ -48,8 +49,9 @@ def test_groups_hold_their_active_joints_in_order_and_know_their_tip() -> None:
     assert read_joints(URDF)["b"].upper == float("inf")
 
 
-@pytest.mark.parametrize(("group", "hint"), [("nothing", "no planning group 'nothing'.*arm"), ("odd", "zz"),
-                                             ("loop", "contains itself")])
+@pytest.mark.parametrize(
+    ("group", "hint"), [("nothing", "no planning group 'nothing'.*arm"), ("odd", "zz"), ("loop", "contains itself")]
+)
 def test_a_wrong_group_is_named(group: str, hint: str) -> None:
     with pytest.raises(RobotModelError, match=hint):
         read_group(URDF, SRDF, group)
@@ -62,10 +64,18 @@ def test_a_description_that_is_no_xml_is_named() -> None:
         read_group(URDF, SRDF.replace('tip_link="palm"', 'tip_link="moon"'), "arm")
 
 
-@pytest.mark.parametrize(("names", "positions", "hint"), [
-    ([], [], "at least one"), (["f"], [], "as many"), (["f", "f"], [0.1, 0.1], "twice"),
-    (["a"], [0.1], "no active joint"),
-    (["g"], [0.1], "no active joint"), (["f"], [2.5], "limits"), (["f"], [float("nan")], "limits")])
+@pytest.mark.parametrize(
+    ("names", "positions", "hint"),
+    [
+        ([], [], "at least one"),
+        (["f"], [], "as many"),
+        (["f", "f"], [0.1, 0.1], "twice"),
+        (["a"], [0.1], "no active joint"),
+        (["g"], [0.1], "no active joint"),
+        (["f"], [2.5], "limits"),
+        (["f"], [float("nan")], "limits"),
+    ],
+)
 def test_a_posture_that_does_not_fit_the_hand_is_refused(names: list[str], positions: list[float], hint: str) -> None:
     with pytest.raises(GraspCommandError, match=hint):
         posture_targets(names, positions, HAND)
@@ -101,12 +111,21 @@ def test_a_greatest_torque_that_is_no_positive_number_is_refused(torque: float) 
         torque_share(torque, 800.0)
 
 
-@pytest.mark.parametrize(("names", "values", "hint"), [
-    (["f"], [1.0, 1.0], "1 joint names and 2 values"), ([], [1.0], "0 joint names and 1 values"),
-    (["f", "f"], [1.0, 1.0], "twice"), (["x"], [1.0], "no active joint"), (["f"], [1.5], "is 1.5, allowed is -1 to 1"),
-    (["f"], [float("nan")], "is nan, allowed is -1 to 1"), (["f"], [float("inf")], "is inf")])
-def test_torque_intensities_that_do_not_fit_the_hand_are_refused(names: list[str], values: list[float],
-                                                                 hint: str) -> None:
+@pytest.mark.parametrize(
+    ("names", "values", "hint"),
+    [
+        (["f"], [1.0, 1.0], "1 joint names and 2 values"),
+        ([], [1.0], "0 joint names and 1 values"),
+        (["f", "f"], [1.0, 1.0], "twice"),
+        (["x"], [1.0], "no active joint"),
+        (["f"], [1.5], "is 1.5, allowed is -1 to 1"),
+        (["f"], [float("nan")], "is nan, allowed is -1 to 1"),
+        (["f"], [float("inf")], "is inf"),
+    ],
+)
+def test_torque_intensities_that_do_not_fit_the_hand_are_refused(
+    names: list[str], values: list[float], hint: str
+) -> None:
     with pytest.raises(GraspCommandError, match=hint):
         torque_intensities(names, values, HAND)
 
@@ -130,17 +149,31 @@ def held_at(position: float) -> StallEvidence:
     return evidence
 
 
-@pytest.mark.parametrize(("outcome", "begun", "evidence"), [
-    (STALL, 0.38, StallEvidence(0.05)), (Outcome({"f": 0.4}, True, pressing=True), 0.4, StallEvidence(0.05)),
-    (STALL, 0.4, held_at(0.41))])
-def test_fingers_that_moved_or_press_or_go_on_holding_were_stopped_by_something(outcome: Outcome, begun: float,
-                                                                                 evidence: StallEvidence) -> None:
+@pytest.mark.parametrize(
+    ("outcome", "begun", "evidence"),
+    [
+        (STALL, 0.38, StallEvidence(0.05)),
+        (Outcome({"f": 0.4}, True, pressing=True), 0.4, StallEvidence(0.05)),
+        (STALL, 0.4, held_at(0.41)),
+    ],
+)
+def test_fingers_that_moved_or_press_or_go_on_holding_were_stopped_by_something(
+    outcome: Outcome, begun: float, evidence: StallEvidence
+) -> None:
     assert evidence.judge(outcome, close({"f": begun})) is outcome
 
 
-@pytest.mark.parametrize(("begun", "evidence"), [
-    ({"f": 0.4}, StallEvidence(0.05)), ({"f": 0.395}, StallEvidence(0.05)), ({"f": 0.8}, StallEvidence(0.05)),
-    ({}, StallEvidence(0.05)), ({"f": 0.4}, held_at(0.6)), ({}, held_at(0.4))])
+@pytest.mark.parametrize(
+    ("begun", "evidence"),
+    [
+        ({"f": 0.4}, StallEvidence(0.05)),
+        ({"f": 0.395}, StallEvidence(0.05)),
+        ({"f": 0.8}, StallEvidence(0.05)),
+        ({}, StallEvidence(0.05)),
+        ({"f": 0.4}, held_at(0.6)),
+        ({}, held_at(0.4)),
+    ],
+)
 def test_fingers_that_never_moved_hold_nothing(begun: dict[str, float], evidence: StallEvidence) -> None:
     outcome = evidence.judge(STALL, close(begun))
     verdict = judge(Stage.GRASP, {"f": 1.94}, outcome, CLOSED, 0.05)
@@ -148,14 +181,20 @@ def test_fingers_that_never_moved_hold_nothing(begun: dict[str, float], evidence
     assert "have not moved" in verdict.reason and "so said the controller" in verdict.reason
 
 
-@pytest.mark.parametrize(("earlier", "effort", "stopped"), [
-    (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.5, True), (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), None, True),
-    (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.4, False),   # less than what moved them
-    (Attempt({"f": 0.0}, {"f": 0.4}, {}), 0.5, False),           # moved by whatever the controller gave
-    (Attempt({"f": 0.9}, {"f": 0.4}, {"f": 0.5}), 0.5, False),   # moved the other way
-    (Attempt({"f": 0.399}, {"f": 0.4}, {"f": 0.5}), 0.5, False)])
+@pytest.mark.parametrize(
+    ("earlier", "effort", "stopped"),
+    [
+        (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.5, True),
+        (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), None, True),
+        (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.4, False),  # less than what moved them
+        (Attempt({"f": 0.0}, {"f": 0.4}, {}), 0.5, False),  # moved by whatever the controller gave
+        (Attempt({"f": 0.9}, {"f": 0.4}, {"f": 0.5}), 0.5, False),  # moved the other way
+        (Attempt({"f": 0.399}, {"f": 0.4}, {"f": 0.5}), 0.5, False),
+    ],
+)
 def test_fingers_that_touch_an_object_from_the_beginning_grasp_it_with_a_torque_that_moved_them(
-        earlier: Attempt, effort: float | None, stopped: bool) -> None:
+    earlier: Attempt, effort: float | None, stopped: bool
+) -> None:
     evidence = StallEvidence(0.05)
     evidence.judge(Outcome({"f": 0.4}, False), earlier)
     assert evidence.judge(STALL, close({"f": 0.4}, effort)).stalled is stopped
@@ -167,16 +206,25 @@ def test_of_several_joints_one_that_is_short_of_its_target_must_have_moved() -> 
         assert StallEvidence(0.05).judge(outcome, Attempt(begun, targets, {})).stalled is stopped
 
 
-@pytest.mark.parametrize(("stage", "target", "position", "stalled", "reached", "why"), [
-    (Stage.PREGRASP, 0.5, 0.51, False, True, "reached"), (Stage.PREGRASP, 0.0, 0.4, False, False, "'f' is 0.4"),
-    (Stage.PREGRASP, 0.5, 0.9, True, False, "away"), (Stage.GRASP, 1.94, 1.2, True, True, "stopped on something"),
-    (Stage.GRASP, 1.94, 1.93, False, False, "without anything"),
-    (Stage.GRASP, 1.94, 1.92, True, False, "without anything"),
-    (Stage.GRASP, 1.2, 1.21, False, True, "reached"), (Stage.GRASP, 1.94, 1.2, False, False, "away"),
-    (Stage.POSTGRASP, 1.94, 1.2, True, True, "still"), (Stage.POSTGRASP, 1.2, 1.2, False, True, "reached"),
-    (Stage.POSTGRASP, 1.94, 0.3, False, False, "away")])
-def test_a_stage_is_reached_only_when_the_fingers_say_so(stage: Stage, target: float, position: float, stalled: bool,
-                                                         reached: bool, why: str) -> None:
+@pytest.mark.parametrize(
+    ("stage", "target", "position", "stalled", "reached", "why"),
+    [
+        (Stage.PREGRASP, 0.5, 0.51, False, True, "reached"),
+        (Stage.PREGRASP, 0.0, 0.4, False, False, "'f' is 0.4"),
+        (Stage.PREGRASP, 0.5, 0.9, True, False, "away"),
+        (Stage.GRASP, 1.94, 1.2, True, True, "stopped on something"),
+        (Stage.GRASP, 1.94, 1.93, False, False, "without anything"),
+        (Stage.GRASP, 1.94, 1.92, True, False, "without anything"),
+        (Stage.GRASP, 1.2, 1.21, False, True, "reached"),
+        (Stage.GRASP, 1.94, 1.2, False, False, "away"),
+        (Stage.POSTGRASP, 1.94, 1.2, True, True, "still"),
+        (Stage.POSTGRASP, 1.2, 1.2, False, True, "reached"),
+        (Stage.POSTGRASP, 1.94, 0.3, False, False, "away"),
+    ],
+)
+def test_a_stage_is_reached_only_when_the_fingers_say_so(
+    stage: Stage, target: float, position: float, stalled: bool, reached: bool, why: str
+) -> None:
     verdict = judge(stage, {"f": target}, Outcome({"f": position}, stalled), CLOSED, 0.05)
     assert verdict.reached is reached
     assert why in verdict.reason

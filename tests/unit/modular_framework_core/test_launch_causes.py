@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Why a node ended is found in its log file, and a wrong launch argument is refused before anything starts."""
+
 from __future__ import annotations
 
 import re
@@ -25,16 +26,22 @@ LOG = """[rospy.client][INFO] 2026-11-22 13:21:26,514: init_node, name[/gazebo],
 def test_the_last_fatal_message_is_the_cause_with_all_its_lines(tmp_path: Path) -> None:
     (tmp_path / "task-10.log").write_text(LOG)
     assert cause_of_death(tmp_path / "task-10.log") == (
-        "The task could not be run: 1 fault in the task:\n  pick.yaml:3:1: unknown key 'sorce'")
+        "The task could not be run: 1 fault in the task:\n  pick.yaml:3:1: unknown key 'sorce'"
+    )
     (tmp_path / "quiet.log").write_text(LOG.replace("CRITICAL", "WARNING"))
     assert cause_of_death(tmp_path / "quiet.log") == ""
     assert cause_of_death(tmp_path / "none.log") == ""
 
 
-@pytest.mark.parametrize(("argument", "hint"), [
-    ("simulation:=flase", "argument 'simulation' is 'flase', allowed are true and false"),
-    ("gui:=", "argument 'gui' is ''"), ("worldfile:=b", "did you mean 'world_file'"),
-    ("b.world", "not of the form name:=value")])
+@pytest.mark.parametrize(
+    ("argument", "hint"),
+    [
+        ("simulation:=flase", "argument 'simulation' is 'flase', allowed are true and false"),
+        ("gui:=", "argument 'gui' is ''"),
+        ("worldfile:=b", "did you mean 'world_file'"),
+        ("b.world", "not of the form name:=value"),
+    ],
+)
 def test_a_wrong_argument_is_refused_with_what_is_allowed(tmp_path: Path, argument: str, hint: str) -> None:
     (tmp_path / "a.launch").write_text(LAUNCH)
     with pytest.raises(roslaunch.core.RLException, match=hint):
@@ -45,17 +52,29 @@ def test_a_wrong_argument_is_refused_with_what_is_allowed(tmp_path: Path, argume
 METHOD = """<launch><arg name="method_launch_file" default=""/><arg name="config_directory" default=""/></launch>"""
 
 
-@pytest.mark.parametrize(("argument", "hint"), [
-    ("method_launch_file:=top_down_grasp/a.launch",
-     "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; did you mean 'top_down_grasps'; allowed "
-     "is PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /; correct it"),
-    ("method_launch_file:=top_down_grasps/top_down.launch",
-     "and the package has no such file; did you mean 'top_down_grasps/top_down_grasps.launch'; allowed are "
-     "top_down_grasps/top_down_grasps.launch; correct it"),
-    ("method_launch_file:=modular_framework_msgs", "which is no launch file; allowed is PACKAGE/FILE"),
-    ("method_launch_file:=/nowhere/a.launch", "and there is no such file; allowed is PACKAGE/FILE"),
-    ("config_directory:=/nowhere", "argument 'config_directory' is '/nowhere', allowed is the path of a folder from /"),
-    ("config_directory:=config", "argument 'config_directory' is 'config', allowed is the path of a folder from /")])
+@pytest.mark.parametrize(
+    ("argument", "hint"),
+    [
+        (
+            "method_launch_file:=top_down_grasp/a.launch",
+            "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; did you mean 'top_down_grasps'; "
+            "allowed is PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /; "
+            "correct it",
+        ),
+        (
+            "method_launch_file:=top_down_grasps/top_down.launch",
+            "and the package has no such file; did you mean 'top_down_grasps/top_down_grasps.launch'; allowed are "
+            "top_down_grasps/top_down_grasps.launch; correct it",
+        ),
+        ("method_launch_file:=modular_framework_msgs", "which is no launch file; allowed is PACKAGE/FILE"),
+        ("method_launch_file:=/nowhere/a.launch", "and there is no such file; allowed is PACKAGE/FILE"),
+        (
+            "config_directory:=/nowhere",
+            "argument 'config_directory' is '/nowhere', allowed is the path of a folder from /",
+        ),
+        ("config_directory:=config", "argument 'config_directory' is 'config', allowed is the path of a folder from /"),
+    ],
+)
 def test_a_method_or_a_configuration_that_is_not_there_is_refused(tmp_path: Path, argument: str, hint: str) -> None:
     (tmp_path / "a.launch").write_text(METHOD)
     with pytest.raises(roslaunch.core.RLException, match=re.escape(hint)):
@@ -78,15 +97,23 @@ def test_a_wrong_default_is_refused_like_a_wrong_argument(tmp_path: Path) -> Non
         check_arguments(str(tmp_path / "a.launch"), [])
 
 
-@pytest.mark.parametrize(("died", "code", "last"), [
-    (("task-10", 0), 0, "run_framework: the task succeeded"),
-    (("task-10", 1), 1, "run_framework: the task did not succeed: because"),
-    (("task-10", 2), 2, "run_framework: the task could not be run: because"),
-    (("gazebo-2", 1), 3, "run_framework: node 'gazebo' died (exited with 1), and everything was stopped: because"),
-    (("gazebo-2", -9), 3,
-     "run_framework: node 'gazebo' died (was killed by signal 9), and everything was stopped: because")])
-def test_the_cause_is_the_last_line(capsys: pytest.CaptureFixture[str], died: tuple[str, int], code: int,
-                                    last: str) -> None:
+@pytest.mark.parametrize(
+    ("died", "code", "last"),
+    [
+        (("task-10", 0), 0, "run_framework: the task succeeded"),
+        (("task-10", 1), 1, "run_framework: the task did not succeed: because"),
+        (("task-10", 2), 2, "run_framework: the task could not be run: because"),
+        (("gazebo-2", 1), 3, "run_framework: node 'gazebo' died (exited with 1), and everything was stopped: because"),
+        (
+            ("gazebo-2", -9),
+            3,
+            "run_framework: node 'gazebo' died (was killed by signal 9), and everything was stopped: because",
+        ),
+    ],
+)
+def test_the_cause_is_the_last_line(
+    capsys: pytest.CaptureFixture[str], died: tuple[str, int], code: int, last: str
+) -> None:
     watcher = EndWatcher("task", ends_with_task=True)
     watcher.process_died(*died)
     watcher.process_died("late-3", 1)

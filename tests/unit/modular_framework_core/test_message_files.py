@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files of a manager's messages: what is read is what was written, by the reader of JSON and by that of YAML."""
+
 from __future__ import annotations
 
 import math
@@ -80,10 +81,23 @@ def test_messages_written_by_hand_may_leave_fields_out_and_list_them_in_order(tm
     assert (second.seq, second.stamp, second.frame_id) == (7, rospy.Time(2), "world")
 
 
-@pytest.mark.parametrize("value", ["{position: [a]}", "{name: 5}", "{position: 1.0}", "{header: {seq: 1.5}}",
-                                   "{header: {seq: -1}}", "{name: abc}", "[1, 2]", "[]", "{joint: [a]}",
-                                   "{position: null}", "{header: {stamp: {secs: -1, nsecs: 0}}}",
-                                   "{header: {stamp: {secs: 1, hours: 2}}}"])
+@pytest.mark.parametrize(
+    "value",
+    [
+        "{position: [a]}",
+        "{name: 5}",
+        "{position: 1.0}",
+        "{header: {seq: 1.5}}",
+        "{header: {seq: -1}}",
+        "{name: abc}",
+        "[1, 2]",
+        "[]",
+        "{joint: [a]}",
+        "{position: null}",
+        "{header: {stamp: {secs: -1, nsecs: 0}}}",
+        "{header: {stamp: {secs: 1, hours: 2}}}",
+    ],
+)
 def test_a_value_of_another_type_is_refused_by_name(tmp_path, value):
     path = tmp_path / "wrong.yaml"
     path.write_text(f"kind: thing\nnamed: {{good: {{}}, bad: {value}}}\n")

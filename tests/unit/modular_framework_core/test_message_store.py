@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The store behind every manager: names stay, the queue is first in, first out."""
+
 from __future__ import annotations
 
 import threading

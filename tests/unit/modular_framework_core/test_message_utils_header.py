@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The C++ functions make the same messages as the Python ones."""
+
 from __future__ import annotations
 
 import io
@@ -47,15 +48,32 @@ def test_a_grasp_made_in_c_plus_plus_is_the_grasp_made_in_python(
 ) -> None:
     (tmp_path / "p.cpp").write_text(PROGRAM)
     space = next(folder for folder in (ROOT / "devel", ROOT / "install") if (folder / "include").is_dir())
-    subprocess.run(["g++", "-std=c++14", "-Wall", "-Werror", f"-I{ROOT}/src/modular_framework_core/include",
-                    f"-I{space}/include", "p.cpp", "-o", "p", "-lrostime", "-lroscpp_serialization", "-lcpp_common"],
-                   cwd=tmp_path, check=True, timeout=300)
+    subprocess.run(
+        [
+            "g++",
+            "-std=c++14",
+            "-Wall",
+            "-Werror",
+            f"-I{ROOT}/src/modular_framework_core/include",
+            f"-I{space}/include",
+            "p.cpp",
+            "-o",
+            "p",
+            "-lrostime",
+            "-lroscpp_serialization",
+            "-lcpp_common",
+        ],
+        cwd=tmp_path,
+        check=True,
+        timeout=300,
+    )
     made = subprocess.run(["./p"], cwd=tmp_path, check=True, capture_output=True, timeout=60).stdout
     monkeypatch.setattr(rospy.Time, "now", lambda: genpy.Time(12, 34))
     turned = generate_pose_stamped_message("world", (0.1, -0.2, 0.3), (0.4, -0.5, 0.6))
     flipped = generate_pose_stamped_message("base", (0.1, -0.2, 0.3), (0.0, 0.0, 1.0, 0.0))
-    expected = get_standardised_grasp(["a", "b"], [0.1, 0.2], [0.3, 0.4], [0.5, 0.6], [1.0, -1.0], turned, flipped,
-                                      turned, 0.7, "g", "h", "o")
+    expected = get_standardised_grasp(
+        ["a", "b"], [0.1, 0.2], [0.3, 0.4], [0.5, 0.6], [1.0, -1.0], turned, flipped, turned, 0.7, "g", "h", "o"
+    )
     buffer = io.BytesIO()
     expected.serialize(buffer)
     assert StandardisedGrasp().deserialize(made) == StandardisedGrasp().deserialize(buffer.getvalue())
@@ -100,8 +118,11 @@ PACKAGE_OF_THE_ORIGINAL = """<package format="2"><name>grasping_method</name><ve
 
 
 def test_a_node_in_c_plus_plus_for_the_original_builds_as_its_package_says(tmp_path: Path) -> None:
-    for name, text in (("node.cpp", NODE_OF_THE_ORIGINAL), ("CMakeLists.txt", CMAKE_OF_THE_ORIGINAL),
-                       ("package.xml", PACKAGE_OF_THE_ORIGINAL)):
+    for name, text in (
+        ("node.cpp", NODE_OF_THE_ORIGINAL),
+        ("CMakeLists.txt", CMAKE_OF_THE_ORIGINAL),
+        ("package.xml", PACKAGE_OF_THE_ORIGINAL),
+    ):
         (tmp_path / name).write_text(text)
     build = tmp_path / "build"
     for command in (["cmake", "-S", str(tmp_path), "-B", str(build)], ["cmake", "--build", str(build)]):

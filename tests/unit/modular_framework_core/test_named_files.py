@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files of named joint states, trajectories and sensors: good entries are kept, bad ones are named with their line."""
+
 from __future__ import annotations
 
 import math
@@ -22,9 +23,12 @@ example_trajectory:
   - {name: stability_gravity_side, interpolate_time: 0.4, pause_time: 0.25}
   - {name: stability_pose, interpolate_time: 0.4, pause_time: 0.25}
 """
-STATES = {"stability_gravity_down": {"wrist": -0.3735, "elbow": 0.35},
-          "stability_pose": {"elbow": 1.57, "wrist": -1.57},
-          "stability_gravity_side": {"elbow": 0.35, "wrist": -1.97}, "short": {"elbow": 0.0}}
+STATES = {
+    "stability_gravity_down": {"wrist": -0.3735, "elbow": 0.35},
+    "stability_pose": {"elbow": 1.57, "wrist": -1.57},
+    "stability_gravity_side": {"elbow": 0.35, "wrist": -1.97},
+    "short": {"elbow": 0.0},
+}
 
 
 def write(folder: Path, text: str) -> Path:
@@ -40,11 +44,18 @@ def test_positions_keep_double_precision_and_file_order(tmp_path: Path) -> None:
     assert states[0].positions == (1.5707963268, -2.0, 0.001)
 
 
-@pytest.mark.parametrize(("text", "line", "hint"), [
-    ("good: {a: 1}\nbad: {a: x}\n", 2, "finite number"), ("good: {a: 1}\nbad: 5\n", 2, "mapping"),
-    ("good: {a: 1}\nbad: {}\n", 2, "no joint"), ("good: {a: 1}\nbad:\n  a: 1\n  b: .nan\n", 4, "finite number"),
-    ("good: {a: 1}\nbad: {a: 1, a: 2}\n", 2, "twice"), ("good: {a: 1}\ngood: {a: 2}\n", 2, "further up"),
-    ("good: {a: 1}\nbad: {a: '1'}\n", 2, "finite number")])
+@pytest.mark.parametrize(
+    ("text", "line", "hint"),
+    [
+        ("good: {a: 1}\nbad: {a: x}\n", 2, "finite number"),
+        ("good: {a: 1}\nbad: 5\n", 2, "mapping"),
+        ("good: {a: 1}\nbad: {}\n", 2, "no joint"),
+        ("good: {a: 1}\nbad:\n  a: 1\n  b: .nan\n", 4, "finite number"),
+        ("good: {a: 1}\nbad: {a: 1, a: 2}\n", 2, "twice"),
+        ("good: {a: 1}\ngood: {a: 2}\n", 2, "further up"),
+        ("good: {a: 1}\nbad: {a: '1'}\n", 2, "finite number"),
+    ],
+)
 def test_a_bad_joint_state_is_named_and_the_others_stay(tmp_path: Path, text: str, line: int, hint: str) -> None:
     states, faults = load_joint_states(write(tmp_path, text))
     assert [state.name for state in states] == ["good"]
@@ -61,9 +72,14 @@ def test_joints_of_the_robot_that_move_and_their_bounds_are_read_from_its_descri
     assert {"elbow": (-1.0, 2.0), "wheel": (-math.inf, math.inf)} == BOUNDS
 
 
-@pytest.mark.parametrize(("entry", "hint"), [
-    ("{elbow: 2.1}", "got 2.1, the joint moves from -1.0000 to 2.0000"),
-    ("{elbw: 0}", "no joint 'elbw' that moves; it has elbow, wheel; did you mean 'elbow'?"), ("{mount: 0}", "'mount'")])
+@pytest.mark.parametrize(
+    ("entry", "hint"),
+    [
+        ("{elbow: 2.1}", "got 2.1, the joint moves from -1.0000 to 2.0000"),
+        ("{elbw: 0}", "no joint 'elbw' that moves; it has elbow, wheel; did you mean 'elbow'?"),
+        ("{mount: 0}", "'mount'"),
+    ],
+)
 def test_a_joint_state_the_robot_cannot_have_is_named(tmp_path: Path, entry: str, hint: str) -> None:
     text = f"bad: {entry}\ngood: {{elbow: 2.0, wheel: 100}}\n"
     states, faults = load_joint_states(write(tmp_path, text), BOUNDS)
@@ -98,17 +114,25 @@ def test_the_shipped_example_trajectory_has_ten_points_at_the_documented_times(t
     trajectory = trajectories[0]
     assert trajectory.joint_names == ("elbow", "wrist")
     assert [time for _, time in trajectory.points] == pytest.approx(
-        [0.4, 0.65, 1.05, 1.30, 1.70, 1.95, 2.35, 2.60, 3.00, 3.25])
+        [0.4, 0.65, 1.05, 1.30, 1.70, 1.95, 2.35, 2.60, 3.00, 3.25]
+    )
     assert trajectory.points[0][0] == trajectory.points[1][0] == (0.35, -0.3735)
     assert trajectory.points[-1][0] == (1.57, -1.57)
 
 
-@pytest.mark.parametrize(("items", "hint"), [
-    ("[{name: unknown, interpolate_time: 1}]", "no joint state named 'unknown'"),
-    ("[{name: stability_pose, interpolate_time: 1}, {name: short, interpolate_time: 1}]", "must be the same"),
-    ("[{name: stability_pose}]", "interpolate_time"), ("[{name: stability_pose, interpolate_time: 0}]", "more than 0"),
-    ("[{name: stability_pose, interpolate_time: 1, pause_time: -1}]", "0 or more"), ("[]", "no waypoint"),
-    ("{a: 1}", "expected a list"), ("[{name: stability_pose, interpolate_time: 1, pause: 1}]", "unknown keys")])
+@pytest.mark.parametrize(
+    ("items", "hint"),
+    [
+        ("[{name: unknown, interpolate_time: 1}]", "no joint state named 'unknown'"),
+        ("[{name: stability_pose, interpolate_time: 1}, {name: short, interpolate_time: 1}]", "must be the same"),
+        ("[{name: stability_pose}]", "interpolate_time"),
+        ("[{name: stability_pose, interpolate_time: 0}]", "more than 0"),
+        ("[{name: stability_pose, interpolate_time: 1, pause_time: -1}]", "0 or more"),
+        ("[]", "no waypoint"),
+        ("{a: 1}", "expected a list"),
+        ("[{name: stability_pose, interpolate_time: 1, pause: 1}]", "unknown keys"),
+    ],
+)
 def test_a_bad_trajectory_is_dropped_whole_and_the_next_one_is_loaded(tmp_path: Path, items: str, hint: str) -> None:
     text = f"bad: {items}\ngood: [{{name: stability_pose, interpolate_time: 0.5}}]\n"
     trajectories, faults = load_trajectories(write(tmp_path, text), STATES.get)
@@ -117,8 +141,10 @@ def test_a_bad_trajectory_is_dropped_whole_and_the_next_one_is_loaded(tmp_path: 
     assert "file.yaml:1" in str(faults[0])
 
 
-SENSOR = ("frame_id: cam, origin_frame_id: world, frame_x: -0.1645, frame_y: 0.375, frame_z: 2.72, "
-          "frame_roll: 3.14159265359, frame_pitch: 0, frame_yaw: -1.57079632679")
+SENSOR = (
+    "frame_id: cam, origin_frame_id: world, frame_x: -0.1645, frame_y: 0.375, frame_z: 2.72, "
+    "frame_roll: 3.14159265359, frame_pitch: 0, frame_yaw: -1.57079632679"
+)
 
 
 def test_sensor_frames_are_read_and_single_values_are_left_alone(tmp_path: Path) -> None:
@@ -129,18 +155,25 @@ def test_sensor_frames_are_read_and_single_values_are_left_alone(tmp_path: Path)
 
 
 def test_the_later_layout_with_an_inline_pose_gives_the_same_frame(tmp_path: Path) -> None:
-    text = ("cam: {frame_id: cam, initial_pose: {reference_frame: world, position: {x: 1, y: 2, z: 3}, "
-            "orientation: {r: 0.1, p: 0.2, y: 0.3}}}\n")
+    text = (
+        "cam: {frame_id: cam, initial_pose: {reference_frame: world, position: {x: 1, y: 2, z: 3}, "
+        "orientation: {r: 0.1, p: 0.2, y: 0.3}}}\n"
+    )
     frames, faults = load_sensor_frames(write(tmp_path, text))
     assert not faults
     assert frames[0].position_m == (1.0, 2.0, 3.0)
     assert frames[0].quaternion_xyzw == pytest.approx(quaternion_from_rpy(0.1, 0.2, 0.3))
 
 
-@pytest.mark.parametrize(("bad", "hint"), [
-    ("{frame_id: cam}", "origin_frame_id"), (f"{{{SENSOR.replace('2.72', 'high')}}}", "finite number"),
-    (f"{{{SENSOR.replace('frame_id: cam', 'frame_id: world', 1)}}}", "its own origin"),
-    ("{frame_id: cam, initial_pose: {position: {x: 1}}}", "reference_frame")])
+@pytest.mark.parametrize(
+    ("bad", "hint"),
+    [
+        ("{frame_id: cam}", "origin_frame_id"),
+        (f"{{{SENSOR.replace('2.72', 'high')}}}", "finite number"),
+        (f"{{{SENSOR.replace('frame_id: cam', 'frame_id: world', 1)}}}", "its own origin"),
+        ("{frame_id: cam, initial_pose: {position: {x: 1}}}", "reference_frame"),
+    ],
+)
 def test_a_wrong_sensor_is_named_and_the_others_stay(tmp_path: Path, bad: str, hint: str) -> None:
     frames, faults = load_sensor_frames(write(tmp_path, f"bad: {bad}\ngood: {{{SENSOR}}}\n"))
     assert [frame.sensor for frame in frames] == ["good"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Command lines about objects, parameters about external controllers, and the map of object types."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -22,8 +23,10 @@ def models(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("position", [["0.1", "-0.2", "0.3"], ["0.1 -0.2 0.3"], ["0.1,-0.2,0.3"], ["0.1, -0.2, 0.3"],
-                                      ["0.1,", "-0.2,", "0.3"]])
+@pytest.mark.parametrize(
+    "position",
+    [["0.1", "-0.2", "0.3"], ["0.1 -0.2 0.3"], ["0.1,-0.2,0.3"], ["0.1, -0.2, 0.3"], ["0.1,", "-0.2,", "0.3"]],
+)
 def test_triplets_may_be_separated_by_spaces_or_commas(models: Path, position: list[str]) -> None:
     request = parse_request(["-t", "box", "-p", *position, "-o", "-0.1,0,1e-1"], str(models))
     assert request.position_m == (0.1, -0.2, 0.3)
@@ -49,10 +52,17 @@ def test_empty_options_of_a_launch_file_mean_the_defaults(models: Path) -> None:
     assert (request.name, request.delete, request.reference_frame) == ("box", False, "world")
 
 
-@pytest.mark.parametrize(("arguments", "hint"), [
-    ([], "neither a name"), (["-n", "x"], "neither a type"), (["-t", "missing"], "no file"),
-    (["-t", "box", "-p", "1", "2"], "three finite numbers"), (["-t", "box", "-p", "a", "b", "c"], "three numbers"),
-    (["-d", "true"], "name of the object to delete")])
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        ([], "neither a name"),
+        (["-n", "x"], "neither a type"),
+        (["-t", "missing"], "no file"),
+        (["-t", "box", "-p", "1", "2"], "three finite numbers"),
+        (["-t", "box", "-p", "a", "b", "c"], "three numbers"),
+        (["-d", "true"], "name of the object to delete"),
+    ],
+)
 def test_a_request_that_makes_no_sense_is_explained(models: Path, arguments: list[str], hint: str) -> None:
     with pytest.raises(ObjectRequestError, match=hint):
         parse_request(arguments, str(models))
@@ -68,8 +78,13 @@ def test_an_empty_package_means_that_there_is_nothing_to_start() -> None:
 
 
 def test_the_parameters_name_the_node() -> None:
-    node = controller_node({"package_manipulator_action_server": "p", "manipulator_controller_action_server_type": "t",
-                            "manipulator_controller_node_name": "n"})
+    node = controller_node(
+        {
+            "package_manipulator_action_server": "p",
+            "manipulator_controller_action_server_type": "t",
+            "manipulator_controller_node_name": "n",
+        }
+    )
     assert node == ControllerNode("p", "t", "n")
 
 

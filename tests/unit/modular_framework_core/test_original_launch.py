@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A launch file with the arguments of the original's start_framework.launch, which knows no config_directory."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -9,16 +10,23 @@ import roslaunch.config
 import rospkg
 
 SIMULATION = {
-    "simulation": "true", "description_package": "modular_framework_description",
+    "simulation": "true",
+    "description_package": "modular_framework_description",
     "robot_package": "ur5_ezgripper_robot",
-    "robot_urdf_file": "ur5_with_ezgripper.urdf.xacro", "world_file": "ur5_setup.world",
+    "robot_urdf_file": "ur5_with_ezgripper.urdf.xacro",
+    "world_file": "ur5_setup.world",
     "scene_file": "ur5_setup.scene",
-    "urdf_args": "initial_z:=0.86", "moveit_config_package": "ur5_ezgripper_moveit_config",
-    "controller_file": "ur5_ezgripper_controller_simulation.yaml", "starting_pose": "-J elbow_joint 1.3",
-    "manipulator_prefix": "ezgripper", "states_directory":
-    "$(find modular_framework_core)/src/modular_framework_core/states",
-    "templates_directory": "$(find modular_framework_core)/templates", "state_machine_to_load": "",
-    "task_constructor_script": "simulation_pick.yaml", "generated_state_machine_name": "simulation_pick.py"}
+    "urdf_args": "initial_z:=0.86",
+    "moveit_config_package": "ur5_ezgripper_moveit_config",
+    "controller_file": "ur5_ezgripper_controller_simulation.yaml",
+    "starting_pose": "-J elbow_joint 1.3",
+    "manipulator_prefix": "ezgripper",
+    "states_directory": "$(find modular_framework_core)/src/modular_framework_core/states",
+    "templates_directory": "$(find modular_framework_core)/templates",
+    "state_machine_to_load": "",
+    "task_constructor_script": "simulation_pick.yaml",
+    "generated_state_machine_name": "simulation_pick.py",
+}
 
 
 @pytest.fixture(scope="module")
@@ -26,34 +34,44 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> roslaunch.config.ROSLaun
     """What roslaunch makes of the file; nothing is started."""
     file = tmp_path_factory.mktemp("launch") / "start_framework.launch"
     arguments = "".join(f'<arg name="{name}" value="{value}"/>' for name, value in SIMULATION.items())
-    file.write_text('<launch><include file="$(find modular_framework_core)/launch/run_framework_core.launch">'
-                    f"{arguments}</include></launch>")
+    file.write_text(
+        '<launch><include file="$(find modular_framework_core)/launch/run_framework_core.launch">'
+        f"{arguments}</include></launch>"
+    )
     return roslaunch.config.load_config_default([str(file)], None, verbose=False)
 
 
 def test_its_configuration_files_are_those_of_the_api_package(config: roslaunch.config.ROSLaunchConfig) -> None:
     folder = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
     managers = next(node for node in config.nodes if node.name == "managers")
-    assert managers.args.split() == [str(folder / f"named_{kind}.yaml") for kind in
-                                     ("joint_states", "trajectories", "poses")]
+    assert managers.args.split() == [
+        str(folder / f"named_{kind}.yaml") for kind in ("joint_states", "trajectories", "poses")
+    ]
     assert config.params["/arm_group_name"].value == "arm_and_manipulator"
     assert config.params["/task/config_directory"].value == str(folder)
 
 
 def test_its_states_folder_without_states_and_its_script_by_name_are_no_fault(
-        config: roslaunch.config.ROSLaunchConfig, capsys: pytest.CaptureFixture[str]) -> None:
+    config: roslaunch.config.ROSLaunchConfig, capsys: pytest.CaptureFixture[str]
+) -> None:
     from modular_framework_core.task_constructor.pipeline import main
 
-    given = [str(config.params[f"/task/{name}"].value) for name in
-             ("task_constructor_script", "states_directory", "templates_directory")]
+    given = [
+        str(config.params[f"/task/{name}"].value)
+        for name in ("task_constructor_script", "states_directory", "templates_directory")
+    ]
     assert main(["--check", *given]) == 0
     said = capsys.readouterr()
     assert "task 'simulation_pick' is in order" in said.out and "states has no state" in said.err
 
 
-@pytest.mark.parametrize(("given", "expected"), [
-    ("pick_and_hold.yaml", "{api}/task_constructor_scripts/pick_and_hold.yaml"),
-    ("/tasks/mine.yaml", "/tasks/mine.yaml")])
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("pick_and_hold.yaml", "{api}/task_constructor_scripts/pick_and_hold.yaml"),
+        ("/tasks/mine.yaml", "/tasks/mine.yaml"),
+    ],
+)
 def test_a_task_is_given_by_its_name_or_by_its_path_and_1_is_a_simulation(given: str, expected: str) -> None:
     api = rospkg.RosPack().get_path("modular_framework_api")
     arguments = [f"task_constructor_script:={given}", "simulation:=1"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is read from a controller file and what is left to do for its controllers."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -39,11 +40,18 @@ def test_a_joint_state_controller_is_added_only_where_there_is_none(tmp_path: Pa
     assert with_joint_states(own, []) is own
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("- arm\n", "expected a mapping"), ("", "expected a mapping"), ("arm: {type: [", "not valid YAML"),
-    ("arm: {type: NoSlash}\n", "'arm/type' is 'NoSlash'"), ("arm: {joints: [x]}\n", "no controller in it"),
-    ("1: {type: a/B}\n", "key 1 is not a name"), ("arm: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("- arm\n", "expected a mapping"),
+        ("", "expected a mapping"),
+        ("arm: {type: [", "not valid YAML"),
+        ("arm: {type: NoSlash}\n", "'arm/type' is 'NoSlash'"),
+        ("arm: {joints: [x]}\n", "no controller in it"),
+        ("1: {type: a/B}\n", "key 1 is not a name"),
+        ("arm: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
+    ],
+)
 def test_a_file_that_cannot_be_used_is_explained(tmp_path: Path, text: str, words: str) -> None:
     path = write(tmp_path, text)
     with pytest.raises(ControllerFileError) as caught:
@@ -65,15 +73,21 @@ def test_only_what_is_missing_is_done() -> None:
 
 def test_every_hardware_with_a_topic_is_waited_for() -> None:
     assert ready_topics(["arm", "plain", "hand"], {"arm": "arm_ready", "plain": None, "hand": "hand_ready"}) == {
-        "arm": "arm_ready", "hand": "hand_ready"}
+        "arm": "arm_ready",
+        "hand": "hand_ready",
+    }
     assert ready_topics(None, {}) == {}
     assert ready_topics(["arm"], {"arm": ""}) == {}
 
 
-@pytest.mark.parametrize(("hardware", "topics", "words"), [
-    ("arm", {}, "/robot_hardware: got 'arm'"), ([1], {}, "/robot_hardware"),
-    (["arm"], {"arm": True}, "/arm/topic_to_wait_for: got True"),
-])
+@pytest.mark.parametrize(
+    ("hardware", "topics", "words"),
+    [
+        ("arm", {}, "/robot_hardware: got 'arm'"),
+        ([1], {}, "/robot_hardware"),
+        (["arm"], {"arm": True}, "/arm/topic_to_wait_for: got True"),
+    ],
+)
 def test_faulty_hardware_parameters_are_named(hardware: object, topics: dict[str, object], words: str) -> None:
     with pytest.raises(ControllerFileError, match=words):
         ready_topics(hardware, topics)

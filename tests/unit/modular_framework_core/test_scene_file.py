@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Text scenes of both layouts are read and written, and what is wrong in one is told with its line."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -56,34 +57,39 @@ def test_the_shipped_scene_has_table_and_can_where_they_stand() -> None:
     top, *legs = objects["table__link"].shapes
     assert len(legs) == 4
     assert top.position[2] + top.size[2] / 2 == pytest.approx(0.84)
-    can, = objects["can__link"].shapes
+    (can,) = objects["can__link"].shapes
     assert (can.kind, can.size) == ("cylinder", pytest.approx((0.033, 0.115)))
     assert objects["ground_plane__link"].shapes[0].size == (0.0, 0.0, 1.0, 0.0)
 
 
 def test_objects_with_poses_meshes_and_subframes_are_read(tmp_path: Path) -> None:
     scene = read_scene_file(write(tmp_path, NEWER))
-    shelf, = scene.objects
+    (shelf,) = scene.objects
     assert scene.name == "(a room)"
     assert shelf.color == (1.0, 0.0, 0.0, 1.0), "that of its first shape with a colour"
     assert shelf.name == "shelf one"
     assert shelf.position == (0.1, 0.2, 0.3)
-    assert shelf.quaternion_xyzw == pytest.approx((0.0, 0.0, 0.5 ** 0.5, 0.5 ** 0.5))
+    assert shelf.quaternion_xyzw == pytest.approx((0.0, 0.0, 0.5**0.5, 0.5**0.5))
     assert [shape.kind for shape in shelf.shapes] == ["box", "mesh"]
     assert shelf.shapes[1].triangles == ((0, 1, 2),)
     assert shelf.subframes[0][:2] == ("handle", (0.0, 0.0, 1.0))
 
 
-@pytest.mark.parametrize(("old", "new", "hint"), [
-    ("box", "bottle", ":6: got 'bottle', expected a kind of shape: box, sphere"),
-    ("1 2 3", "1 2", ":7: got '1 2', expected the size of a box"),
-    ("1 2 3", "1 -2 3", "more than 0"),
-    ("1 2 3", "1 nan 3", "finite"),
-    (TURN, "0 0 0 0", ":4: .* unit quaternion"),
-    ("0 1 2", "0 1 3", "indices below 3"), ("1 0 0 1", "1 0 0 2", ":19: .* in 0..1"),
-    ("\n.\n", "\n", "ends where"),
-    ("* shelf", "shelf", ":2: got 'shelf one', expected an object"),
-    ("handle\n0 0 1\n0 0 0 1\n.", "handle\n0 0 1\n0 0 0 1\n* shelf one\n0\n.", "no object above")])
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ("box", "bottle", ":6: got 'bottle', expected a kind of shape: box, sphere"),
+        ("1 2 3", "1 2", ":7: got '1 2', expected the size of a box"),
+        ("1 2 3", "1 -2 3", "more than 0"),
+        ("1 2 3", "1 nan 3", "finite"),
+        (TURN, "0 0 0 0", ":4: .* unit quaternion"),
+        ("0 1 2", "0 1 3", "indices below 3"),
+        ("1 0 0 1", "1 0 0 2", ":19: .* in 0..1"),
+        ("\n.\n", "\n", "ends where"),
+        ("* shelf", "shelf", ":2: got 'shelf one', expected an object"),
+        ("handle\n0 0 1\n0 0 0 1\n.", "handle\n0 0 1\n0 0 0 1\n* shelf one\n0\n.", "no object above"),
+    ],
+)
 def test_a_fault_is_told_with_its_line(tmp_path: Path, old: str, new: str, hint: str) -> None:
     assert old in NEWER
     with pytest.raises(SceneFileError, match=hint):
@@ -110,17 +116,22 @@ def test_what_is_written_in_the_newer_layout_is_read_as_it_was(tmp_path: Path) -
 
 
 def test_the_older_layout_has_the_objects_pose_in_its_shapes(tmp_path: Path) -> None:
-    half = 0.5 ** 0.5
-    cup = SceneObject("cup", (1.0, 2.0, 3.0), (0.0, 0.0, half, half),
-                      (SceneShape("cylinder", (0.1, 0.4), (0.5, 0.0, 0.0), (half, 0.0, 0.0, half)),))
+    half = 0.5**0.5
+    cup = SceneObject(
+        "cup",
+        (1.0, 2.0, 3.0),
+        (0.0, 0.0, half, half),
+        (SceneShape("cylinder", (0.1, 0.4), (0.5, 0.0, 0.0), (half, 0.0, 0.0, half)),),
+    )
     text = scene_text(Scene("old", (cup,)), old_layout=True)
     assert text.splitlines()[:5] == ["old", "* cup", "1", "cylinder", "0.1 0.4"], "radius before length"
-    read, = read_scene_file(write(tmp_path, text)).objects
+    (read,) = read_scene_file(write(tmp_path, text)).objects
     assert read.position == (0.0, 0.0, 0.0)
     assert read.shapes[0].position == pytest.approx((1.0, 2.5, 3.0)), "x of the object points along y"
     assert read.shapes[0].quaternion_xyzw == pytest.approx((0.5, 0.5, 0.5, 0.5))
-    with_handle = SceneObject("cup", cup.position, cup.quaternion_xyzw, cup.shapes,
-                              (("handle", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),))
+    with_handle = SceneObject(
+        "cup", cup.position, cup.quaternion_xyzw, cup.shapes, (("handle", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),)
+    )
     with pytest.raises(SceneFileError, match="'cup': got 1 subframes"):
         scene_text(Scene("old", (with_handle,)), old_layout=True)
 

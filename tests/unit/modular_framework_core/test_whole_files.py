@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files on a full disk, of strange kinds and names, nested without end: a reason at once, and nothing left behind."""
+
 from __future__ import annotations
 
 import os
@@ -81,13 +82,21 @@ def test_what_is_there_and_no_file_is_not_replaced(tmp_path: Path) -> None:
     assert left_in(tmp_path) == [] and (tmp_path / "pipe.yaml").is_fifo()
 
 
-@pytest.mark.parametrize(("path", "reason"), [
-    ("a\0.yaml", "is no path of a file: embedded null byte; name a file in"),
-    ("~no_such_user/a.yaml", "is no path of a file: Could not determine home directory.; name a file in"),
-    ("../a.yaml", "is outside of the managers' folder"), ("/etc/a.yaml", "is outside of the managers' folder"),
-    ("link/a.yaml", "is outside of the managers' folder"), ("ring/a.yaml", "is no path of a file"),
-    ("x.txt", "a file that ends in .yaml"), ("", "a file that ends in .yaml"), ("a.yaml/..", "a file that ends in"),
-    ("\udcff.txt", "a file that ends in .yaml")])
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("a\0.yaml", "is no path of a file: embedded null byte; name a file in"),
+        ("~no_such_user/a.yaml", "is no path of a file: Could not determine home directory.; name a file in"),
+        ("../a.yaml", "is outside of the managers' folder"),
+        ("/etc/a.yaml", "is outside of the managers' folder"),
+        ("link/a.yaml", "is outside of the managers' folder"),
+        ("ring/a.yaml", "is no path of a file"),
+        ("x.txt", "a file that ends in .yaml"),
+        ("", "a file that ends in .yaml"),
+        ("a.yaml/..", "a file that ends in"),
+        ("\udcff.txt", "a file that ends in .yaml"),
+    ],
+)
 def test_a_path_that_is_none_or_elsewhere_is_refused(tmp_path: Path, path: str, reason: str) -> None:
     folder = tmp_path / "managers"
     folder.mkdir()
@@ -105,8 +114,13 @@ def test_a_path_in_the_managers_folder_or_beside_the_configuration_is_taken(tmp_
     assert message_files.path_of(str(other / "a.yaml"), tmp_path / "managers", [other]) == other / "a.yaml"
 
 
-DEEP = {"json": "[" * 20000 + "]" * 20000, "flow": "a: " + "[" * 20000 + "]" * 20000, "open": "{a: " * 20000,
-        "block": "\n".join(f"{' ' * number}a:" for number in range(300)), "dashes": "- " * 20000}
+DEEP = {
+    "json": "[" * 20000 + "]" * 20000,
+    "flow": "a: " + "[" * 20000 + "]" * 20000,
+    "open": "{a: " * 20000,
+    "block": "\n".join(f"{' ' * number}a:" for number in range(300)),
+    "dashes": "- " * 20000,
+}
 
 
 @pytest.mark.parametrize("text", DEEP.values(), ids=DEEP)
@@ -136,8 +150,10 @@ def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() 
     state.position = [1e308, 1e308]
     assert unusable_position(state) == ""
     plan = AddMoveitPlanRequest().moveit_plan
-    plan.joint_trajectory.points = [JointTrajectoryPoint(positions=[0.0], accelerations=[float("nan")]),
-                                    JointTrajectoryPoint(positions=[float("-inf")])]
+    plan.joint_trajectory.points = [
+        JointTrajectoryPoint(positions=[0.0], accelerations=[float("nan")]),
+        JointTrajectoryPoint(positions=[float("-inf")]),
+    ]
     assert unusable_position(plan) == "joint_trajectory.points[1].positions[0] is -inf"
     grasp = AddStandardisedGraspRequest().grasp_message
     grasp.grasp.pose.pose.orientation.w = float("inf")

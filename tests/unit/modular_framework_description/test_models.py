@@ -88,8 +88,10 @@ def test_a_graspable_model_fits_between_the_pads_and_is_centred(package: Path, n
 @pytest.mark.parametrize("name", NAMES)
 def test_every_collision_element_states_friction_for_both_engines(package: Path, name: str) -> None:
     for collision in sdf(package, name).iter("collision"):
-        values = {numbers(collision, f"surface/friction/{path}")[0]
-                  for path in ("ode/mu", "ode/mu2", "bullet/friction", "bullet/friction2")}
+        values = {
+            numbers(collision, f"surface/friction/{path}")[0]
+            for path in ("ode/mu", "ode/mu2", "bullet/friction", "bullet/friction2")
+        }
         assert len(values) == 1
         assert 0.3 <= values.pop() <= 1.2
 
@@ -111,8 +113,9 @@ def test_the_committed_models_are_what_the_generator_writes(package: Path, tmp_p
         for name in ("model.sdf", "model.config"):
             written, committed = ((root / body.name / name).read_text() for root in (tmp_path, package / "models"))
             assert re.sub(r"[-\d.e]+", "#", written) == re.sub(r"[-\d.e]+", "#", committed)
-            values = [[float(x) for x in re.findall(r"(?<=[> ])-?\d[\d.e-]*(?=[< ])", text)]
-                      for text in (written, committed)]
+            values = [
+                [float(x) for x in re.findall(r"(?<=[> ])-?\d[\d.e-]*(?=[< ])", text)] for text in (written, committed)
+            ]
             assert np.allclose(*values, rtol=1e-5, atol=1e-9)
 
 

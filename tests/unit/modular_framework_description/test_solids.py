@@ -30,8 +30,9 @@ def test_the_inertia_of_a_round_part_is_near_that_of_its_polygons(part: Part) ->
 
 def test_two_halves_weigh_like_the_whole() -> None:
     whole = Body("whole", "", 2.0, (Part("box", (0.2, 0.1, 0.1)),)).mass_properties()
-    halves = Body("halves", "", 2.0, (Part("box", (0.1, 0.1, 0.1), (-0.05, 0, 0)),
-                                      Part("box", (0.1, 0.1, 0.1), (0.05, 0, 0)))).mass_properties()
+    halves = Body(
+        "halves", "", 2.0, (Part("box", (0.1, 0.1, 0.1), (-0.05, 0, 0)), Part("box", (0.1, 0.1, 0.1), (0.05, 0, 0)))
+    ).mass_properties()
     assert np.allclose(whole.inertia, halves.inertia, rtol=1e-5)
     assert np.allclose(whole.centre, halves.centre, atol=1e-7)
 

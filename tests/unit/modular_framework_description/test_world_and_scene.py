@@ -33,7 +33,7 @@ def read_scene(path: Path) -> dict[str, list[tuple[str, list[float], list[float]
     while lines[row] != ".":
         shapes = objects[lines[row].removeprefix("* ")] = []
         for index in range(int(lines[row + 1])):
-            kind, *rest = lines[row + 2 + 5 * index:row + 7 + 5 * index]
+            kind, *rest = lines[row + 2 + 5 * index : row + 7 + 5 * index]
             size, position, quaternion, colour = ([float(value) for value in text.split()] for text in rest)
             assert len(colour) == 4
             shapes.append((kind, size, position, quaternion))
@@ -122,8 +122,12 @@ def test_a_missing_model_is_named_with_those_there_are(tmp_path: Path, package: 
 
 def test_a_shape_a_scene_cannot_hold_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "strange.world"
-    path.write_text(WORLD.format('<model name="m"><link name="l"><collision name="c"><geometry><heightmap/>'
-                                 "</geometry></collision></link></model>"))
+    path.write_text(
+        WORLD.format(
+            '<model name="m"><link name="l"><collision name="c"><geometry><heightmap/>'
+            "</geometry></collision></link></model>"
+        )
+    )
     with pytest.raises(WorldError, match="heightmap, allowed"):
         read_world(path, tmp_path)
 
@@ -137,10 +141,13 @@ def test_a_pose_with_five_numbers_is_refused(tmp_path: Path) -> None:
 
 def test_poses_of_model_link_and_collision_are_chained(tmp_path: Path) -> None:
     path = tmp_path / "chained.world"
-    path.write_text(WORLD.format(
-        '<model name="m"><pose>1 0 0 0 0 1.5707963267948966</pose><link name="l"><pose>1 0 0 0 0 0</pose>'
-        '<collision name="c"><pose>0 0 1 0 0 0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>'
-        "</collision></link></model>"))
+    path.write_text(
+        WORLD.format(
+            '<model name="m"><pose>1 0 0 0 0 1.5707963267948966</pose><link name="l"><pose>1 0 0 0 0 0</pose>'
+            '<collision name="c"><pose>0 0 1 0 0 0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>'
+            "</collision></link></model>"
+        )
+    )
     link = read_world(path, tmp_path)[0]
     assert np.allclose(link.pose[:3, 3], [1, 1, 0])
     assert np.allclose(link.shapes[0].pose[:3, 3], [1, 1, 1])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Emulated devices for the tests of the drivers."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A process of the arm's driver begins as an ordinary one, says what it has to, and ends."""
+
 from __future__ import annotations
 
 import os
@@ -22,7 +23,8 @@ with socket.socket(fileno=int(sys.argv[2])) as channel:
 
 
 def test_it_begins_with_ordinary_scheduling_though_its_starter_runs_in_real_time(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, real_time_permitted: bool) -> None:
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, real_time_permitted: bool
+) -> None:
     if not real_time_permitted:
         pytest.skip("no real-time scheduling is permitted here")
     (tmp_path / "teller.py").write_text(TELLER)

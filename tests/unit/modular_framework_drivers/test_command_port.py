@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Orders to an emulator over its command port: what is understood, and what is answered to what is not."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -33,17 +34,21 @@ def test_a_command_gets_its_arguments_as_values(port: int) -> None:
     assert send_command(port, "add", one=True) == "2"
 
 
-@pytest.mark.parametrize(("command", "arguments", "reason"), [
-    ("divide", {}, "unknown command 'divide'; known: help, add, fail, write"),
-    ("add", {}, "missing a required argument: 'one'"),
-    ("add", {"one": 1, "third": 2}, "unexpected keyword argument 'third'"),
-    ("add 3", {}, "arguments are written key=value"),
-    ("fail", {}, "fail: not today"),
-    ("write", {}, "No space left on device"),
-    ("", {}, "help"),
-])
-def test_what_cannot_be_done_is_answered_with_the_reason(port: int, command: str, arguments: dict[str, object],
-                                                         reason: str) -> None:
+@pytest.mark.parametrize(
+    ("command", "arguments", "reason"),
+    [
+        ("divide", {}, "unknown command 'divide'; known: help, add, fail, write"),
+        ("add", {}, "missing a required argument: 'one'"),
+        ("add", {"one": 1, "third": 2}, "unexpected keyword argument 'third'"),
+        ("add 3", {}, "arguments are written key=value"),
+        ("fail", {}, "fail: not today"),
+        ("write", {}, "No space left on device"),
+        ("", {}, "help"),
+    ],
+)
+def test_what_cannot_be_done_is_answered_with_the_reason(
+    port: int, command: str, arguments: dict[str, object], reason: str
+) -> None:
     with pytest.raises(CommandError) as error:
         send_command(port, command, **arguments)
     assert reason in str(error.value)
@@ -60,4 +65,10 @@ def test_a_taken_port_is_named(port: int) -> None:
 
 def test_values_are_what_they_look_like() -> None:
     assert [parse_value(text) for text in ("true", "false", "3", "0.5", "-1e3", "slow")] == [
-        True, False, 3, 0.5, -1000.0, "slow"]
+        True,
+        False,
+        3,
+        0.5,
+        -1000.0,
+        "slow",
+    ]

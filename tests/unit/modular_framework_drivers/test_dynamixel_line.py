@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The unmodified dynamixel-sdk, and our bus on top of it, against the emulated serial line and its faults."""
+
 from __future__ import annotations
 
 import os
@@ -59,8 +60,10 @@ def test_the_sdk_talks_to_two_servos_at_once(make_line: MakeLine) -> None:
     together.addParam(2, [200, 0])
     assert together.txPacket() == COMM_SUCCESS
     assert packets.bulkReadTx(port, [2, 1, 34, 2, 2, 34], 6) == COMM_SUCCESS
-    assert [packets.read2ByteRx(port, servo_id) for servo_id in (1, 2)] == [(100, COMM_SUCCESS, 0),
-                                                                            (200, COMM_SUCCESS, 0)]
+    assert [packets.read2ByteRx(port, servo_id) for servo_id in (1, 2)] == [
+        (100, COMM_SUCCESS, 0),
+        (200, COMM_SUCCESS, 0),
+    ]
     port.closePort()
 
 
@@ -91,7 +94,7 @@ def test_waiting_for_an_answer_leaves_the_processor_alone(line: DynamixelLine, b
 
 @pytest.mark.parametrize("fault", ["garbage", "lose", "corrupt"])
 def test_a_damaged_line_is_endured(line: DynamixelLine, fault: str) -> None:
-    bus = DynamixelBus(str(line.link), 57600, timeout_s=0.3)    # a busy computer is no damage
+    bus = DynamixelBus(str(line.link), 57600, timeout_s=0.3)  # a busy computer is no damage
     bus.open()
     {"garbage": lambda: line.garbage(12), "lose": lambda: line.lose(3), "corrupt": lambda: line.corrupt(3)}[fault]()
     for value in range(30):
@@ -101,8 +104,9 @@ def test_a_damaged_line_is_endured(line: DynamixelLine, fault: str) -> None:
     bus.close()
 
 
-def test_an_answer_too_late_is_not_taken_for_that_to_another_question(line: DynamixelLine,
-                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_too_late_is_not_taken_for_that_to_another_question(
+    line: DynamixelLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(dynamixel_bus, "LATE_S", 2.0)  # a busy computer makes answers later than the line does
     bus = DynamixelBus(str(line.link), 57600, timeout_s=2.0)
     bus.open()
@@ -113,8 +117,9 @@ def test_an_answer_too_late_is_not_taken_for_that_to_another_question(line: Dyna
     assert bus.read(1, mx64.MAX_TORQUE) == (b"\xff\x03", ServoErrors.NONE)
 
 
-def test_answers_that_never_come_are_not_waited_for_longer_than_late_ones_take(line: DynamixelLine,
-                                                                              bus: DynamixelBus) -> None:
+def test_answers_that_never_come_are_not_waited_for_longer_than_late_ones_take(
+    line: DynamixelLine, bus: DynamixelBus
+) -> None:
     line.lose(2)
     begun_s = time.monotonic()
     assert [bus.model_number(1) for _ in range(4)] == [310] * 4
@@ -122,15 +127,18 @@ def test_answers_that_never_come_are_not_waited_for_longer_than_late_ones_take(l
     assert time.monotonic() - begun_s < 2.0
 
 
-@pytest.mark.parametrize(("fault", "error", "hint"), [
-    (lambda line: line.power_off(), NoAnswerError, "does not answer"),
-    (lambda line: line.change_id(5), NoAnswerError, "servo 1 on"),
-    (lambda line: line.corrupt(1), NoAnswerError, "damaged packets"),
-    (lambda line: line.unplug(), PortLostError, "is gone"),
-])
-def test_a_servo_out_of_reach_is_an_error_that_says_why(line: DynamixelLine, bus: DynamixelBus,
-                                                        fault: Callable[[DynamixelLine], None],
-                                                        error: type[Exception], hint: str) -> None:
+@pytest.mark.parametrize(
+    ("fault", "error", "hint"),
+    [
+        (lambda line: line.power_off(), NoAnswerError, "does not answer"),
+        (lambda line: line.change_id(5), NoAnswerError, "servo 1 on"),
+        (lambda line: line.corrupt(1), NoAnswerError, "damaged packets"),
+        (lambda line: line.unplug(), PortLostError, "is gone"),
+    ],
+)
+def test_a_servo_out_of_reach_is_an_error_that_says_why(
+    line: DynamixelLine, bus: DynamixelBus, fault: Callable[[DynamixelLine], None], error: type[Exception], hint: str
+) -> None:
     fault(line)
     start_s = time.monotonic()
     with pytest.raises(error, match=hint):
@@ -184,11 +192,11 @@ def test_a_line_that_nobody_reads_loses_what_it_cannot_hold_and_goes_on(line: Dy
     port, packets = sdk_port(line), PacketHandler(1.0)
     line.garbage(3_000)
     for asked in range(1, 11):
-        port.writePort(bytes((0xff, 0xff, 1, 2, 1, 0xfb)))
+        port.writePort(bytes((0xFF, 0xFF, 1, 2, 1, 0xFB)))
         until = time.monotonic() + 5.0
         while line.instructions < asked and time.monotonic() < until:
             time.sleep(0.002)
-    time.sleep(3_000 * 10.0 / 57600 + 0.1)    # until the last answer was on the wire
+    time.sleep(3_000 * 10.0 / 57600 + 0.1)  # until the last answer was on the wire
     line.clear()
     port.clearPort()
     assert packets.ping(port, 1) == (310, COMM_SUCCESS, 0)

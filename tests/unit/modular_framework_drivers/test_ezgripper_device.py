@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The gripper device against emulated servos: calibration, holding, and every fault, seen in time and survived."""
+
 from __future__ import annotations
 
 import logging
@@ -45,8 +46,9 @@ class Bench:
         self.line = DynamixelLine([finger], folder / "gripper")
         self.line.connect()
         self.strongest_while_calibrating = 0.0
-        self.gripper = EzGripper(GripperSettings(str(self.line.link), fault_pause_s=0.3, start_position=1.7,
-                                                 link_timeout_s=LINK_TIMEOUT_S))
+        self.gripper = EzGripper(
+            GripperSettings(str(self.line.link), fault_pause_s=0.3, start_position=1.7, link_timeout_s=LINK_TIMEOUT_S)
+        )
         self.gripper.start()
         while not self.gripper.state().ready:
             servo = self.line.fingers[0].servo
@@ -93,8 +95,9 @@ def make_gripper(make_line: MakeLine) -> Iterator[Callable[..., tuple[DynamixelL
 
     def make(*servo_ids: int, **changes: object) -> tuple[DynamixelLine, EzGripper]:
         line = make_line(*servo_ids, opening=200.0)
-        settings = GripperSettings(str(line.link), servo_ids=servo_ids or (1,), start_position=1.7,
-                                   link_timeout_s=LINK_TIMEOUT_S)
+        settings = GripperSettings(
+            str(line.link), servo_ids=servo_ids or (1,), start_position=1.7, link_timeout_s=LINK_TIMEOUT_S
+        )
         made.append(EzGripper(replace(settings, **changes)))
         return line, made[-1]
 
@@ -193,11 +196,17 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("fault", "mend", "text", "within_s"), [case[1:] for case in FAULTS],
-                         ids=[case[0] for case in FAULTS])
-def test_a_fault_is_reported_in_time_and_survived(line: DynamixelLine, gripper: EzGripper, text: str, within_s: float,
-                                                  fault: Callable[[DynamixelLine], None],
-                                                  mend: Callable[[DynamixelLine], None]) -> None:
+@pytest.mark.parametrize(
+    ("fault", "mend", "text", "within_s"), [case[1:] for case in FAULTS], ids=[case[0] for case in FAULTS]
+)
+def test_a_fault_is_reported_in_time_and_survived(
+    line: DynamixelLine,
+    gripper: EzGripper,
+    text: str,
+    within_s: float,
+    fault: Callable[[DynamixelLine], None],
+    mend: Callable[[DynamixelLine], None],
+) -> None:
     arrive(gripper, 1.2)
     fault(line)
     assert until(lambda: bool(gripper.state().fault)) < within_s
@@ -212,11 +221,19 @@ def test_a_fault_is_reported_in_time_and_survived(line: DynamixelLine, gripper: 
     assert line.fingers[0].opening == pytest.approx(2500 * (1 - 0.6 / 1.94), abs=60)
 
 
-@pytest.mark.parametrize("fault", [lambda line: line.garbage(12), lambda line: line.lose(4),
-                                   lambda line: line.corrupt(4), lambda line: line.delay(0.01)],
-                         ids=["garbage", "some lost", "some damaged", "a bit late"])
-def test_a_bad_line_is_endured_without_a_fault(line: DynamixelLine, gripper: EzGripper,
-                                               fault: Callable[[DynamixelLine], None]) -> None:
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda line: line.garbage(12),
+        lambda line: line.lose(4),
+        lambda line: line.corrupt(4),
+        lambda line: line.delay(0.01),
+    ],
+    ids=["garbage", "some lost", "some damaged", "a bit late"],
+)
+def test_a_bad_line_is_endured_without_a_fault(
+    line: DynamixelLine, gripper: EzGripper, fault: Callable[[DynamixelLine], None]
+) -> None:
     fault(line)
     assert arrive(gripper, 0.5).motion is Motion.REACHED
     assert arrive(gripper, 1.5).motion is Motion.REACHED
@@ -234,8 +251,9 @@ def test_what_is_held_stays_held_while_the_cable_is_out(line: DynamixelLine, gri
     assert gripper.state().reading.load == pytest.approx(300 / 1023, abs=0.02)
 
 
-def test_fingers_under_way_when_the_cable_is_pulled_stop_when_it_is_back(line: DynamixelLine,
-                                                                         gripper: EzGripper) -> None:
+def test_fingers_under_way_when_the_cable_is_pulled_stop_when_it_is_back(
+    line: DynamixelLine, gripper: EzGripper
+) -> None:
     gripper.command(0.0, 80)
     until(lambda: gripper.state().reading.position < 1.1)
     line.unplug()
@@ -260,7 +278,8 @@ def test_turns_of_the_shaft_are_counted_anew_after_a_loss_of_power(line: Dynamix
 
 
 def test_an_overload_while_the_cable_is_out_is_told_before_the_motor_gets_its_torque_again(
-        line: DynamixelLine, gripper: EzGripper) -> None:
+    line: DynamixelLine, gripper: EzGripper
+) -> None:
     line.unplug()
     until(lambda: bool(gripper.state().fault))
     line.overload()
@@ -278,8 +297,9 @@ def cut_supply(line: DynamixelLine) -> None:
         finger.servo.shut_down(ServoErrors.VOLTAGE)
 
 
-def test_fingers_told_to_stay_do_so_when_the_cable_was_out_until_the_motor_was_well(line: DynamixelLine,
-                                                                                    gripper: EzGripper) -> None:
+def test_fingers_told_to_stay_do_so_when_the_cable_was_out_until_the_motor_was_well(
+    line: DynamixelLine, gripper: EzGripper
+) -> None:
     line.place_object(OBJECT_POSITION)
     arrive(gripper, 1.94, 300)
     cut_supply(line)
@@ -296,10 +316,14 @@ def test_fingers_told_to_stay_do_so_when_the_cable_was_out_until_the_motor_was_w
     assert gripper.state().reading.position == pytest.approx(OBJECT_POSITION, abs=0.05)
 
 
-@pytest.mark.parametrize("fault", [cut_supply, lambda line: line.fingers[0].servo.shut_down(ServoErrors.OVERLOAD)],
-                         ids=["all out of voltage", "one of two overloaded"])
-def test_no_finger_goes_on_once_a_fault_of_a_motor_is_told(make_gripper: MakeGripper,
-                                                           fault: Callable[[DynamixelLine], None]) -> None:
+@pytest.mark.parametrize(
+    "fault",
+    [cut_supply, lambda line: line.fingers[0].servo.shut_down(ServoErrors.OVERLOAD)],
+    ids=["all out of voltage", "one of two overloaded"],
+)
+def test_no_finger_goes_on_once_a_fault_of_a_motor_is_told(
+    make_gripper: MakeGripper, fault: Callable[[DynamixelLine], None]
+) -> None:
     line, gripper = make_gripper(1, 2)
     gripper.start()
     until(lambda: gripper.state().ready, 10.0)
@@ -345,8 +369,9 @@ def test_goals_are_ignored_while_there_is_a_fault(line: DynamixelLine, gripper: 
     assert gripper.state().reading.position == pytest.approx(1.2, abs=0.05)
 
 
-def test_a_warm_motor_is_reported_before_it_gives_up(line: DynamixelLine, gripper: EzGripper,
-                                                     caplog: pytest.LogCaptureFixture) -> None:
+def test_a_warm_motor_is_reported_before_it_gives_up(
+    line: DynamixelLine, gripper: EzGripper, caplog: pytest.LogCaptureFixture
+) -> None:
     with caplog.at_level(logging.WARNING):
         line.heat(72)
         until(lambda: "72 degrees C" in caplog.text)
@@ -442,8 +467,9 @@ def test_two_servos_move_as_one_joint(make_gripper: MakeGripper) -> None:
     assert [finger.opening for finger in line.fingers] == pytest.approx([2500 * (1 - 1.7 / 1.94)] * 2, abs=40)
 
 
-def test_fingers_that_do_not_come_to_a_stop_are_not_calibrated(make_gripper: MakeGripper,
-                                                               monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fingers_that_do_not_come_to_a_stop_are_not_calibrated(
+    make_gripper: MakeGripper, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("modular_framework_drivers.ezgripper.gripper_servos.CALIBRATION_TIMEOUT_S", 0.5)
     line, gripper = make_gripper()
     line.fingers[0].model = replace(line.fingers[0].model, closed_ticks=-1e6)
@@ -473,9 +499,14 @@ def test_closed_it_leaves_the_fingers_with_little_torque(make_gripper: MakeGripp
     assert line.fingers[0].opening == pytest.approx(2500 * (1 - 1.77 / 1.94), abs=30)
 
 
-@pytest.mark.parametrize(("position", "torque", "hint"), [
-    (2.0, 400, r"position 2.0 rad is outside \[0, 1.94\]"), (float("nan"), 400, "position nan"),
-    (1.0, 1024, r"torque 1024 is outside \[0, 1023\]")])
+@pytest.mark.parametrize(
+    ("position", "torque", "hint"),
+    [
+        (2.0, 400, r"position 2.0 rad is outside \[0, 1.94\]"),
+        (float("nan"), 400, "position nan"),
+        (1.0, 1024, r"torque 1024 is outside \[0, 1023\]"),
+    ],
+)
 def test_goals_out_of_limits_are_refused(position: float, torque: int, hint: str) -> None:
     with pytest.raises(ValueError, match=hint):
         EzGripper(GripperSettings("/dev/null")).command(position, torque)

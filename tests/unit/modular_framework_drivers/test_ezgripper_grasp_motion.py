@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How the grasp server moves an EZGripper, without servos."""
+
 from __future__ import annotations
 
 import time
@@ -54,8 +55,9 @@ def test_a_fault_that_came_and_went_between_two_looks_ends_the_motion_with_its_r
         EzGripperManipulator(FaultyGripper(), "knuckle").move(wanted)
 
 
-@pytest.mark.parametrize(("target", "expected"), [
-    (-1e-12, 0.0), (CLOSED_POSITION + 1e-12, CLOSED_POSITION), (1.0, 1.0)])
+@pytest.mark.parametrize(
+    ("target", "expected"), [(-1e-12, 0.0), (CLOSED_POSITION + 1e-12, CLOSED_POSITION), (1.0, 1.0)]
+)
 def test_a_posture_that_rounding_put_just_outside_the_range_is_its_end(target: float, expected: float) -> None:
     wanted = WantedMotion({"knuckle": target}, {"knuckle": 0.4}, 1.0, lambda: False)
     outcome = EzGripperManipulator(ObedientGripper(), "knuckle").move(wanted)
@@ -63,8 +65,9 @@ def test_a_posture_that_rounding_put_just_outside_the_range_is_its_end(target: f
 
 
 @pytest.mark.parametrize(("efforts", "torque"), [({}, 400), ({"knuckle": 0.25}, 200)])
-def test_a_motion_without_a_bound_has_the_torque_the_gripper_starts_with(efforts: dict[str, float],
-                                                                         torque: int) -> None:
+def test_a_motion_without_a_bound_has_the_torque_the_gripper_starts_with(
+    efforts: dict[str, float], torque: int
+) -> None:
     gripper = ObedientGripper()
     EzGripperManipulator(gripper, "knuckle").move(WantedMotion({"knuckle": 1.0}, efforts, 1.0, lambda: False))
     assert gripper.torque() == torque

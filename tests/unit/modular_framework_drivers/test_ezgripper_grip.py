@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """When the fingers count as arrived or held up, without a motor: positions go in, orders to the motor come out."""
+
 from __future__ import annotations
 
 import math
@@ -125,10 +126,13 @@ def test_fingers_pushed_away_come_back() -> None:
     assert fingers.run(1.0) is Motion.REACHED
 
 
-@given(st.lists(st.tuples(st.floats(0.0, 1.94), st.integers(0, 1023), st.floats(0.0, 1.0)), min_size=1, max_size=8),
-       st.floats(0.0, 1.94))
+@given(
+    st.lists(st.tuples(st.floats(0.0, 1.94), st.integers(0, 1023), st.floats(0.0, 1.0)), min_size=1, max_size=8),
+    st.floats(0.0, 1.94),
+)
 def test_the_torque_asked_for_is_never_exceeded_and_held_goals_are_short_of_the_goal(
-        goals: list[tuple[float, int, float]], obstacle: float) -> None:
+    goals: list[tuple[float, int, float]], obstacle: float
+) -> None:
     fingers = Fingers(0.0, 0.0)
     fingers.high = obstacle
     for goal, torque, duration_s in goals:
@@ -166,19 +170,28 @@ def test_open_is_0_and_closed_1_94() -> None:
 
 def test_the_parameters_of_the_guide_are_read() -> None:
     settings = read_gripper_settings(
-        MappingNodeHandle({"port_name": "/dev/ttyUSB0", "baudrate": 57600, "servo_ids": [1, 2],
-                           "manipulator_name": "EzGripper"}),
-        MappingNodeHandle({"poll_rate": 100, "hold_torque": 200, "start_position": 1.0}, "/hw"))
+        MappingNodeHandle(
+            {"port_name": "/dev/ttyUSB0", "baudrate": 57600, "servo_ids": [1, 2], "manipulator_name": "EzGripper"}
+        ),
+        MappingNodeHandle({"poll_rate": 100, "hold_torque": 200, "start_position": 1.0}, "/hw"),
+    )
     assert (settings.port_name, settings.baudrate, settings.servo_ids) == ("/dev/ttyUSB0", 57600, (1, 2))
     assert (settings.name, settings.poll_period_s, settings.rules.hold_torque) == ("EzGripper", 0.01, 200)
 
 
 def test_all_faults_of_the_parameters_are_told_at_once() -> None:
     with pytest.raises(ParameterError) as error:
-        read_gripper_settings(MappingNodeHandle({"baudrate": 12345, "servo_ids": [1, 1]}),
-                              MappingNodeHandle({"start_position": 3.0, "poll_rate": "fast"}, "/hw"))
-    for part in ("/port_name: got ''", "/baudrate: got 12345; expected one of 9600", "/servo_ids: got [1, 1]",
-                 "/hw/start_position: got 3; expected a number from 0 to 1.94", "/hw/poll_rate: got 'fast'"):
+        read_gripper_settings(
+            MappingNodeHandle({"baudrate": 12345, "servo_ids": [1, 1]}),
+            MappingNodeHandle({"start_position": 3.0, "poll_rate": "fast"}, "/hw"),
+        )
+    for part in (
+        "/port_name: got ''",
+        "/baudrate: got 12345; expected one of 9600",
+        "/servo_ids: got [1, 1]",
+        "/hw/start_position: got 3; expected a number from 0 to 1.94",
+        "/hw/poll_rate: got 'fast'",
+    ):
         assert part in str(error.value)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers drive the gripper through its hardware interface, with the emulated servos behind it."""
+
 from __future__ import annotations
 
 import logging
@@ -31,10 +32,19 @@ from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGrip
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 PERIOD_S = 0.008
-CONTROLLER = {"type": "position_controllers/GripperActionController", "joint": JOINT, "goal_tolerance": 0.03,
-              "max_effort": 0.5, "stall_timeout": 0.3, "stall_velocity_threshold": 0.02}
-TRAJECTORY_CONTROLLER = {"type": "position_controllers/JointTrajectoryController", "joints": [JOINT],
-                         "constraints": {"goal_time": 5.0, JOINT: {"trajectory": 0.45, "goal": 0.03}}}
+CONTROLLER = {
+    "type": "position_controllers/GripperActionController",
+    "joint": JOINT,
+    "goal_tolerance": 0.03,
+    "max_effort": 0.5,
+    "stall_timeout": 0.3,
+    "stall_velocity_threshold": 0.02,
+}
+TRAJECTORY_CONTROLLER = {
+    "type": "position_controllers/JointTrajectoryController",
+    "joints": [JOINT],
+    "constraints": {"goal_time": 5.0, JOINT: {"trajectory": 0.45, "goal": 0.03}},
+}
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +92,21 @@ class Loop:
 
 
 def parameters(line: DynamixelLine) -> dict[str, Any]:
-    gripper = {"type": "modular_framework_drivers/EzGripperRobotHW", "start_position": 1.5, "hold_torque": 300,
-               "link_timeout": 0.4}
-    return {"port_name": str(line.link), "baudrate": 57600, "servo_ids": [1], "manipulator_name": "EzGripper",
-            "hand": gripper, "grip": CONTROLLER, "swing": TRAJECTORY_CONTROLLER}
+    gripper = {
+        "type": "modular_framework_drivers/EzGripperRobotHW",
+        "start_position": 1.5,
+        "hold_torque": 300,
+        "link_timeout": 0.4,
+    }
+    return {
+        "port_name": str(line.link),
+        "baudrate": 57600,
+        "servo_ids": [1],
+        "manipulator_name": "EzGripper",
+        "hand": gripper,
+        "grip": CONTROLLER,
+        "swing": TRAJECTORY_CONTROLLER,
+    }
 
 
 @pytest.fixture(scope="module")
@@ -125,8 +146,9 @@ def test_an_object_stalls_it_and_is_held_with_the_effort_asked_for(line: Dynamix
     assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
 
 
-def test_what_is_held_stays_held_when_the_goal_is_over_and_when_the_cable_was_out(line: DynamixelLine,
-                                                                                  loop: Loop) -> None:
+def test_what_is_held_stays_held_when_the_goal_is_over_and_when_the_cable_was_out(
+    line: DynamixelLine, loop: Loop
+) -> None:
     line.remove_object()
     go(loop, 0.9)
     line.place_object(1.24)
@@ -156,8 +178,9 @@ def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loo
     assert line.fingers[0].opening == pytest.approx(2500 * (1 - 1.7 / 1.94), abs=60)
 
 
-def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_back(line: DynamixelLine,
-                                                                                     loop: Loop) -> None:
+def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_back(
+    line: DynamixelLine, loop: Loop
+) -> None:
     line.remove_object()
     go(loop, 0.9)
     goal_handle: GripperGoalHandle = GripperGoalHandle()
@@ -188,13 +211,18 @@ def test_an_overload_is_no_grasp(line: DynamixelLine, loop: Loop) -> None:
     line.remove_object()
 
 
-def test_beside_other_hardware_only_its_own_controllers_hear_of_its_faults(make_line: Callable[..., DynamixelLine],
-                                                                          ) -> None:
+def test_beside_other_hardware_only_its_own_controllers_hear_of_its_faults(
+    make_line: Callable[..., DynamixelLine],
+) -> None:
     line = make_line(opening=200.0)
-    root = MappingNodeHandle({
-        **parameters(line), "robot_hardware": ["arm", "hand"], "elbow_controller": {
-            "type": "position_controllers/JointPositionController", "joint": "elbow"},
-        "arm": {"type": "modular_framework_control/MockRobotHW", "joints": ["elbow"]}})
+    root = MappingNodeHandle(
+        {
+            **parameters(line),
+            "robot_hardware": ["arm", "hand"],
+            "elbow_controller": {"type": "position_controllers/JointPositionController", "joint": "elbow"},
+            "arm": {"type": "modular_framework_control/MockRobotHW", "joints": ["elbow"]},
+        }
+    )
     robot_hw = CombinedRobotHW()
     assert robot_hw.init(root, root)
     loop = Loop(robot_hw, root)
@@ -239,8 +267,10 @@ class SteadyGripper(EzGripper):
 @pytest.fixture
 def steady(monkeypatch: pytest.MonkeyPatch) -> tuple[EzGripperRobotHW, SteadyGripper]:
     made: list[SteadyGripper] = []
-    monkeypatch.setattr("modular_framework_drivers.ezgripper.ezgripper_robot_hw.EzGripper",
-                        lambda settings: made.append(SteadyGripper(settings)) or made[-1])
+    monkeypatch.setattr(
+        "modular_framework_drivers.ezgripper.ezgripper_robot_hw.EzGripper",
+        lambda settings: made.append(SteadyGripper(settings)) or made[-1],
+    )
     robot_hw = EzGripperRobotHW()
     root = MappingNodeHandle({"hand": {"port_name": "/nowhere"}})
     assert robot_hw.init(root, root.child("hand"))
@@ -258,7 +288,8 @@ def test_fingers_of_which_nothing_is_known_have_no_velocity(steady: tuple[EzGrip
 
 
 def test_a_fault_that_came_and_went_between_two_looks_is_told_once_and_ends_what_was_commanded(
-        steady: tuple[EzGripperRobotHW, SteadyGripper]) -> None:
+    steady: tuple[EzGripperRobotHW, SteadyGripper],
+) -> None:
     robot_hw, gripper = steady
     handle = robot_hw.get(PositionJointInterface).get_handle(JOINT)
     handle.command = 1.9
@@ -272,11 +303,22 @@ def test_a_fault_that_came_and_went_between_two_looks_is_told_once_and_ends_what
     assert robot_hw.fault() == ""
 
 
-@pytest.mark.parametrize(("max_effort", "torque"), [
-    (0.0, 400), (-1.0, 400), (math.nan, 400), (0.5, 400), (1.0, 800), (3.0, 800), (sys.float_info.max, 800),
-    (math.inf, 800)])
+@pytest.mark.parametrize(
+    ("max_effort", "torque"),
+    [
+        (0.0, 400),
+        (-1.0, 400),
+        (math.nan, 400),
+        (0.5, 400),
+        (1.0, 800),
+        (3.0, 800),
+        (sys.float_info.max, 800),
+        (math.inf, 800),
+    ],
+)
 def test_whatever_effort_is_allowed_becomes_a_torque_the_servo_knows(
-        line: DynamixelLine, monkeypatch: pytest.MonkeyPatch, max_effort: float, torque: int) -> None:
+    line: DynamixelLine, monkeypatch: pytest.MonkeyPatch, max_effort: float, torque: int
+) -> None:
     robot_hw = EzGripperRobotHW()
     root = MappingNodeHandle({"hand": {"port_name": str(line.link)}})
     monkeypatch.setattr(EzGripperRobotHW, "_wait_until_ready", lambda *_: True)

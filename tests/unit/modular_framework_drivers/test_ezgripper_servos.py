@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the servos of a gripper are told, word for word, and what is believed of them when an answer is lost."""
+
 from __future__ import annotations
 
 import pytest
@@ -64,8 +65,12 @@ def servos(bus: DirectBus) -> GripperServos:
 def test_a_motor_that_gets_its_torque_back_has_its_new_goal_before(bus: DirectBus, servos: GripperServos) -> None:
     servos.forget()
     servos.drive(Drive(1.94, 300))
-    assert bus.new_words() == [(mx64.GOAL_POSITION, CLOSED), (mx64.TORQUE_CONTROL_MODE, 0), (mx64.TORQUE_LIMIT, 300),
-                               (mx64.TORQUE_ENABLE, 1)]
+    assert bus.new_words() == [
+        (mx64.GOAL_POSITION, CLOSED),
+        (mx64.TORQUE_CONTROL_MODE, 0),
+        (mx64.TORQUE_LIMIT, 300),
+        (mx64.TORQUE_ENABLE, 1),
+    ]
 
 
 def test_less_torque_is_told_before_the_goal_it_is_for(bus: DirectBus, servos: GripperServos) -> None:
@@ -91,7 +96,8 @@ def test_staying_leaves_a_motor_off_that_has_shut_down(bus: DirectBus, servos: G
 
 @pytest.mark.parametrize("lost", [mx64.GOAL_TORQUE, mx64.TORQUE_CONTROL_MODE])
 def test_a_servo_that_did_what_it_was_told_though_its_answer_was_lost_had_power(
-        bus: DirectBus, servos: GripperServos, lost: Register) -> None:
+    bus: DirectBus, servos: GripperServos, lost: Register
+) -> None:
     servos.drive(Drive(None, 200))
     servos.drive(Drive(0.97, 200))
     bus.loses = lost
@@ -103,8 +109,9 @@ def test_a_servo_that_did_what_it_was_told_though_its_answer_was_lost_had_power(
     assert (bus.servo.get(mx64.GOAL_TORQUE), bus.servo.get(mx64.TORQUE_CONTROL_MODE)) == (200, 1)
 
 
-def test_a_servo_of_which_only_the_place_is_known_is_not_taken_for_faithful(bus: DirectBus,
-                                                                            servos: GripperServos) -> None:
+def test_a_servo_of_which_only_the_place_is_known_is_not_taken_for_faithful(
+    bus: DirectBus, servos: GripperServos
+) -> None:
     servos.forget()
     servos.stay()
     bus.servo.power_cycle()
@@ -115,7 +122,8 @@ def test_a_servo_of_which_only_the_place_is_known_is_not_taken_for_faithful(bus:
 
 
 def test_a_shaft_where_the_fingers_cannot_be_is_a_fault_until_it_is_back_and_nothing_is_told_to_it(
-        bus: DirectBus, servos: GripperServos) -> None:
+    bus: DirectBus, servos: GripperServos
+) -> None:
     bus.servo.power_cycle()
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 3300)
     for _ in range(2):

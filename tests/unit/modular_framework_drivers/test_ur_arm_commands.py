@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the driver of UR arms sends, and how it treats its helper processes, without any arm."""
+
 from __future__ import annotations
 
 import time
@@ -38,8 +39,19 @@ class FakeLink:
 
     @property
     def state(self) -> ArmState:
-        return ArmState(time.monotonic(), 0.0, tuple(self.positions), ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL,
-                        self.runtime_state)
+        return ArmState(
+            time.monotonic(),
+            0.0,
+            tuple(self.positions),
+            ZEROS,
+            ZEROS,
+            ZEROS,
+            1.0,
+            1.0,
+            RUNNING,
+            NORMAL,
+            self.runtime_state,
+        )
 
     def servo(self, positions: Sequence[float], time_s: float) -> bool:
         self.sent.append(list(positions))
@@ -108,7 +120,7 @@ class FakeProcess:
 
     started: list[FakeProcess]
     refused: OSError | None
-    mute: str       # role of the one that says nothing; of the one that reads, after its first message
+    mute: str  # role of the one that says nothing; of the one that reads, after its first message
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
         if FakeProcess.refused is not None:
@@ -123,8 +135,9 @@ class FakeProcess:
             return
         if self.role == "state":
             self._said = True
-            yield ArmState(time.monotonic(), 0.0, ZEROS, ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL,
-                           PLAYING).packed()
+            yield ArmState(
+                time.monotonic(), 0.0, ZEROS, ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL, PLAYING
+            ).packed()
         elif not self._said:
             self._said = True
             yield READY
@@ -183,7 +196,7 @@ def test_a_program_asked_for_while_one_is_ready_is_a_new_one(link: RtdeLink) -> 
     link.connect()
     link.request_program()
     until(link, lambda: link.commanding)
-    link.request_program()    # as resume does when the arm stopped before it followed
+    link.request_program()  # as resume does when the arm stopped before it followed
     assert not link.commanding
     until(link, lambda: link.commanding)
     controls = [process for process in FakeProcess.started if process.role == "control"]
@@ -209,8 +222,10 @@ def test_a_control_loop_that_comes_late_does_not_take_the_link_for_lost(link: Rt
         assert link.lost == "" and link.commanding
 
 
-@pytest.mark.parametrize(("role", "said"), [("state", "reads the arm's state has said nothing"),
-                                            ("control", "commands the arm has taken no command")])
+@pytest.mark.parametrize(
+    ("role", "said"),
+    [("state", "reads the arm's state has said nothing"), ("control", "commands the arm has taken no command")],
+)
 def test_a_process_that_hangs_is_told_and_replaced(link: RtdeLink, role: str, said: str) -> None:
     link.connect()
     link.request_program()

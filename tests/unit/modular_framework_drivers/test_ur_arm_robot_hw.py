@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The driver of UR arms against the emulated controller: it follows, says what is wrong, and comes back."""
+
 from __future__ import annotations
 
 import contextlib
@@ -118,17 +119,23 @@ def rig(running: Rig) -> Rig:
         running.arm.command(command)
     running.arm.command("slider", value=1.0)
     running.cycle()
-    running.until(lambda: running.resume() == "")    # what was ordered is known to the driver a little later
+    running.until(lambda: running.resume() == "")  # what was ordered is known to the driver a little later
     running.until(lambda: running.hw.ready)
     running.run(0.1, running.positions)
     return running
 
 
 def test_it_starts_says_what_it_does_and_leaves_the_arm_where_it_is(
-        make_rig: Callable[..., Rig], caplog: pytest.LogCaptureFixture) -> None:
+    make_rig: Callable[..., Rig], caplog: pytest.LogCaptureFixture
+) -> None:
     caplog.set_level(logging.INFO, "rosout.ur_arm")
-    rig = make_rig(payload_mass_kg=0.4, payload_center_of_mass_m=[0.0, 0.0, 0.05], speed_scale=0.5,
-                   control_pc_ip_address="192.168.56.1", robot_program_path="")
+    rig = make_rig(
+        payload_mass_kg=0.4,
+        payload_center_of_mass_m=[0.0, 0.0, 0.05],
+        speed_scale=0.5,
+        control_pc_ip_address="192.168.56.1",
+        robot_program_path="",
+    )
     before = rig.positions
     rig.run(0.3)
     assert rig.positions == pytest.approx(before, abs=1e-6)
@@ -136,7 +143,7 @@ def test_it_starts_says_what_it_does_and_leaves_the_arm_where_it_is(
     assert rig.arm.state()["payload_kg"] == "0.4"
     assert rig.arm.state()["slider"] == "0.5"
     assert rig.hw.get(SpeedScalingInterface).handles[0].factor == pytest.approx(0.5)
-    assert rig.hw.get(ForceTorqueSensorInterface).get_handle("wrench").frame_id == "base"   # a link of the description
+    assert rig.hw.get(ForceTorqueSensorInterface).get_handle("wrench").frame_id == "base"  # a link of the description
     unused = [record.getMessage() for record in caplog.records if "not used" in record.getMessage()]
     assert len(unused) == 1 and "control_pc_ip_address" in unused[0] and "robot_program_path" not in unused[0]
 
@@ -150,7 +157,7 @@ def test_it_follows_a_motion(rig: Rig) -> None:
         worst = max(worst, abs(rig.positions[0] - goal[0]))
         assert rig.hw.fault() == ""
     rig.run(0.3, start)
-    assert worst < 0.15      # what a lookahead of 0.03 s and a busy machine explain, at 0.79 rad/s
+    assert worst < 0.15  # what a lookahead of 0.03 s and a busy machine explain, at 0.79 rad/s
     assert rig.positions == pytest.approx(start, abs=1e-3)
 
 
@@ -164,10 +171,17 @@ def test_the_wrench_at_the_tool_is_a_sensor(make_rig: Callable[..., Rig]) -> Non
     rig.arm.command("wrench")
 
 
-@pytest.mark.parametrize(("command", "reason"), [
-    ("protective_stop", "protective stop of the arm"), ("emergency_stop", "emergency stop of the arm"),
-    ("stop_program", "the program on the arm was stopped"), ("cut", "link to the arm"), ("freeze", "link to the arm"),
-    ("garbage", "link to the arm")])
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("protective_stop", "protective stop of the arm"),
+        ("emergency_stop", "emergency stop of the arm"),
+        ("stop_program", "the program on the arm was stopped"),
+        ("cut", "link to the arm"),
+        ("freeze", "link to the arm"),
+        ("garbage", "link to the arm"),
+    ],
+)
 def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, command: str, reason: str) -> None:
     start = rig.positions
     commands = ([position + 0.001 * step for position in start] for step in itertools.count())
@@ -182,7 +196,7 @@ def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, comman
     told_at = rig.arm.positions()
     rig.run(0.2)
     standing = rig.arm.positions()
-    assert standing == pytest.approx(told_at, abs=0.02)     # its way to rest, from 0.125 rad/s
+    assert standing == pytest.approx(told_at, abs=0.02)  # its way to rest, from 0.125 rad/s
     rig.run(0.2)
     assert rig.hw.fault() != "" and rig.arm.positions() == pytest.approx(standing, abs=1e-4)
     for remedy in ("restore", "unlock", "release_emergency_stop", "power_on"):
@@ -210,7 +224,8 @@ def test_resume_says_what_is_to_be_done_first(rig: Rig) -> None:
 
 
 def test_resume_does_not_raise_a_slider_that_was_lowered_but_lowers_one_that_was_raised(
-        make_rig: Callable[..., Rig]) -> None:
+    make_rig: Callable[..., Rig],
+) -> None:
     rig = make_rig(speed_scale=0.5)
     scaling = rig.hw.get(SpeedScalingInterface).handles[0]
     for value, expected in ((0.1, 0.1), (1.0, 0.5)):
@@ -279,20 +294,23 @@ def scheduling(rig: Rig) -> dict[str, list[tuple[int, int]]]:
             if modules & set(line) and rig.arm.address in line:
                 threads = sorted((thread.name for thread in (entry / "task").iterdir()), key=entry.name.__ne__)
                 name = line[3] if line[3] in ("state", "control") else "emulator"
-                found[name] = [(os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority)
-                               for thread in map(int, threads)]
+                found[name] = [
+                    (os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority)
+                    for thread in map(int, threads)
+                ]
     return found
 
 
 def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitted_and_wanted(
-        make_rig: Callable[..., Rig], real_time_permitted: bool) -> None:
+    make_rig: Callable[..., Rig], real_time_permitted: bool
+) -> None:
     def check(**priorities: int) -> None:
         found = scheduling(rig)
         assert set(found) == set(priorities)
         for role, (main, *others) in found.items():
             wanted = priorities[role] if real_time_permitted else 0
             assert main == (os.SCHED_FIFO if wanted else os.SCHED_OTHER, wanted)
-            assert others and max(others) <= main, role      # ur-rtde and the command port have threads
+            assert others and max(others) <= main, role  # ur-rtde and the command port have threads
 
     rig = make_rig()
     check(state=60, control=60, emulator=30)
@@ -350,12 +368,17 @@ def test_an_emulator_that_is_killed_is_a_lost_link(tmp_path: Any) -> None:
     other.close()
 
 
-@pytest.mark.parametrize(("parameters", "said"), [
-    ({}, "robot_ip_address"), ({"robot_ip_address": "x", "speed_scale": 2.0}, "speed_scale"),
-    ({"robot_ip_address": "x", "payload_mass_kg": "heavy"}, "payload_mass_kg"),
-    ({"robot_ip_address": "x", "payload_center_of_mass_m": [0.0]}, "payload_center_of_mass_m"),
-    ({"robot_ip_address": "x", "robot_id": 7}, "robot_id"),
-    ({"robot_ip_address": "x", "servoj_gain": 5}, "servoj_gain")])
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({}, "robot_ip_address"),
+        ({"robot_ip_address": "x", "speed_scale": 2.0}, "speed_scale"),
+        ({"robot_ip_address": "x", "payload_mass_kg": "heavy"}, "payload_mass_kg"),
+        ({"robot_ip_address": "x", "payload_center_of_mass_m": [0.0]}, "payload_center_of_mass_m"),
+        ({"robot_ip_address": "x", "robot_id": 7}, "robot_id"),
+        ({"robot_ip_address": "x", "servoj_gain": 5}, "servoj_gain"),
+    ],
+)
 def test_a_wrong_parameter_is_named(parameters: dict[str, Any], said: str, caplog: pytest.LogCaptureFixture) -> None:
     assert UrArmHardware().init(MappingNodeHandle({}), MappingNodeHandle(parameters, "/arm_hw")) is False
     assert f"/arm_hw/{said}" in caplog.text

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What of the commands reaches the arm."""
+
 from __future__ import annotations
 
 import math
@@ -32,7 +33,7 @@ def checked(max_jump: float = 0.5, soft: SoftJointLimits | None = None) -> Comma
 def test_whatever_is_commanded_the_arm_is_told_what_it_can_do(steps: list[tuple[float, float, float]]) -> None:
     check = checked()
     velocities = [0.0, 0.0]
-    longer_cycles = 3.0 * (PERIODS_S[-1] - PERIODS_S[1]) / 2.0    # what cycles that become shorter take from braking
+    longer_cycles = 3.0 * (PERIODS_S[-1] - PERIODS_S[1]) / 2.0  # what cycles that become shorter take from braking
     for first, second, period_s in steps:
         before = list(check.sent)
         check.admit([first, second], period_s)
@@ -48,10 +49,15 @@ def test_whatever_is_commanded_the_arm_is_told_what_it_can_do(steps: list[tuple[
 
 
 @settings(deadline=None)
-@given(speed=st.floats(0.1, 3.0), end=st.floats(1.8, 2.0), period_s=st.sampled_from(PERIODS_S[1:]),
-       afterwards=st.sampled_from(["it stays", "it goes back", "it is refused"]))
+@given(
+    speed=st.floats(0.1, 3.0),
+    end=st.floats(1.8, 2.0),
+    period_s=st.sampled_from(PERIODS_S[1:]),
+    afterwards=st.sampled_from(["it stays", "it goes back", "it is refused"]),
+)
 def test_a_command_that_stops_abruptly_at_the_end_of_the_range_does_not_send_the_arm_beyond(
-        speed: float, end: float, period_s: float, afterwards: str) -> None:
+    speed: float, end: float, period_s: float, afterwards: str
+) -> None:
     check = checked()
     velocity = 0.0
     for cycle in range(1, round(end / speed / period_s) + 100):
@@ -140,8 +146,9 @@ def test_the_refusal_says_what_was_got_and_what_is_allowed() -> None:
 
 @settings(deadline=None)
 @given(speed=st.floats(0.1, 2.5), k_position=st.floats(2.0, 20.0), end=st.floats(0.2, 1.5))
-def test_an_end_of_the_soft_range_is_approached_the_slower_the_nearer_and_not_passed(speed: float, k_position: float,
-                                                                                     end: float) -> None:
+def test_an_end_of_the_soft_range_is_approached_the_slower_the_nearer_and_not_passed(
+    speed: float, k_position: float, end: float
+) -> None:
     check = checked(max_jump=4.0, soft=SoftJointLimits(-1.9, end, k_position, 1.0))
     for cycle in range(1, 700):
         before = check.sent[0]
@@ -195,10 +202,25 @@ def test_the_limits_are_those_of_the_description_and_of_joint_limits_but_never_m
         <limit lower="-9" upper="1" velocity="99" effort="1"/>
         <safety_controller soft_lower_limit="-1" soft_upper_limit="0.5" k_position="15" k_velocity="2"/>
       </joint></robot>"""
-    root = MappingNodeHandle({"robot_description": description, "joint_limits": {"elbow": {
-        "has_position_limits": True, "min_position": -0.5, "max_position": 0.5, "has_acceleration_limits": True,
-        "max_acceleration": 3.0, "has_soft_limits": True, "soft_lower_limit": -0.4, "soft_upper_limit": 0.4,
-        "k_position": 10.0, "k_velocity": 1.0}}})
+    root = MappingNodeHandle(
+        {
+            "robot_description": description,
+            "joint_limits": {
+                "elbow": {
+                    "has_position_limits": True,
+                    "min_position": -0.5,
+                    "max_position": 0.5,
+                    "has_acceleration_limits": True,
+                    "max_acceleration": 3.0,
+                    "has_soft_limits": True,
+                    "soft_lower_limit": -0.4,
+                    "soft_upper_limit": 0.4,
+                    "k_position": 10.0,
+                    "k_velocity": 1.0,
+                }
+            },
+        }
+    )
     shoulder, elbow = read_checked_joints(["shoulder", "elbow"], root)
     assert (shoulder.limits.min_position, shoulder.limits.max_position) == (pytest.approx(-2.0 * math.pi), 1.0)
     assert (shoulder.limits.max_velocity, shoulder.limits.max_acceleration) == (pytest.approx(math.pi), 40.0)

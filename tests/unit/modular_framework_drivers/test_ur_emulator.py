@@ -3,6 +3,7 @@
 
 The client runs in a process of its own: it stops the whole interpreter while it connects.
 """
+
 from __future__ import annotations
 
 import itertools
@@ -33,12 +34,19 @@ def arm() -> Iterator[EmulatedArm]:
 
 def client(arm: EmulatedArm, code: str) -> Any:
     """Run client code that ends with a value in `answer`; returns the value."""
-    head = ("import json, math, time\nfrom rtde_control import RTDEControlInterface\n"
-            "from rtde_receive import RTDEReceiveInterface\nfrom rtde_io import RTDEIOInterface\n"
-            f"from dashboard_client import DashboardClient\naddress = {arm.address!r}\n")
+    head = (
+        "import json, math, time\nfrom rtde_control import RTDEControlInterface\n"
+        "from rtde_receive import RTDEReceiveInterface\nfrom rtde_io import RTDEIOInterface\n"
+        f"from dashboard_client import DashboardClient\naddress = {arm.address!r}\n"
+    )
     tail = "\nprint('answer', json.dumps(answer), flush=True)\n"
-    done = subprocess.run([sys.executable, "-c", head + textwrap.dedent(code) + tail], capture_output=True, text=True,
-                          timeout=40.0, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", head + textwrap.dedent(code) + tail],
+        capture_output=True,
+        text=True,
+        timeout=40.0,
+        check=False,
+    )
     lines = [line for line in done.stdout.splitlines() if line.startswith("answer ")]
     assert lines, done.stdout + done.stderr
     return json.loads(lines[-1][7:])
@@ -47,13 +55,16 @@ def client(arm: EmulatedArm, code: str) -> Any:
 @pytest.mark.parametrize("model", ["UR5", "UR5e"])
 def test_the_client_reads_every_variable_it_asks_for_by_default(model: str) -> None:
     arm = EmulatedArm(model)
-    answer = client(arm, """
+    answer = client(
+        arm,
+        """
         arm = RTDEReceiveInterface(address)
         first = arm.getTimestamp()
         time.sleep(0.5)
         answer = [arm.getActualQ(), arm.getActualQd(), arm.getRobotMode(), arm.getSafetyMode(), arm.getRuntimeState(),
                   arm.getSpeedScaling(), arm.getTimestamp() - first, arm.getActualTCPPose()[:3]]
-        """)
+        """,
+    )
     arm.close()
     positions, velocities, robot_mode, safety_mode, runtime_state, scaling, passed_s, flange = answer
     assert positions == pytest.approx(HOME) and velocities == [0.0] * 6
@@ -65,7 +76,9 @@ def test_the_client_reads_every_variable_it_asks_for_by_default(model: str) -> N
 def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm, tmp_path: Path) -> None:
     log = tmp_path / "path.csv"
     arm.command("log", path=log)
-    before, moved, after, stopped, running = client(arm, """
+    before, moved, after, stopped, running = client(
+        arm,
+        """
         arm, control = RTDEReceiveInterface(address), RTDEControlInterface(address)
         before = control.isProgramRunning()
         start = arm.getActualQ()
@@ -82,7 +95,8 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
         control.moveJ(start, 2.0, 5.0)
         control.stopScript()
         answer = [before, moved, after, stopped, control.isProgramRunning()]
-        """)
+        """,
+    )
     arm.command("end_log")
     assert before is True and stopped is True and running is False
     assert moved == pytest.approx(0.4, abs=1e-3)
@@ -95,8 +109,9 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
     assert commanded == sorted(commanded)
 
 
-def test_the_log_tells_of_every_cycle_when_asked_to_and_else_of_streamed_positions(arm: EmulatedArm,
-                                                                                   tmp_path: Path) -> None:
+def test_the_log_tells_of_every_cycle_when_asked_to_and_else_of_streamed_positions(
+    arm: EmulatedArm, tmp_path: Path
+) -> None:
     def lines(**arguments: object) -> list[str]:
         arm.command("log", path=tmp_path / "log.csv", **arguments)
         time.sleep(0.3)
@@ -111,28 +126,36 @@ def test_the_log_tells_of_every_cycle_when_asked_to_and_else_of_streamed_positio
 
 
 def test_a_second_program_replaces_the_first(arm: EmulatedArm) -> None:
-    assert client(arm, """
+    assert client(
+        arm,
+        """
         first = RTDEControlInterface(address)
         first.disconnect()
         second = RTDEControlInterface(address)
         answer = [second.isProgramRunning(), second.setPayload(1.5, [0.0, 0.0, 0.1])]
         second.stopScript()
-        """) == [True, True]
+        """,
+    ) == [True, True]
     assert arm.state()["payload_kg"] == "1.5"
 
 
 def test_the_speed_slider_is_set_and_read(arm: EmulatedArm) -> None:
-    assert client(arm, """
+    assert client(
+        arm,
+        """
         arm, panel = RTDEReceiveInterface(address), RTDEIOInterface(address)
         panel.setSpeedSlider(0.4)
         time.sleep(0.3)
         answer = arm.getTargetSpeedFraction()
         panel.setSpeedSlider(1.0)
-        """) == pytest.approx(0.4)
+        """,
+    ) == pytest.approx(0.4)
 
 
 def test_a_protective_stop_ends_the_program_and_is_unlocked(arm: EmulatedArm) -> None:
-    answer = client(arm, """
+    answer = client(
+        arm,
+        """
         arm, control, dashboard = RTDEReceiveInterface(address), RTDEControlInterface(address), DashboardClient(address)
         dashboard.connect()
         control.triggerProtectiveStop()
@@ -145,7 +168,8 @@ def test_a_protective_stop_ends_the_program_and_is_unlocked(arm: EmulatedArm) ->
         time.sleep(0.3)
         answer = [stopped, refused, arm.isProtectiveStopped(), control.isProgramRunning()]
         control.stopScript()
-        """)
+        """,
+    )
     assert answer == [[True, 3, False, "Safetymode: PROTECTIVE_STOP"], False, False, True]
 
 
@@ -162,7 +186,9 @@ def test_after_an_emergency_stop_the_arm_is_powered_on_from_the_dashboard(arm: E
 
 
 def test_a_pause_holds_the_arm_where_it_is_until_play(arm: EmulatedArm) -> None:
-    paused, resumed = client(arm, """
+    paused, resumed = client(
+        arm,
+        """
         arm, control, dashboard = RTDEReceiveInterface(address), RTDEControlInterface(address), DashboardClient(address)
         dashboard.connect()
         start = arm.getActualQ()
@@ -180,16 +206,20 @@ def test_a_pause_holds_the_arm_where_it_is_until_play(arm: EmulatedArm) -> None:
         answer = [paused, arm.getActualQ()[0] - start[0]]
         control.moveJ(start, 2.0, 5.0)
         control.stopScript()
-        """)
+        """,
+    )
     assert paused == [4, 0.0, 0.0]
     assert resumed == pytest.approx(0.3, abs=1e-3)
 
 
 def test_it_says_what_it_does_not_run(arm: EmulatedArm) -> None:
-    assert client(arm, """
+    assert client(
+        arm,
+        """
         control = RTDEControlInterface(address)
         answer = [control.moveL([0.1, -0.3, 0.5, 0.0, 3.1, 0.0], 0.25, 1.2), control.isProgramRunning()]
-        """) == [False, False]
+        """,
+    ) == [False, False]
 
 
 def test_a_lost_link_refuses_connections_until_it_is_restored(arm: EmulatedArm) -> None:
@@ -212,14 +242,22 @@ def test_delayed_packages_come_late(arm: EmulatedArm) -> None:
     arm.command("delay", seconds=0.3)
     begun_s = time.monotonic()
     ask_dashboard(arm.address, "robotmode")
-    assert time.monotonic() - begun_s >= 0.6      # the greeting and the answer
+    assert time.monotonic() - begun_s >= 0.6  # the greeting and the answer
     arm.command("restore")
 
 
-@pytest.mark.parametrize(("command", "arguments", "allowed"), [
-    ("slider", {"value": 1.2}, "from 0 to 1"), ("delay", {"seconds": -1}, "at least 0"),
-    ("lose", {"every": -1}, "at least 0"), ("explode", {}, "known: help"), ("slider", {}, "value")])
-def test_an_order_that_cannot_be_carried_out_says_what_can(arm: EmulatedArm, command: str, arguments: dict[str, float],
-                                                           allowed: str) -> None:
+@pytest.mark.parametrize(
+    ("command", "arguments", "allowed"),
+    [
+        ("slider", {"value": 1.2}, "from 0 to 1"),
+        ("delay", {"seconds": -1}, "at least 0"),
+        ("lose", {"every": -1}, "at least 0"),
+        ("explode", {}, "known: help"),
+        ("slider", {}, "value"),
+    ],
+)
+def test_an_order_that_cannot_be_carried_out_says_what_can(
+    arm: EmulatedArm, command: str, arguments: dict[str, float], allowed: str
+) -> None:
     with pytest.raises(CommandError, match=allowed):
         arm.command(command, **arguments)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The joints of the emulated arm."""
+
 from __future__ import annotations
 
 import math
@@ -23,20 +24,28 @@ DRIVES = st.sampled_from([Drive.SERVO, Drive.MOVE, Drive.SPEED, Drive.STOP, Driv
 
 
 @settings(deadline=None)
-@given(start=POSITIONS, commands=st.lists(st.tuples(DRIVES, POSITIONS, st.integers(1, 30)), max_size=6),
-       speed=st.floats(0.0, 1.0))
+@given(
+    start=POSITIONS,
+    commands=st.lists(st.tuples(DRIVES, POSITIONS, st.integers(1, 30)), max_size=6),
+    speed=st.floats(0.0, 1.0),
+)
 def test_no_joint_is_ever_faster_than_the_arm_or_accelerates_more(
-        start: tuple[float, ...], commands: list[tuple[Drive, tuple[float, ...], int]], speed: float) -> None:
+    start: tuple[float, ...], commands: list[tuple[Drive, tuple[float, ...], int]], speed: float
+) -> None:
     motion = ArmMotion(start)
     for drive, target, cycles in commands:
         motion.set_command(MotionCommand(drive, target))
         for _ in range(cycles):
             before, positions = list(motion.velocities), list(motion.positions)
             motion.step(DT_S, speed)
-            assert all(abs(new - old) <= MAX_ACCELERATION * DT_S + 1e-9
-                       for new, old in zip(motion.velocities, before, strict=True))
-            assert all(abs(new - old) <= MAX_VELOCITY * DT_S + 1e-9
-                       for new, old in zip(motion.positions, positions, strict=True))
+            assert all(
+                abs(new - old) <= MAX_ACCELERATION * DT_S + 1e-9
+                for new, old in zip(motion.velocities, before, strict=True)
+            )
+            assert all(
+                abs(new - old) <= MAX_VELOCITY * DT_S + 1e-9
+                for new, old in zip(motion.positions, positions, strict=True)
+            )
 
 
 @settings(deadline=None)
@@ -72,7 +81,8 @@ def test_at_a_slider_of_nothing_the_arm_rests() -> None:
 def test_the_flange_is_where_the_makers_table_puts_it() -> None:
     # upright: the arm's lengths above each other, the wrist beside them
     assert flange_pose((0.0, -math.pi / 2, 0.0, -math.pi / 2, 0.0, 0.0))[:3] == pytest.approx(
-        (0.0, -(0.10915 + 0.0823), 0.089159 + 0.425 + 0.39225 + 0.09465), abs=1e-9)
+        (0.0, -(0.10915 + 0.0823), 0.089159 + 0.425 + 0.39225 + 0.09465), abs=1e-9
+    )
     # stretched out along x
     assert flange_pose((0.0,) * 6)[:3] == pytest.approx((-0.81725, -0.10915 - 0.0823, 0.089159 - 0.09465), abs=1e-9)
 

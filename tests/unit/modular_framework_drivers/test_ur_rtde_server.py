@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The emulated controller's side of RTDE, byte by byte as its maker documents the protocol."""
+
 from __future__ import annotations
 
 import struct
@@ -72,7 +73,7 @@ def test_a_data_package_sets_the_inputs_of_its_recipe(server: RtdeServer) -> Non
 def test_packages_may_come_in_pieces(server: RtdeServer) -> None:
     session = RtdeSession(server)
     data = package("V", b"\x00\x02") + package("v")
-    replies = b"".join(session.receive(data[index:index + 1]) for index in range(len(data)))
+    replies = b"".join(session.receive(data[index : index + 1]) for index in range(len(data)))
     assert replies == package("V", b"\x01") + package("v", struct.pack(">4I", 5, 12, 4, 1101661))
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What counts as silence of the arm, and what as one of its states."""
+
 from __future__ import annotations
 
 import math
@@ -48,8 +49,15 @@ def test_a_joint_that_turns_without_end_has_turned_often() -> None:
     assert is_plausible(next_state(positions=(*SIX[1:], 50.02)), replace(STATE, positions=(*SIX[1:], 50.0)))
 
 
-@pytest.mark.parametrize("changes", [
-    {"timestamp_s": math.nan}, {"timestamp_s": 4.9},
-    {"positions": (math.nan, *SIX[1:])}, {"positions": (101.0, *SIX[1:])}, {"positions": (0.3, *SIX[1:])}])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"timestamp_s": math.nan},
+        {"timestamp_s": 4.9},
+        {"positions": (math.nan, *SIX[1:])},
+        {"positions": (101.0, *SIX[1:])},
+        {"positions": (0.3, *SIX[1:])},
+    ],
+)
 def test_garbage_does_not_follow(changes: dict[str, object]) -> None:
     assert not is_plausible(next_state(**changes), STATE)

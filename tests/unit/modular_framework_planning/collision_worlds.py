@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Worlds of every kind of shape around the robot, which holds an object; verdicts on random states in them."""
+
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass
@@ -70,8 +71,11 @@ def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Gen
     second.set_world(world)
     shape, solid = shape_of(held, np.array([0.17, 0.17, 0.2]))
     pose = pin.SE3(np.eye(3), np.array([0.0, 0.25, 0.05]))
-    touch = frozenset(link for link in model.document.links if model.has_link(link)
-                      and ("wrist_3" in link or "ee" in link or "ezgripper" in link or "tool" in link))
+    touch = frozenset(
+        link
+        for link in model.document.links
+        if model.has_link(link) and ("wrist_3" in link or "ee" in link or "ezgripper" in link or "tool" in link)
+    )
     body = CollisionObject("held", pose, ((shape, pin.SE3.Identity()),))
     scene = scene.with_attached(AttachedObject(body, TIP, touch))
     robot_parts = [number for number, part in enumerate(second.parts) if part.link]
@@ -96,8 +100,9 @@ def verdict(ours: ExactCollisionChecker, second: IndependentChecker, positions: 
     return Verdicts(1, free, free and touching, refused and not near, near)
 
 
-def compare_verdicts(model: RobotModel, second: IndependentChecker, rng: np.random.Generator, states: int,
-                     held: int) -> Verdicts:
+def compare_verdicts(
+    model: RobotModel, second: IndependentChecker, rng: np.random.Generator, states: int, held: int
+) -> Verdicts:
     """Compares random states in a random world; `held` is the kind of the held object."""
     ours = ExactCollisionChecker(world_with(model, second, rng, held))
     return sum((verdict(ours, second, random_state(model, rng)) for _ in range(states)), Verdicts())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robots the planner is tested with: the shipped UR5 with EZGripper and a small arm written for the tests."""
+
 from __future__ import annotations
 
 import sys
@@ -9,17 +10,27 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path += [str(ROOT / "src/modular_framework_planning/src"), str(ROOT / "src/modular_framework_urdf/src"),
-             str(Path(__file__).parent)]
+sys.path += [
+    str(ROOT / "src/modular_framework_planning/src"),
+    str(ROOT / "src/modular_framework_urdf/src"),
+    str(Path(__file__).parent),
+]
 
 from modular_framework_planning.errors import ModelError  # noqa: E402
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 from modular_framework_planning.robot_model.urdf_document import package_resolver  # noqa: E402
 
-LIMITS = {name: {"has_velocity_limits": True, "max_velocity": 3.0, "has_acceleration_limits": True,
-                 "max_acceleration": 5.0}
-          for name in ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint",
-                       "wrist_3_joint")}
+LIMITS = {
+    name: {"has_velocity_limits": True, "max_velocity": 3.0, "has_acceleration_limits": True, "max_acceleration": 5.0}
+    for name in (
+        "shoulder_pan_joint",
+        "shoulder_lift_joint",
+        "elbow_joint",
+        "wrist_1_joint",
+        "wrist_2_joint",
+        "wrist_3_joint",
+    )
+}
 
 
 @dataclass(frozen=True)

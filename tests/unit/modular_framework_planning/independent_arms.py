@@ -3,6 +3,7 @@
 
 The UR5's Denavit-Hartenberg lengths and the joint frames of the seven-joint arm (those of a Franka Panda) are public.
 """
+
 from __future__ import annotations
 
 import math
@@ -15,21 +16,33 @@ UR5_ALPHA = (math.pi / 2, 0.0, 0.0, math.pi / 2, -math.pi / 2, 0.0)  # [rad]
 
 _UP, _DOWN = math.pi / 2, -math.pi / 2
 SEVEN_JOINTS = (  # position [m] and turn about x [rad] of each joint in the frame of the one before, bounds [rad]
-    ((0.0, 0.0, 0.333), 0.0, (-2.8973, 2.8973)), ((0.0, 0.0, 0.0), _DOWN, (-1.7628, 1.7628)),
-    ((0.0, -0.316, 0.0), _UP, (-2.8973, 2.8973)), ((0.0825, 0.0, 0.0), _UP, (-3.0718, -0.0698)),
-    ((-0.0825, 0.384, 0.0), _DOWN, (-2.8973, 2.8973)), ((0.0, 0.0, 0.0), _UP, (-0.0175, 3.7525)),
-    ((0.088, 0.0, 0.0), _UP, (-2.8973, 2.8973)))
+    ((0.0, 0.0, 0.333), 0.0, (-2.8973, 2.8973)),
+    ((0.0, 0.0, 0.0), _DOWN, (-1.7628, 1.7628)),
+    ((0.0, -0.316, 0.0), _UP, (-2.8973, 2.8973)),
+    ((0.0825, 0.0, 0.0), _UP, (-3.0718, -0.0698)),
+    ((-0.0825, 0.384, 0.0), _DOWN, (-2.8973, 2.8973)),
+    ((0.0, 0.0, 0.0), _UP, (-0.0175, 3.7525)),
+    ((0.088, 0.0, 0.0), _UP, (-2.8973, 2.8973)),
+)
 FLANGE = 0.107  # [m] along z of the last joint
 
 _JOINT = """<link name="link{n}"/>
 <joint name="joint{n}" type="revolute"><parent link="{parent}"/><child link="link{n}"/>
 <origin xyz="{x} {y} {z}" rpy="{turn} 0 0"/><axis xyz="0 0 1"/>
 <limit lower="{low}" upper="{high}" velocity="2" effort="10"/></joint>"""
-SEVEN_JOINT_URDF = '<robot name="seven"><link name="base"/>' + "".join(
-    _JOINT.format(n=n, parent=f"link{n - 1}" if n > 1 else "base", x=at[0], y=at[1], z=at[2], turn=turn, low=low,
-                  high=high) for n, (at, turn, (low, high)) in enumerate(SEVEN_JOINTS, 1)) + (
-    '<link name="flange"/><joint name="fixed" type="fixed"><parent link="link7"/><child link="flange"/>'
-    f'<origin xyz="0 0 {FLANGE}"/></joint></robot>')
+SEVEN_JOINT_URDF = (
+    '<robot name="seven"><link name="base"/>'
+    + "".join(
+        _JOINT.format(
+            n=n, parent=f"link{n - 1}" if n > 1 else "base", x=at[0], y=at[1], z=at[2], turn=turn, low=low, high=high
+        )
+        for n, (at, turn, (low, high)) in enumerate(SEVEN_JOINTS, 1)
+    )
+    + (
+        '<link name="flange"/><joint name="fixed" type="fixed"><parent link="link7"/><child link="flange"/>'
+        f'<origin xyz="0 0 {FLANGE}"/></joint></robot>'
+    )
+)
 SEVEN_JOINT_SRDF = """<robot name="seven">
 <group name="arm"><chain base_link="base" tip_link="flange"/></group></robot>"""
 
@@ -80,8 +93,16 @@ def seven_joint_flange(values: np.ndarray) -> np.ndarray:
 def pose_gap(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distances [m] and angles [rad] between poses of shape (..., 4, 4), exact for small angles."""
     turned = np.swapaxes(first[..., :3, :3], -1, -2) @ second[..., :3, :3]
-    axis = np.stack([turned[..., 2, 1] - turned[..., 1, 2], turned[..., 0, 2] - turned[..., 2, 0],
-                     turned[..., 1, 0] - turned[..., 0, 1]], axis=-1)
+    axis = np.stack(
+        [
+            turned[..., 2, 1] - turned[..., 1, 2],
+            turned[..., 0, 2] - turned[..., 2, 0],
+            turned[..., 1, 0] - turned[..., 0, 1],
+        ],
+        axis=-1,
+    )
     trace = np.trace(turned, axis1=-2, axis2=-1)
-    return (np.linalg.norm(first[..., :3, 3] - second[..., :3, 3], axis=-1),
-            np.arctan2(0.5 * np.linalg.norm(axis, axis=-1), 0.5 * (trace - 1.0)))
+    return (
+        np.linalg.norm(first[..., :3, 3] - second[..., :3, 3], axis=-1),
+        np.arctan2(0.5 * np.linalg.norm(axis, axis=-1), 0.5 * (trace - 1.0)),
+    )

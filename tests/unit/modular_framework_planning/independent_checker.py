@@ -4,6 +4,7 @@
 Of the planner it shares the reader of mesh files only. Pairs are left out where a sphere around one body does not reach
 the box around the other.
 """
+
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
@@ -129,9 +130,15 @@ class IndependentChecker:
             axis = _floats(joint.find("axis"), "xyz", "1 0 0")
             mimic = joint.find("mimic")
             self._joints[joint.find("child").get("link")] = (
-                joint.get("name"), joint.get("type"), joint.find("parent").get("link"), _origin(joint), axis,
-                None if mimic is None else (mimic.get("joint"), float(mimic.get("multiplier", 1)),
-                                            float(mimic.get("offset", 0))))
+                joint.get("name"),
+                joint.get("type"),
+                joint.find("parent").get("link"),
+                _origin(joint),
+                axis,
+                None
+                if mimic is None
+                else (mimic.get("joint"), float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))),
+            )
         self._links = [link.get("name") for link in root.findall("link")]
         self.parts: list[Part] = []
         for link in root.findall("link"):
@@ -161,19 +168,25 @@ class IndependentChecker:
 
     def _robot_pairs(self) -> list[tuple[int, int]]:
         roots = [self._moving_root(part.link) for part in self.parts]
-        return [(i, j) for i in range(len(self.parts)) for j in range(i + 1, len(self.parts))
-                if roots[i] != roots[j]
-                and frozenset((self.parts[i].link, self.parts[j].link)) not in self._allowed]
+        return [
+            (i, j)
+            for i in range(len(self.parts))
+            for j in range(i + 1, len(self.parts))
+            if roots[i] != roots[j] and frozenset((self.parts[i].link, self.parts[j].link)) not in self._allowed
+        ]
 
     def set_world(self, objects: World) -> None:
         """Replaces the world: name, solid, pose in the root frame."""
-        self.parts = self.parts[:self._robot_parts]
+        self.parts = self.parts[: self._robot_parts]
         self._pairs = self._robot_pairs()
         base = self._moving_root(self._links[0])
         for name, solid, pose in objects:
             self.parts.append(Part(name, "", pose, solid))
-            self._pairs += [(i, len(self.parts) - 1) for i in range(self._robot_parts)
-                            if self._moving_root(self.parts[i].link) != base]
+            self._pairs += [
+                (i, len(self.parts) - 1)
+                for i in range(self._robot_parts)
+                if self._moving_root(self.parts[i].link) != base
+            ]
 
     def link_poses(self, positions: Mapping[str, float | np.ndarray]) -> dict[str, np.ndarray]:
         """Forward kinematics of one state, or of many where positions are arrays; poses of shape (..., 4, 4).
@@ -218,8 +231,10 @@ class IndependentChecker:
         return near
 
     def _touch(self, pair: tuple[int, int], poses: np.ndarray) -> bool:
-        first, second = (fcl.CollisionObject(self.parts[k].solid.geometry,
-                                             fcl.Transform(poses[k, :3, :3], poses[k, :3, 3])) for k in pair)
+        first, second = (
+            fcl.CollisionObject(self.parts[k].solid.geometry, fcl.Transform(poses[k, :3, :3], poses[k, :3, 3]))
+            for k in pair
+        )
         return fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
 
     def collisions(self, positions: Mapping[str, float], first_only: bool = True) -> list[tuple[str, str]]:
@@ -238,8 +253,10 @@ class IndependentChecker:
         """The smallest distance of bodies that may not touch [m]; 0 or less where some do."""
         poses, best = self._part_poses(positions, 1)[0], np.inf
         for pair in self._pairs:
-            first, second = (fcl.CollisionObject(self.parts[k].solid.geometry,
-                                                 fcl.Transform(poses[k, :3, :3], poses[k, :3, 3])) for k in pair)
+            first, second = (
+                fcl.CollisionObject(self.parts[k].solid.geometry, fcl.Transform(poses[k, :3, :3], poses[k, :3, 3]))
+                for k in pair
+            )
             best = min(best, fcl.distance(first, second, fcl.DistanceRequest(), fcl.DistanceResult()))
         return float(best)
 
@@ -249,25 +266,29 @@ class IndependentChecker:
         result = fcl.CollisionResult()
         for pair in self._pairs:
             if {self.parts[k].body for k in pair} == set(bodies):
-                first, second = (fcl.CollisionObject(self.parts[k].solid.geometry,
-                                                     fcl.Transform(poses[k, :3, :3], poses[k, :3, 3])) for k in pair)
+                first, second = (
+                    fcl.CollisionObject(self.parts[k].solid.geometry, fcl.Transform(poses[k, :3, :3], poses[k, :3, 3]))
+                    for k in pair
+                )
                 fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=100, enable_contact=True), result)
         return [contact.penetration_depth for contact in result.contacts]
 
-    def touching_pairs(self, joint_names: Sequence[str], samples: np.ndarray,
-                       rest: Mapping[str, float]) -> dict[int, tuple[str, str]]:
+    def touching_pairs(
+        self, joint_names: Sequence[str], samples: np.ndarray, rest: Mapping[str, float]
+    ) -> dict[int, tuple[str, str]]:
         """The first pair of bodies that touches, for each of many states (n, joints) in which one does."""
         found: dict[int, tuple[str, str]] = {}
         for begin in range(0, len(samples), STATES_AT_ONCE):
-            some = samples[begin:begin + STATES_AT_ONCE]
+            some = samples[begin : begin + STATES_AT_ONCE]
             poses = self._part_poses({**rest, **dict(zip(joint_names, some.T, strict=True))}, len(some))
             for state, number in np.argwhere(self._near(poses)):
                 if begin + state not in found and self._touch(self._pairs[number], poses[state]):
                     found[begin + int(state)] = tuple(self.parts[k].body for k in self._pairs[number])
         return found
 
-    def colliding_states(self, joint_names: Sequence[str], path: np.ndarray, rest: Mapping[str, float],
-                         step: float = 0.01) -> int:
+    def colliding_states(
+        self, joint_names: Sequence[str], path: np.ndarray, rest: Mapping[str, float], step: float = 0.01
+    ) -> int:
         """Counts colliding states on the straight pieces of a path, sampled at most `step` apart in every joint."""
         return len(self.touching_pairs(joint_names, sampled(path, step), rest))
 

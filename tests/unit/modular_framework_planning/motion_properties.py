@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Random problems for each planning pipeline, and what every returned motion must be true of."""
+
 from __future__ import annotations
 
 from collections import Counter
@@ -84,14 +85,16 @@ def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, 
     return scene, world
 
 
-def _free_state(model: RobotModel, checker: ExactCollisionChecker, rng: np.random.Generator,
-                near: np.ndarray | None = None) -> np.ndarray:
+def _free_state(
+    model: RobotModel, checker: ExactCollisionChecker, rng: np.random.Generator, near: np.ndarray | None = None
+) -> np.ndarray:
     """A free state: anywhere, or with each joint at most LINE_TURNS from another state."""
     indices = model.group(GROUP).indices
     positions = model.default_positions()
     while True:
-        positions[indices] = (rng.uniform(-np.pi, np.pi, 6) if near is None
-                              else near[indices] + rng.uniform(-LINE_TURNS, LINE_TURNS, 6))
+        positions[indices] = (
+            rng.uniform(-np.pi, np.pi, 6) if near is None else near[indices] + rng.uniform(-LINE_TURNS, LINE_TURNS, 6)
+        )
         if checker.is_free(positions):
             return positions.copy()
 
@@ -118,15 +121,38 @@ def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Pr
             if number % 2:
                 joint = int(indices[0])
                 low, high = sorted((start[joint], end[joint]))
-                constraints = KinematicConstraints(model, [JointConstraint(
-                    model.joint_names[joint], joint, 0.5 * (low + high), 0.5 * (high - low) + 0.3,
-                    0.5 * (high - low) + 0.3)])
-        yield Problem(PlanningRequest(scene.with_positions(start), GROUP, (asked,), PLANNERS[kind], 1, 10.0, SCALING,
-                                      SCALING, path_constraints=constraints), world, goal)
+                constraints = KinematicConstraints(
+                    model,
+                    [
+                        JointConstraint(
+                            model.joint_names[joint],
+                            joint,
+                            0.5 * (low + high),
+                            0.5 * (high - low) + 0.3,
+                            0.5 * (high - low) + 0.3,
+                        )
+                    ],
+                )
+        yield Problem(
+            PlanningRequest(
+                scene.with_positions(start),
+                GROUP,
+                (asked,),
+                PLANNERS[kind],
+                1,
+                10.0,
+                SCALING,
+                SCALING,
+                path_constraints=constraints,
+            ),
+            world,
+            goal,
+        )
 
 
-def violations(model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer,
-               scaling: float) -> list[str]:
+def violations(
+    model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer, scaling: float
+) -> list[str]:
     """Properties the motion lacks, looked at on the curve of a controller, at 1 ms samples.
 
     Joints' limits count with the factor `scaling`, collisions along the curve and straight from point to point.
@@ -136,10 +162,15 @@ def violations(model: RobotModel, checker: IndependentChecker, problem: Problem,
     if motion.times[0] != 0.0 or not (np.diff(motion.times) > 0.0).all():
         faults.append("times do not increase strictly")
     positions, velocities, accelerations, _ = motion.at(motion.sample_times(0.001))
-    shares = (np.abs(velocities) / model.max_velocity[indices]).max(), (
-        np.abs(accelerations) / model.max_acceleration[indices]).max()
-    faults += [f"{name} is {share / scaling:.7f} of its limit" for name, share in zip(
-        ("velocity", "acceleration"), shares, strict=True) if share > scaling * (1.0 + ROUNDING)]
+    shares = (
+        (np.abs(velocities) / model.max_velocity[indices]).max(),
+        (np.abs(accelerations) / model.max_acceleration[indices]).max(),
+    )
+    faults += [
+        f"{name} is {share / scaling:.7f} of its limit"
+        for name, share in zip(("velocity", "acceleration"), shares, strict=True)
+        if share > scaling * (1.0 + ROUNDING)
+    ]
     if (positions < model.lower[indices] - 1e-9).any() or (positions > model.upper[indices] + 1e-9).any():
         faults.append("a position is out of bounds")
     if not np.allclose(positions[0], problem.request.scene.positions[indices], atol=1e-9):
@@ -155,8 +186,9 @@ def violations(model: RobotModel, checker: IndependentChecker, problem: Problem,
                 break
     checker.set_world(problem.world)
     named = dict(zip(model.joint_names, problem.request.scene.positions.tolist(), strict=True))
-    hits = sum(checker.colliding_states(motion.joint_names, line, named)
-               for line in (motion.curve(0.01), *motion.chords()))
+    hits = sum(
+        checker.colliding_states(motion.joint_names, line, named) for line in (motion.curve(0.01), *motion.chords())
+    )
     return faults + ([f"{hits} states collide"] if hits else [])
 
 
@@ -180,8 +212,9 @@ def _groundless(model: RobotModel, checker: IndependentChecker, problem: Problem
     start = problem.request.scene.positions
     line = np.array([start[model.group(GROUP).indices], problem.goal])
     named = dict(zip(model.joint_names, start.tolist(), strict=True))
-    touches = any(checker.colliding_states(list(model.group(GROUP).joints), line, named, step)
-                  for step in (0.01, 0.001, 0.00025))
+    touches = any(
+        checker.colliding_states(list(model.group(GROUP).joints), line, named, step) for step in (0.01, 0.001, 0.00025)
+    )
     return [] if touches else ["refused, though the straight motion is free"]
 
 

@@ -4,6 +4,7 @@
 It judges the others in test_collision_checkers, and is a checker to begin one's own with. It gives the same answers as
 the one that ships, some hundred times slower, so that nobody would choose it to plan with: it ships with the tests.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
@@ -46,18 +47,26 @@ class Pair:
 class PlainCoalChecker:
     """See CollisionChecker."""
 
-    def __init__(self, scene: PlanningScene, moving: Sequence[int] | None = None,
-                 tolerated: Sequence[Contact] = ()) -> None:
+    def __init__(
+        self, scene: PlanningScene, moving: Sequence[int] | None = None, tolerated: Sequence[Contact] = ()
+    ) -> None:
         self.model = scene.model
         self._data = self.model.pin_model.createData()
         self._poses: dict[Part, Any] = {}
         depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
         parts = list(parts_of(scene))
-        self._pairs = [Pair(one, other, one.margin if other.body.kind == WORLD else 0.0,
-                            self._moved_by(one, moving) == self._moved_by(other, moving),
-                            depths.get(frozenset((one.body.name, other.body.name)), -1.0))
-                       for number, one in enumerate(parts) for other in parts[number + 1:]
-                       if is_checked(scene, one, other)]
+        self._pairs = [
+            Pair(
+                one,
+                other,
+                one.margin if other.body.kind == WORLD else 0.0,
+                self._moved_by(one, moving) == self._moved_by(other, moving),
+                depths.get(frozenset((one.body.name, other.body.name)), -1.0),
+            )
+            for number, one in enumerate(parts)
+            for other in parts[number + 1 :]
+            if is_checked(scene, one, other)
+        ]
 
     def _moved_by(self, part: Part, moving: Sequence[int] | None) -> set[int]:
         """The moving joints between a part and the world."""
@@ -80,8 +89,9 @@ class PlainCoalChecker:
 
     def contacts(self, positions: np.ndarray, include_fixed: bool = True) -> list[Contact]:
         self._place(positions)
-        found = [self._contact(pair) for pair in self._pairs
-                 if (include_fixed or not pair.is_fixed) and self._touches(pair)]
+        found = [
+            self._contact(pair) for pair in self._pairs if (include_fixed or not pair.is_fixed) and self._touches(pair)
+        ]
         return sorted(found, key=lambda item: -item.depth)
 
     def fixed_contacts(self, positions: np.ndarray) -> list[Contact]:
@@ -117,10 +127,13 @@ class PlainCoalChecker:
         bodies = pair.first.body, pair.second.body
         if not result.numContacts():  # nearer than the distance they have to keep
             return Contact(*bodies, pair.margin - self._distance(pair), np.zeros(3), np.zeros(3))
-        deepest = max((result.getContact(number) for number in range(result.numContacts())),
-                      key=lambda item: abs(item.penetration_depth))
-        return Contact(*bodies, pair.margin + abs(deepest.penetration_depth), np.array(deepest.pos),
-                       np.array(deepest.normal))
+        deepest = max(
+            (result.getContact(number) for number in range(result.numContacts())),
+            key=lambda item: abs(item.penetration_depth),
+        )
+        return Contact(
+            *bodies, pair.margin + abs(deepest.penetration_depth), np.array(deepest.pos), np.array(deepest.normal)
+        )
 
 
 def parts_of(scene: PlanningScene) -> Iterator[Part]:
@@ -131,8 +144,13 @@ def parts_of(scene: PlanningScene) -> Iterator[Part]:
     for held in scene.attached.values():
         frame = model.pin_model.frames[model.frame_ids[held.link]]
         for shape, pose in held.body.shapes:
-            yield Part(Body(held.name, ATTACHED, held.link, held.touch_links), frame.parentJoint,
-                       frame.placement * held.body.pose * pose, shape.geometry, scene.attached_padding())
+            yield Part(
+                Body(held.name, ATTACHED, held.link, held.touch_links),
+                frame.parentJoint,
+                frame.placement * held.body.pose * pose,
+                shape.geometry,
+                scene.attached_padding(),
+            )
     for thing in scene.obstacles():
         for shape, pose in thing.shapes:
             yield Part(Body(thing.name, WORLD), 0, thing.pose * pose, shape.geometry, 0.0)

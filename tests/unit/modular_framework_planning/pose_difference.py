@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How far two poses are apart."""
+
 from __future__ import annotations
 
 import numpy as np

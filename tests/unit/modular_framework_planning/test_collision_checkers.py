@@ -4,6 +4,7 @@
 A checker of one's own is tested by its name in CHECKERS (as the parameter `collision_detector` has it), with its module
 on PYTHONPATH.
 """
+
 from __future__ import annotations
 
 import contextlib
@@ -49,25 +50,48 @@ CHECKERS = (*SHIPPED, PLAIN)  # the checkers to test; one of your own is one mor
 STEP = 0.1  # [rad or m]
 STATES, PATHS, PATHS_TRIED, SLOW_STATES = 30, 20, 120, 5
 SAME_DISTANCE, SAME_DEPTH = 2.0e-4, 1.0e-3  # [m]
-JOINTS = (("pan", "revolute", "0 0 1", "base", "column", ""), ("lift", "revolute", "0 1 0", "column", "upper", ""),
-          ("bend", "revolute", "0 1 0", "upper", "lower", ""), ("slide", "prismatic", "0 1 0", "lower", "finger", ""),
-          ("follow", "prismatic", "0 -1 0", "lower", "thumb", '<mimic joint="slide"/>'))
-SHAPES = {"base": '<box size="0.3 0.3 0.1"/>', "column": '<cylinder radius="0.06" length="0.2"/>',
-          "upper": '<box size="0.08 0.08 0.4"/>', "lower": '<cylinder radius="0.03" length="0.36"/>',
-          "finger": '<box size="0.02 0.02 0.05"/>', "thumb": '<sphere radius="0.02"/>'}
+JOINTS = (
+    ("pan", "revolute", "0 0 1", "base", "column", ""),
+    ("lift", "revolute", "0 1 0", "column", "upper", ""),
+    ("bend", "revolute", "0 1 0", "upper", "lower", ""),
+    ("slide", "prismatic", "0 1 0", "lower", "finger", ""),
+    ("follow", "prismatic", "0 -1 0", "lower", "thumb", '<mimic joint="slide"/>'),
+)
+SHAPES = {
+    "base": '<box size="0.3 0.3 0.1"/>',
+    "column": '<cylinder radius="0.06" length="0.2"/>',
+    "upper": '<box size="0.08 0.08 0.4"/>',
+    "lower": '<cylinder radius="0.03" length="0.36"/>',
+    "finger": '<box size="0.02 0.02 0.05"/>',
+    "thumb": '<sphere radius="0.02"/>',
+}
 AT = {"base": 0.05, "column": 0.1, "upper": 0.2, "lower": 0.18, "finger": 0.025, "thumb": 0.025}
 LONG = {"pan": 0.1, "lift": 0.25, "bend": 0.45, "slide": 0.38, "follow": 0.38}
-SMALL_URDF = '<robot name="small">' + "".join(
-    f'<link name="{name}"><collision><origin xyz="0 0 {AT[name]}"/><geometry>{shape}</geometry></collision></link>'
-    for name, shape in SHAPES.items()) + "".join(
-    f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-    f'<origin xyz="0 0 {LONG[name]}"/><axis xyz="{axis}"/><limit lower="{0.02 if kind == "prismatic" else -2.6}" '
-    f'upper="{0.08 if kind == "prismatic" else 2.6}" velocity="1" effort="1"/>{mimic}</joint>'
-    for name, kind, axis, parent, child, mimic in JOINTS) + "</robot>"
-SMALL_SRDF = ('<robot name="small"><group name="arm"><joint name="pan"/><joint name="lift"/><joint name="bend"/>'
-              '</group><group name="hand"><joint name="slide"/></group>') + "".join(
-    f'<disable_collisions link1="{parent}" link2="{child}" reason="Adjacent"/>'
-    for _, _, _, parent, child, _ in JOINTS) + "</robot>"
+SMALL_URDF = (
+    '<robot name="small">'
+    + "".join(
+        f'<link name="{name}"><collision><origin xyz="0 0 {AT[name]}"/><geometry>{shape}</geometry></collision></link>'
+        for name, shape in SHAPES.items()
+    )
+    + "".join(
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0 0 {LONG[name]}"/><axis xyz="{axis}"/><limit lower="{0.02 if kind == "prismatic" else -2.6}" '
+        f'upper="{0.08 if kind == "prismatic" else 2.6}" velocity="1" effort="1"/>{mimic}</joint>'
+        for name, kind, axis, parent, child, mimic in JOINTS
+    )
+    + "</robot>"
+)
+SMALL_SRDF = (
+    (
+        '<robot name="small"><group name="arm"><joint name="pan"/><joint name="lift"/><joint name="bend"/>'
+        '</group><group name="hand"><joint name="slide"/></group>'
+    )
+    + "".join(
+        f'<disable_collisions link1="{parent}" link2="{child}" reason="Adjacent"/>'
+        for _, _, _, parent, child, _ in JOINTS
+    )
+    + "</robot>"
+)
 
 
 @dataclass(frozen=True)
@@ -94,11 +118,15 @@ def thing(name: str, shape: object, *position: float) -> CollisionObject:
 def small_scene() -> PlanningScene:
     """The small arm, which holds a ball beyond its fingers, between three things."""
     scene = empty_scene(RobotModel(SMALL_URDF, SMALL_SRDF))
-    for item in (thing("table", Box(0.5, 1.0, 0.04), 0.7, 0.0, 0.3), thing("post", Cylinder(1.0, 0.05), -0.3, 0.4, 0.5),
-                 thing("ball", Sphere(0.15), 0.2, -0.5, 0.9)):
+    for item in (
+        thing("table", Box(0.5, 1.0, 0.04), 0.7, 0.0, 0.3),
+        thing("post", Cylinder(1.0, 0.05), -0.3, 0.4, 0.5),
+        thing("ball", Sphere(0.15), 0.2, -0.5, 0.9),
+    ):
         scene = scene.with_object(item)
-    return scene.with_attached(AttachedObject(thing("held", Sphere(0.03), 0.0, 0.0, 0.42), "lower",
-                                              frozenset(("finger", "thumb"))))
+    return scene.with_attached(
+        AttachedObject(thing("held", Sphere(0.03), 0.0, 0.0, 0.42), "lower", frozenset(("finger", "thumb")))
+    )
 
 
 @pytest.fixture(scope="module", params=["small", "ur5"])
@@ -123,8 +151,9 @@ def described(contacts: list[Contact]) -> set[frozenset[tuple[str, str]]]:
     return {frozenset((body.kind, body.name) for body in (item.first, item.second)) for item in contacts}
 
 
-def both(cell: Cell, make: Make, moving: object = None, scene: PlanningScene | None = None
-         ) -> tuple[CollisionChecker, PlainCoalChecker]:
+def both(
+    cell: Cell, make: Make, moving: object = None, scene: PlanningScene | None = None
+) -> tuple[CollisionChecker, PlainCoalChecker]:
     scene = scene or cell.scene
     return make(scene, moving), PlainCoalChecker(scene, moving)
 
@@ -166,8 +195,13 @@ def test_the_first_sample_may_be_left_out_and_a_path_may_have_one_vertex(cell: C
     states = cell.states(STATES)
     free = next(state for state in states if judge.is_free(state))
     touching = next(state for state in states if not judge.is_free(state))
-    for vertices, first, is_free in (((free,), 0, True), ((touching,), 0, False), ((touching, touching), 1, False),
-                                     ((free, free), 1, True), ((free, free), 0, True)):
+    for vertices, first, is_free in (
+        ((free,), 0, True),
+        ((touching,), 0, False),
+        ((touching, touching), 1, False),
+        ((free, free), 1, True),
+        ((free, free), 0, True),
+    ):
         assert checker.path_is_free(np.array(vertices), STEP, first) is is_free
     memory = np.array([free])
     assert checker.path_is_free(memory, STEP)
@@ -186,7 +220,8 @@ def test_contacts_name_every_pair_that_touches(cell: Cell, make: Make) -> None:
                 assert depths == sorted(depths, reverse=True) and all(depth >= 0.0 for depth in depths)
             assert described(checker.fixed_contacts(state)) == described(judge.fixed_contacts(state))
     assert described(checker.contacts(state, True)) == described(
-        [*checker.contacts(state, False), *checker.fixed_contacts(state)])
+        [*checker.contacts(state, False), *checker.fixed_contacts(state)]
+    )
 
 
 def test_depth_position_and_normal_of_a_contact(make: Make) -> None:
@@ -233,8 +268,9 @@ def test_a_held_object_may_touch_its_links_and_nothing_else(make: Make) -> None:
     assert make(scene.with_attached(AttachedObject(inside, "lower", held.touch_links))).is_free(state)
     strict = make(scene.with_attached(AttachedObject(thing("held", Sphere(0.05), 0.0, 0.0, 0.4), "lower", frozenset())))
     assert not strict.is_free(state)
-    assert described(strict.contacts(state)) == {frozenset((("robot_attached", "held"), ("robot_link", name)))
-                                                for name in ("finger", "thumb")}
+    assert described(strict.contacts(state)) == {
+        frozenset((("robot_attached", "held"), ("robot_link", name))) for name in ("finger", "thumb")
+    }
 
 
 def test_padding_keeps_the_world_away_and_leaves_the_robot_alone(cell: Cell, make: Make) -> None:
@@ -313,24 +349,43 @@ def test_costs_are_0_for_free_states_and_at_least_a_step_for_others(cell: Cell, 
     assert costs.shape == (STATES,) and (costs[free] == 0.0).all() and (costs[~free] >= TOUCH_COST_M).all()
 
 
-@pytest.mark.parametrize("planner", ["ompl_interface/OMPLPlanner", "pilz_industrial_motion_planner/CommandPlanner",
-                                     "stomp_moveit/StompPlanner"])
+@pytest.mark.parametrize(
+    "planner",
+    ["ompl_interface/OMPLPlanner", "pilz_industrial_motion_planner/CommandPlanner", "stomp_moveit/StompPlanner"],
+)
 @pytest.mark.parametrize("detector", dict.fromkeys(("FCL", PLAIN)))
 def test_pipelines_plan_with_the_checker_that_is_named(planner: str, detector: str) -> None:
     scene = small_scene()
     model = scene.model
     start = model.merge(model.default_positions(), {"pan": -0.4, "lift": 0.9, "slide": 0.03})
-    settings = PipelineSettings(seed=1, motion_step=1.0, parameters={"num_timesteps": 10}, robot_planning={
-        "cartesian_limits": {"max_trans_vel": 1.0, "max_trans_acc": 1.0, "max_trans_dec": -1.0, "max_rot_vel": 1.0}})
+    settings = PipelineSettings(
+        seed=1,
+        motion_step=1.0,
+        parameters={"num_timesteps": 10},
+        robot_planning={
+            "cartesian_limits": {"max_trans_vel": 1.0, "max_trans_acc": 1.0, "max_trans_dec": -1.0, "max_rot_vel": 1.0}
+        },
+    )
     pipeline = PipelineSpec("any", planner, settings=settings, collision_detector=detector).build(
-        model, KinematicsPool(model))
+        model, KinematicsPool(model)
+    )
     planner_id = "PTP" if "pilz" in planner else ""
-    request = PlanningRequest(scene.with_positions(start), "arm", (JointGoal({"pan": 0.3, "lift": 0.3, "bend": 0.2}),),
-                              planner_id, 1, 60.0, 1.0, 1.0)
+    request = PlanningRequest(
+        scene.with_positions(start),
+        "arm",
+        (JointGoal({"pan": 0.3, "lift": 0.3, "bend": 0.2}),),
+        planner_id,
+        1,
+        60.0,
+        1.0,
+        1.0,
+    )
     answer = pipeline.plan(request)
     judge = PlainCoalChecker(scene)
-    assert all(judge.is_free(model.merge(start, dict(zip(answer.trajectory.joint_names, row, strict=True))))
-               for row in answer.trajectory.positions)
+    assert all(
+        judge.is_free(model.merge(start, dict(zip(answer.trajectory.joint_names, row, strict=True))))
+        for row in answer.trajectory.positions
+    )
     assert type(pipeline.checker(scene, model.group("arm"), start)) is collision_detector(detector)
     blocked = PlanningRequest(scene.with_positions(start), "arm", (JointGoal({"pan": 0.0, "lift": 1.6}),), planner_id)
     with pytest.raises(PlanningError, match="table"):
@@ -347,9 +402,11 @@ class Half:
 def test_names_of_checkers() -> None:
     assert collision_detector() is collision_detector("") is collision_detector("Hybrid") is ExactCollisionChecker
     assert collision_detector(PLAIN) is PlainCoalChecker
-    for name, reason in (("Unknown", "known are FCL, Bullet, HYBRID and module/Class"),
-                         ("no_such_module/Checker", "no_such_module"),
-                         ("plain_coal_checker/Missing", "Missing"),
-                         ("test_collision_checkers/Half", "no method build, path_is_free, colliding_state")):
+    for name, reason in (
+        ("Unknown", "known are FCL, Bullet, HYBRID and module/Class"),
+        ("no_such_module/Checker", "no_such_module"),
+        ("plain_coal_checker/Missing", "Missing"),
+        ("test_collision_checkers/Half", "no method build, path_is_free, colliding_state"),
+    ):
         with pytest.raises(ModelError, match=reason):
             collision_detector(name)

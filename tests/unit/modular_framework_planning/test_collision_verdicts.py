@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Verdicts of the compiled collision check against a second checker; 10,000 states: benchmarks/collision_verdicts."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -21,7 +22,8 @@ def second(robot: object) -> IndependentChecker:
 
 
 def test_no_touching_state_is_called_free_and_no_free_one_far_from_contact_is_refused(
-        model: RobotModel, second: IndependentChecker) -> None:
+    model: RobotModel, second: IndependentChecker
+) -> None:
     rng = np.random.default_rng(11)
     total = sum((compare_verdicts(model, second, rng, STATES_PER_WORLD, held) for held in range(WORLDS)), Verdicts())
     assert total.states == WORLDS * STATES_PER_WORLD

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Constraints: the verdict agrees with an independent reading, and projected states satisfy."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -32,16 +33,24 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 TIP = "eg_manipulator"
 SEEDS = st.integers(0, 2**32 - 1)
 CUBE = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)])
-SOLIDS: dict[str, Solid] = {"box": BoxSolid(0.2, 0.4, 0.6), "sphere": SphereSolid(0.3),
-                            "cylinder": CylinderSolid(0.4, 0.2), "cone": ConeSolid(0.6, 0.3), "mesh": HullSolid(CUBE)}
+SOLIDS: dict[str, Solid] = {
+    "box": BoxSolid(0.2, 0.4, 0.6),
+    "sphere": SphereSolid(0.3),
+    "cylinder": CylinderSolid(0.4, 0.2),
+    "cone": ConeSolid(0.6, 0.3),
+    "mesh": HullSolid(CUBE),
+}
 
 
 def inside(kind: str, point: np.ndarray) -> bool:
     x, y, z = point
-    return {"box": abs(x) <= 0.1 and abs(y) <= 0.2 and abs(z) <= 0.3, "sphere": x * x + y * y + z * z <= 0.09,
-            "cylinder": abs(z) <= 0.2 and np.hypot(x, y) <= 0.2,
-            "cone": abs(z) <= 0.3 and np.hypot(x, y) <= 0.3 * (0.3 - z) / 0.6,
-            "mesh": abs(x) <= 0.1 and abs(y) <= 0.2 and abs(z) <= 0.3}[kind]
+    return {
+        "box": abs(x) <= 0.1 and abs(y) <= 0.2 and abs(z) <= 0.3,
+        "sphere": x * x + y * y + z * z <= 0.09,
+        "cylinder": abs(z) <= 0.2 and np.hypot(x, y) <= 0.2,
+        "cone": abs(z) <= 0.3 and np.hypot(x, y) <= 0.3 * (0.3 - z) / 0.6,
+        "mesh": abs(x) <= 0.1 and abs(y) <= 0.2 and abs(z) <= 0.3,
+    }[kind]
 
 
 @pytest.mark.parametrize("kind", SOLIDS)
@@ -70,8 +79,13 @@ def test_samples_fill_the_solid_evenly(kind: str) -> None:
 
 
 def test_solids_without_meaning_are_refused() -> None:
-    for build in (lambda: BoxSolid(-1.0, 1.0, 1.0), lambda: SphereSolid(np.nan), lambda: HullSolid(np.zeros((8, 3))),
-                  lambda: HullSolid(CUBE[:3]), lambda: HullSolid(np.full((8, 3), np.inf))):
+    for build in (
+        lambda: BoxSolid(-1.0, 1.0, 1.0),
+        lambda: SphereSolid(np.nan),
+        lambda: HullSolid(np.zeros((8, 3))),
+        lambda: HullSolid(CUBE[:3]),
+        lambda: HullSolid(np.full((8, 3), np.inf)),
+    ):
         with pytest.raises(GeometryError, match="must be|enclose no volume"):
             build()
 
@@ -97,12 +111,14 @@ def test_orientation_verdicts_agree_with_another_librarys_angles(model: RobotMod
     positions, target = random_state(model, rng), Rotation.random(rng=rng)
     current = Rotation.from_matrix(model.link_transforms(positions)[TIP].rotation)
     deviation = target.inv() * current
-    expected = {Parameterization.XYZ_EULER_ANGLES: deviation.as_euler("XYZ"),
-                Parameterization.ROTATION_VECTOR: target.apply(deviation.as_rotvec())}
+    expected = {
+        Parameterization.XYZ_EULER_ANGLES: deviation.as_euler("XYZ"),
+        Parameterization.ROTATION_VECTOR: target.apply(deviation.as_rotvec()),
+    }
     for kind, angles in expected.items():
         tolerances = np.abs(angles) + rng.choice([-0.01, 0.01], 3)
         constraint = OrientationConstraint(on_link(model), WORLD, target.as_matrix(), tolerances, kind, 2.0)
-        result, = KinematicConstraints(model, orientations=[constraint]).evaluate(positions)
+        (result,) = KinematicConstraints(model, orientations=[constraint]).evaluate(positions)
         assert result.satisfied == bool((tolerances > np.abs(angles)).all())
         assert result.distance == pytest.approx(2.0 * np.abs(angles).sum(), abs=1e-6)
 
@@ -123,8 +139,12 @@ def test_a_position_is_kept_in_any_of_the_regions_of_a_turned_frame(model: Robot
     poses = [pin.SE3(Rotation.random(rng=rng).as_matrix(), rng.uniform(-0.3, 0.3, 3)) for _ in kinds]
     point = model.link_transforms(positions)[TIP].act(offset)
     reference = pin.SE3(reference.rotation, point + rng.uniform(-0.3, 0.3, 3))
-    constraint = PositionConstraint(on_link(model), offset, FrameOnRobot("table", 0, reference),
-                                    tuple((SOLIDS[kind], pose) for kind, pose in zip(kinds, poses, strict=True)))
+    constraint = PositionConstraint(
+        on_link(model),
+        offset,
+        FrameOnRobot("table", 0, reference),
+        tuple((SOLIDS[kind], pose) for kind, pose in zip(kinds, poses, strict=True)),
+    )
     expected = any(inside(kind, (reference * pose).actInv(point)) for kind, pose in zip(kinds, poses, strict=True))
     assert KinematicConstraints(model, positions=[constraint]).satisfied(positions) == expected
 
@@ -136,8 +156,9 @@ def test_a_joint_without_ends_is_compared_the_short_way_round() -> None:
 
 
 def upright(model: RobotModel, kind: Parameterization, frame: FrameOnRobot) -> OrientationConstraint:
-    return OrientationConstraint(on_link(model), frame, np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.1, 2 * np.pi]),
-                                 kind)
+    return OrientationConstraint(
+        on_link(model), frame, np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.1, 2 * np.pi]), kind
+    )
 
 
 @pytest.mark.parametrize("kind", Parameterization)
@@ -173,8 +194,10 @@ def test_a_pose_within_tolerances_of_goals_is_found_from_one_nearby(model: Robot
         wanted, turned = model.link_transforms(goal)[TIP], model.link_transforms(start)[TIP].rotation
         spot = (SphereSolid(1e-4), pin.SE3(np.eye(3), wanted.translation))
         constraints = KinematicConstraints(
-            model, positions=[PositionConstraint(on_link(model), np.zeros(3), WORLD, (spot,))],
-            orientations=[OrientationConstraint(on_link(model), WORLD, turned, np.full(3, 1e-3))])
+            model,
+            positions=[PositionConstraint(on_link(model), np.zeros(3), WORLD, (spot,))],
+            orientations=[OrientationConstraint(on_link(model), WORLD, turned, np.full(3, 1e-3))],
+        )
         found = constraints.project(start, indices)
         if found is not None:
             solved += 1
@@ -199,9 +222,11 @@ def test_all_kinds_together_are_met_and_joints_keep_their_tolerance(model: Robot
     pan = int(indices[0])
     region = pin.SE3(np.eye(3), np.array([0.4, 0.2, 1.3]))
     constraints = KinematicConstraints(
-        model, [JointConstraint(model.joint_names[pan], pan, 0.5, 0.4, 0.4)],
+        model,
+        [JointConstraint(model.joint_names[pan], pan, 0.5, 0.4, 0.4)],
         [PositionConstraint(on_link(model), np.zeros(3), WORLD, ((BoxSolid(0.2, 0.2, 0.2), region),))],
-        [upright(model, Parameterization.XYZ_EULER_ANGLES, WORLD)])
+        [upright(model, Parameterization.XYZ_EULER_ANGLES, WORLD)],
+    )
     for _ in range(20):
         found = constraints.sample(rng, model.default_positions(), indices)
         assert found is not None and constraints.satisfied(found)
@@ -217,8 +242,9 @@ def test_a_moving_frame_moves_the_constraint_with_it(model: RobotModel) -> None:
     positions = model.default_positions()
     at = model.link_transforms(positions)
     pose = at["forearm_link"].actInv(at[TIP])
-    kept = KinematicConstraints(model, positions=[PositionConstraint(
-        on_link(model), np.zeros(3), forearm, ((SphereSolid(0.02), pose),))])
+    kept = KinematicConstraints(
+        model, positions=[PositionConstraint(on_link(model), np.zeros(3), forearm, ((SphereSolid(0.02), pose),))]
+    )
     assert kept.satisfied(positions)
     positions[indices[0]] += 1.0
     assert kept.satisfied(positions), "the joint before the frame turns both"

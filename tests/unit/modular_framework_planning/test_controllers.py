@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which controllers execute a motion, and what a controller is told."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -66,14 +67,31 @@ def test_controllers_that_share_joints_do_not_move_them_together() -> None:
 
 
 def test_all_keys_of_a_controller_are_read() -> None:
-    specs, faults = parse_controllers([
-        {"name": "arm", "action_ns": "follow", "type": "FollowJointTrajectory", "joints": ["a", "b"], "default": True,
-         "allowed_execution_duration_scaling": 2, "allowed_goal_duration_margin": 1.5, "goal_time_tolerance": 0.3,
-         "path_tolerance": {"position": [0.1, 0.2], "velocity": 1},
-         "goal_tolerance": [{"name": "b", "position": 0.01}]},
-        {"name": "jaws", "type": "GripperCommand", "joints": ["l", "r"], "parallel": True, "max_effort": 5},
-        {"name": "jaw", "type": "GripperCommand", "joints": ["l", "r"], "command_joint": "r", "allow_failure": True},
-    ], ACTION_KINDS)
+    specs, faults = parse_controllers(
+        [
+            {
+                "name": "arm",
+                "action_ns": "follow",
+                "type": "FollowJointTrajectory",
+                "joints": ["a", "b"],
+                "default": True,
+                "allowed_execution_duration_scaling": 2,
+                "allowed_goal_duration_margin": 1.5,
+                "goal_time_tolerance": 0.3,
+                "path_tolerance": {"position": [0.1, 0.2], "velocity": 1},
+                "goal_tolerance": [{"name": "b", "position": 0.01}],
+            },
+            {"name": "jaws", "type": "GripperCommand", "joints": ["l", "r"], "parallel": True, "max_effort": 5},
+            {
+                "name": "jaw",
+                "type": "GripperCommand",
+                "joints": ["l", "r"],
+                "command_joint": "r",
+                "allow_failure": True,
+            },
+        ],
+        ACTION_KINDS,
+    )
     assert not faults
     arm, jaws, jaw = specs
     assert (arm.action, arm.is_default, arm.duration_scaling, arm.duration_margin) == ("arm/follow", True, 2.0, 1.5)
@@ -84,31 +102,44 @@ def test_all_keys_of_a_controller_are_read() -> None:
 
 
 def test_entries_that_cannot_be_used_are_left_out_and_named() -> None:
-    specs, faults = parse_controllers([
-        "text", {"name": "a"}, {"name": "b", "joints": ["x"], "type": "Strange"},
-        {"name": "c", "joints": "x", "type": "GripperCommand"}, {"name": "d", "joints": ["x"], "parallel": True,
-                                                                 "type": "GripperCommand"},
-        {"name": "e", "joints": ["x"], "type": "GripperCommand", "max_effort": "strong"},
-        {"name": "good", "joints": ["x"], "type": "GripperCommand"}], ACTION_KINDS)
+    specs, faults = parse_controllers(
+        [
+            "text",
+            {"name": "a"},
+            {"name": "b", "joints": ["x"], "type": "Strange"},
+            {"name": "c", "joints": "x", "type": "GripperCommand"},
+            {"name": "d", "joints": ["x"], "parallel": True, "type": "GripperCommand"},
+            {"name": "e", "joints": ["x"], "type": "GripperCommand", "max_effort": "strong"},
+            {"name": "good", "joints": ["x"], "type": "GripperCommand"},
+        ],
+        ACTION_KINDS,
+    )
     assert [item.name for item in specs] == ["good"]
     assert [fault.split(":")[0].split()[0] for fault in faults] == [f"controller_list[{n}]" for n in range(6)]
     assert "allowed: FollowJointTrajectory, GripperCommand" in faults[2]
     assert parse_controllers({"name": "a"}, ACTION_KINDS)[1] == [
-        "controller_list is a dict; needed is a list with name, joints and type"]
+        "controller_list is a dict; needed is a list with name, joints and type"
+    ]
 
 
 def test_fake_controllers_interpolate_unless_told_otherwise() -> None:
-    specs, faults = parse_controllers([{"name": "a", "joints": ["x"]},
-                                       {"name": "b", "joints": ["x"], "type": "last point", "rate": 50}],
-                                      FAKE_KINDS, FAKE_KINDS[0])
+    specs, faults = parse_controllers(
+        [{"name": "a", "joints": ["x"]}, {"name": "b", "joints": ["x"], "type": "last point", "rate": 50}],
+        FAKE_KINDS,
+        FAKE_KINDS[0],
+    )
     assert not faults
     assert [(item.kind, item.rate) for item in specs] == [("interpolate", 0.0), ("last point", 50.0)]
 
 
 def two_points(**last: Any) -> JointTrajectory:
-    return JointTrajectory(joint_names=["a", "l", "r"], points=[
-        JointTrajectoryPoint(positions=[0.0, 0.0, 0.0]),
-        JointTrajectoryPoint(positions=[1.0, 0.02, 0.03], time_from_start=Duration(2), **last)])
+    return JointTrajectory(
+        joint_names=["a", "l", "r"],
+        points=[
+            JointTrajectoryPoint(positions=[0.0, 0.0, 0.0]),
+            JointTrajectoryPoint(positions=[1.0, 0.02, 0.03], time_from_start=Duration(2), **last),
+        ],
+    )
 
 
 def test_a_gripper_is_sent_where_its_command_joints_end() -> None:
@@ -120,16 +151,21 @@ def test_a_gripper_is_sent_where_its_command_joints_end() -> None:
 
 
 def test_configured_tolerances_go_with_the_goal_of_the_joints_that_move() -> None:
-    arm = spec("arm", "a b", path_tolerances=(JointTolerance("a", 0.1), JointTolerance("b", 0.2)),
-               goal_time_tolerance=0.5)
+    arm = spec(
+        "arm", "a b", path_tolerances=(JointTolerance("a", 0.1), JointTolerance("b", 0.2)), goal_time_tolerance=0.5
+    )
     goal = trajectory_goal(MotionPart(arm, JointTrajectory(joint_names=["a"], points=[JointTrajectoryPoint()])))
     assert [(item.name, item.position) for item in goal.path_tolerance] == [("a", 0.1)]
     assert goal.goal_time_tolerance.to_sec() == 0.5
 
 
 def loaded(name: str, kind: str, state: str, *joints: str) -> ControllerState:
-    return ControllerState(name=name, type=kind, state=state, claimed_resources=[
-        HardwareInterfaceResources("hardware_interface::PositionJointInterface", list(joints))])
+    return ControllerState(
+        name=name,
+        type=kind,
+        state=state,
+        claimed_resources=[HardwareInterfaceResources("hardware_interface::PositionJointInterface", list(joints))],
+    )
 
 
 def test_controllers_of_ros_control_that_take_motions_are_recognised_by_their_type() -> None:
@@ -144,8 +180,12 @@ def test_controllers_of_ros_control_that_take_motions_are_recognised_by_their_ty
 
 
 def test_running_controllers_that_hold_a_joint_are_to_be_stopped_first() -> None:
-    states = [loaded("old", "x", "running", "a"), loaded("other", "x", "running", "c"),
-              loaded("off", "x", "stopped", "a"), loaded("new", "x", "stopped", "a", "b")]
+    states = [
+        loaded("old", "x", "running", "a"),
+        loaded("other", "x", "running", "c"),
+        loaded("off", "x", "stopped", "a"),
+        loaded("new", "x", "stopped", "a", "b"),
+    ]
     assert running_claims(states, {"a", "b"}, {"new"}) == ["old"]
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Execution of motions, as far as it needs no controller."""
+
 from __future__ import annotations
 
 import threading
@@ -32,8 +33,11 @@ GRIPPER = ControllerSpec("gripper", "gripper_cmd", "GripperCommand", ("finger",)
 class StandingRobot:
     """What execution asks of the scene monitor: the joints stand at 0.3, the wheel almost a turn further."""
 
-    model = SimpleNamespace(index={"elbow": 0, "finger": 1, "wheel": 2}, follower_joints=frozenset({"mirror"}),
-                            is_continuous=lambda number: number == 2)
+    model = SimpleNamespace(
+        index={"elbow": 0, "finger": 1, "wheel": 2},
+        follower_joints=frozenset({"mirror"}),
+        is_continuous=lambda number: number == 2,
+    )
 
     def wait_for_state(self) -> None:
         return
@@ -93,8 +97,11 @@ def motion(joints: str, *points: tuple[float, list[float]]) -> RobotTrajectory:
     message = RobotTrajectory()
     message.joint_trajectory.joint_names = joints.split()
     message.joint_trajectory.points = [
-        JointTrajectoryPoint(positions=positions, velocities=[0.1] * len(positions),
-                             time_from_start=rospy.Duration.from_sec(at)) for at, positions in points]
+        JointTrajectoryPoint(
+            positions=positions, velocities=[0.1] * len(positions), time_from_start=rospy.Duration.from_sec(at)
+        )
+        for at, positions in points
+    ]
     return message
 
 
@@ -147,7 +154,8 @@ def test_a_motion_is_cut_by_the_joints_of_its_controllers_and_mimicking_joints_a
 def test_velocity_scaling_executes_the_same_motion_in_less_time() -> None:
     controllers = RecordedControllers(ARM)
     executor(controllers, execution_velocity_scaling=2.0).execute(
-        motion("elbow", (0.0, [0.3]), (1.0, [0.7])), threading.Event())
+        motion("elbow", (0.0, [0.3]), (1.0, [0.7])), threading.Event()
+    )
     last = controllers.sent[0].trajectory.points[-1]
     assert (last.time_from_start.to_sec(), list(last.positions), list(last.velocities)) == (0.5, [0.7], [0.2])
 
@@ -161,9 +169,15 @@ def test_a_controller_that_fails_stops_the_others_and_its_words_are_passed_on() 
     assert "arm" in controllers.cancelled
 
 
-@pytest.mark.parametrize(("settings", "spec", "late_s"), [
-    ({}, {}, 1.7), ({"allowed_execution_duration_scaling": 2.0}, {}, 2.6),
-    ({"allowed_goal_duration_margin": 2.0}, {}, 3.2), ({}, {"duration_scaling": 3.0, "duration_margin": 1.0}, 4.1)])
+@pytest.mark.parametrize(
+    ("settings", "spec", "late_s"),
+    [
+        ({}, {}, 1.7),
+        ({"allowed_execution_duration_scaling": 2.0}, {}, 2.6),
+        ({"allowed_goal_duration_margin": 2.0}, {}, 3.2),
+        ({}, {"duration_scaling": 3.0, "duration_margin": 1.0}, 4.1),
+    ],
+)
 def test_a_motion_that_takes_too_long_is_stopped(clock: Any, settings: Any, spec: Any, late_s: float) -> None:
     controllers = RecordedControllers(replace(ARM, **spec))
     controllers.answers["arm"] = False
@@ -232,9 +246,19 @@ def test_closing_stops_the_motion_and_waits_until_it_has_ended() -> None:
 
 
 def test_settings_that_make_no_sense_keep_their_defaults_and_are_named() -> None:
-    settings, faults = parse_execution_settings({
-        "allowed_start_tolerance": 0, "allowed_goal_duration_margin": "much", "execution_velocity_scaling": 0.0,
-        "execution_duration_monitoring": "yes", "joints_allowed_start_tolerance": {"elbow": 1}, "unheard_of": 1})
+    settings, faults = parse_execution_settings(
+        {
+            "allowed_start_tolerance": 0,
+            "allowed_goal_duration_margin": "much",
+            "execution_velocity_scaling": 0.0,
+            "execution_duration_monitoring": "yes",
+            "joints_allowed_start_tolerance": {"elbow": 1},
+            "unheard_of": 1,
+        }
+    )
     assert settings == ExecutionSettings(allowed_start_tolerance=0.0, joints_allowed_start_tolerance={"elbow": 1})
     assert [fault.split()[0] for fault in faults] == [
-        "execution_duration_monitoring", "allowed_goal_duration_margin", "execution_velocity_scaling"]
+        "execution_duration_monitoring",
+        "allowed_goal_duration_margin",
+        "execution_velocity_scaling",
+    ]

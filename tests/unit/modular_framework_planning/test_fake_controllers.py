@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Motions of a robot that is not there."""
+
 from __future__ import annotations
 
 import time
@@ -36,8 +37,12 @@ class Echo:
 
     def positions(self) -> Any:
         known = self._passes_on and self.states
-        return np.array([dict(zip(self.states[-1].name, self.states[-1].position, strict=True)).get(name, 0.0)
-                         if known else 0.0 for name in MODEL.index])
+        return np.array(
+            [
+                dict(zip(self.states[-1].name, self.states[-1].position, strict=True)).get(name, 0.0) if known else 0.0
+                for name in MODEL.index
+            ]
+        )
 
 
 @pytest.fixture(autouse=True)
@@ -48,10 +53,12 @@ def clock() -> Iterator[None]:
 
 
 def begin(kind: str, echo: Echo, times: tuple[float, ...] = (0.0, 0.1, 0.2)) -> FakeMotion:
-    points = [JointTrajectoryPoint(positions=[10 * at, -at], time_from_start=rospy.Duration.from_sec(at))
-              for at in times]
-    part = MotionPart(ControllerSpec("fake", "", kind, ("a", "b")), JointTrajectory(joint_names=["a", "b"],
-                                                                                   points=points))
+    points = [
+        JointTrajectoryPoint(positions=[10 * at, -at], time_from_start=rospy.Duration.from_sec(at)) for at in times
+    ]
+    part = MotionPart(
+        ControllerSpec("fake", "", kind, ("a", "b")), JointTrajectory(joint_names=["a", "b"], points=points)
+    )
     return FakeMotion(part, echo, echo, rate=50.0)  # type: ignore[arg-type]
 
 
@@ -62,8 +69,9 @@ def wait(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
         time.sleep(0.005)
 
 
-@pytest.mark.parametrize(("kind", "fewest", "most"), [("last point", 1, 1), ("via points", 3, 4),
-                                                      ("interpolate", 5, 42)])
+@pytest.mark.parametrize(
+    ("kind", "fewest", "most"), [("last point", 1, 1), ("via points", 3, 4), ("interpolate", 5, 42)]
+)
 def test_every_kind_ends_at_the_last_point_in_its_time(kind: str, fewest: int, most: int) -> None:
     echo, begun = Echo(), time.monotonic()
     motion = begin(kind, echo, (0.0, 0.4, 0.8))
@@ -103,7 +111,13 @@ def test_a_motion_nobody_shows_on_joint_states_is_no_success(monkeypatch: pytest
 
 
 def test_the_robot_starts_in_named_poses_of_its_groups() -> None:
-    positions, faults = initial_positions(MODEL, [  # type: ignore[arg-type]
-        {"group": "arm", "pose": "ready"}, {"group": "hand", "pose": "open"}, "text"])
+    positions, faults = initial_positions(
+        MODEL,
+        [  # type: ignore[arg-type]
+            {"group": "arm", "pose": "ready"},
+            {"group": "hand", "pose": "open"},
+            "text",
+        ],
+    )
     assert positions == {"a": 1.0, "b": 2.0}
     assert len(faults) == 2 and "group 'hand' has no pose 'open' in the SRDF; it has none" in faults[0]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Goals of an action run one after the other, and one that was given up meanwhile never begins."""
+
 from __future__ import annotations
 
 import threading

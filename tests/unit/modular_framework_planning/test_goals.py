@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Goals become free states, the nearest first; where there is none, the reason says what to change."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -52,12 +53,20 @@ def resolve(model: RobotModel, scene: PlanningScene) -> Resolve:
         group = model.group(GROUP)
         checker = ExactCollisionChecker(world, group.indices)
         motion = MotionChecker(checker, group.indices, world.positions)
-        found = GoalResolver(PlanningRequest(world, GROUP, goals), group, KinematicsPool(model), checker, motion,
-                             np.random.default_rng(1), path).resolve()
+        found = GoalResolver(
+            PlanningRequest(world, GROUP, goals),
+            group,
+            KinematicsPool(model),
+            checker,
+            motion,
+            np.random.default_rng(1),
+            path,
+        ).resolve()
         distances = np.linalg.norm(found - world.positions[group.indices], axis=1)
         assert (np.diff(distances) >= 0.0).all(), "nearest first"
         assert all(motion.state_is_free(values) for values in found)
         return found
+
     return run
 
 
@@ -68,8 +77,12 @@ def tip(model: RobotModel) -> FrameOnRobot:
 
 def pose_constraints(model: RobotModel, size: float, tolerances: tuple[float, float, float]) -> KinematicConstraints:
     region = ((BoxSolid(size, size, size), pin.SE3(np.eye(3), ABOVE)),)
-    return KinematicConstraints(model, (), [PositionConstraint(tip(model), np.zeros(3), WORLD, region)],
-                                [OrientationConstraint(tip(model), WORLD, DOWN, np.array(tolerances))])
+    return KinematicConstraints(
+        model,
+        (),
+        [PositionConstraint(tip(model), np.zeros(3), WORLD, region)],
+        [OrientationConstraint(tip(model), WORLD, DOWN, np.array(tolerances))],
+    )
 
 
 def whole(model: RobotModel, values: np.ndarray) -> np.ndarray:
@@ -79,12 +92,14 @@ def whole(model: RobotModel, values: np.ndarray) -> np.ndarray:
 
 
 def with_block(scene: PlanningScene, at: np.ndarray, size: float) -> PlanningScene:
-    return scene.with_object(CollisionObject("block", pin.SE3(np.eye(3), at), (
-        (Box(size, size, size), pin.SE3.Identity()),)))
+    return scene.with_object(
+        CollisionObject("block", pin.SE3(np.eye(3), at), ((Box(size, size, size), pin.SE3.Identity()),))
+    )
 
 
-def test_a_tolerant_pose_is_met_where_the_exact_one_collides(model: RobotModel, scene: PlanningScene,
-                                                             resolve: Resolve) -> None:
+def test_a_tolerant_pose_is_met_where_the_exact_one_collides(
+    model: RobotModel, scene: PlanningScene, resolve: Resolve
+) -> None:
     loose = pose_constraints(model, 0.5, (0.2, 0.2, 7.0))
     goal = PoseGoal(TIP, pin.SE3(DOWN, ABOVE), loose)
     blocked = with_block(scene, ABOVE + (0.0, 0.0, 0.09), 0.06)  # where the palm would be
@@ -95,8 +110,9 @@ def test_a_tolerant_pose_is_met_where_the_exact_one_collides(model: RobotModel, 
         assert loose.satisfied(whole(model, values))
 
 
-def test_a_free_rotation_makes_a_goal_nearer_than_the_exact_pose(model: RobotModel, scene: PlanningScene,
-                                                                 resolve: Resolve) -> None:
+def test_a_free_rotation_makes_a_goal_nearer_than_the_exact_pose(
+    model: RobotModel, scene: PlanningScene, resolve: Resolve
+) -> None:
     start = scene.positions[model.group(GROUP).indices]
     exact = resolve(PoseGoal(TIP, pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 2.5) @ DOWN, ABOVE)))
     loose = pose_constraints(model, 0.01, (0.05, 0.05, 7.0))
@@ -107,15 +123,15 @@ def test_a_free_rotation_makes_a_goal_nearer_than_the_exact_pose(model: RobotMod
 def test_any_mix_of_constraints_is_a_goal(model: RobotModel, resolve: Resolve) -> None:
     pan = int(model.group(GROUP).indices[0])
     poses = pose_constraints(model, 0.4, (0.3, 0.3, 7.0))
-    mixed = KinematicConstraints(model, [JointConstraint("pan", pan, 1.3, 0.2, 0.2)], poses.positions,
-                                 poses.orientations)
+    mixed = KinematicConstraints(
+        model, [JointConstraint("pan", pan, 1.3, 0.2, 0.2)], poses.positions, poses.orientations
+    )
     found = resolve(ConstraintGoal(mixed))
     assert len(found) > 1
     assert all(mixed.satisfied(whole(model, values)) for values in found)
 
 
-def test_goal_states_are_chosen_among_those_that_keep_the_path_constraints(model: RobotModel,
-                                                                           resolve: Resolve) -> None:
+def test_goal_states_are_chosen_among_those_that_keep_the_path_constraints(model: RobotModel, resolve: Resolve) -> None:
     goal = PoseGoal(TIP, pin.SE3(DOWN, ABOVE))
     elbow = int(model.group(GROUP).indices[2])
     other_side = KinematicConstraints(model, [JointConstraint("elbow_joint", elbow, -1.5, 1.5, 1.5)])
@@ -127,10 +143,21 @@ def test_goal_states_are_chosen_among_those_that_keep_the_path_constraints(model
     assert caught.value.code is ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS
 
 
-def test_reasons_tell_an_empty_region_from_one_that_only_collides(model: RobotModel, scene: PlanningScene,
-                                                                  resolve: Resolve) -> None:
-    far = KinematicConstraints(model, (), [PositionConstraint(tip(model), np.zeros(3), WORLD, (
-        (BoxSolid(0.1, 0.1, 0.1), pin.SE3(np.eye(3), np.array([0.0, 0.0, 9.0]))),))])
+def test_reasons_tell_an_empty_region_from_one_that_only_collides(
+    model: RobotModel, scene: PlanningScene, resolve: Resolve
+) -> None:
+    far = KinematicConstraints(
+        model,
+        (),
+        [
+            PositionConstraint(
+                tip(model),
+                np.zeros(3),
+                WORLD,
+                ((BoxSolid(0.1, 0.1, 0.1), pin.SE3(np.eye(3), np.array([0.0, 0.0, 9.0]))),),
+            )
+        ],
+    )
     with pytest.raises(PlanningError, match="goal region was empty: .* m outside its region") as caught:
         resolve(ConstraintGoal(far))
     assert caught.value.code is ErrorCode.GOAL_CONSTRAINTS_VIOLATED

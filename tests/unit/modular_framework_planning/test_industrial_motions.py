@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """PTP, LIN and CIRC on the shipped arm: exact in space, within limits at every millisecond, refused with the reason."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -35,8 +36,9 @@ STRAIGHT_M = 1.0e-4
 
 @pytest.fixture(scope="module")
 def pipeline(model: RobotModel) -> PlanningPipeline:
-    settings = PipelineSettings(parameters={"default_planner_config": "PTP"},
-                                robot_planning={"cartesian_limits": LIMITS})
+    settings = PipelineSettings(
+        parameters={"default_planner_config": "PTP"}, robot_planning={"cartesian_limits": LIMITS}
+    )
     planner = CommandPlanner.configure(model, settings)
     return PlanningPipeline(model, KinematicsPool(model), settings, planner, (), "pilz")
 
@@ -62,8 +64,10 @@ def moved(pose: pin.SE3, shift: tuple[float, float, float], turn: tuple[float, f
 
 
 def lin(scene: PlanningScene, target: pin.SE3, **changes: object) -> PlanningRequest:
-    return dataclasses.replace(PlanningRequest(scene, GROUP, (PoseGoal(LINK, target),), "LIN", velocity_scaling=0.3,
-                                               acceleration_scaling=0.3), **changes)
+    return dataclasses.replace(
+        PlanningRequest(scene, GROUP, (PoseGoal(LINK, target),), "LIN", velocity_scaling=0.3, acceleration_scaling=0.3),
+        **changes,
+    )
 
 
 def joint_goal(model: RobotModel, values: np.ndarray) -> JointGoal:
@@ -81,11 +85,18 @@ def check_limits(model: RobotModel, motion: Trajectory, factor: float = 1.0) -> 
         assert not rows[0].any() and not rows[-1].any(), "from rest to rest"
 
 
-def test_ptp_moves_all_joints_in_the_phases_of_the_widest_move(model: RobotModel, pipeline: PlanningPipeline,
-                                                               scene: PlanningScene) -> None:
+def test_ptp_moves_all_joints_in_the_phases_of_the_widest_move(
+    model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene
+) -> None:
     change = np.array([-0.9, 0.2, -0.3, 0.1, 0.0, 0.45])
-    request = PlanningRequest(scene, GROUP, (joint_goal(model, np.array(HOME) + change),), "PTP", velocity_scaling=0.2,
-                              acceleration_scaling=0.1)
+    request = PlanningRequest(
+        scene,
+        GROUP,
+        (joint_goal(model, np.array(HOME) + change),),
+        "PTP",
+        velocity_scaling=0.2,
+        acceleration_scaling=0.1,
+    )
     motion = pipeline.plan(request).trajectory
     velocity, acceleration = 3.0 * 0.2, 5.0 * 0.1  # the strictest of all joints, scaled
     peak = min(velocity, np.sqrt(0.9 * acceleration))
@@ -102,15 +113,21 @@ def test_ptp_moves_all_joints_in_the_phases_of_the_widest_move(model: RobotModel
 
 def test_a_faster_joint_does_not_run_ahead_of_the_strictest_limit(robot: object) -> None:
     limits = {name: {"max_velocity": 3.0, "max_acceleration": 5.0} for name in robot.model.group(GROUP).joints}
-    limits["elbow_joint"] = {"max_velocity": 0.5, "max_acceleration": 0.8, "has_deceleration": True,
-                             "max_deceleration": -0.4}
+    limits["elbow_joint"] = {
+        "max_velocity": 0.5,
+        "max_acceleration": 0.8,
+        "has_deceleration": True,
+        "max_deceleration": -0.4,
+    }
     model = RobotModel(robot.urdf, robot.srdf, limits)
-    scene = empty_scene(model, model.merge(model.default_positions(), dict(zip(model.group(GROUP).joints, HOME,
-                                                                               strict=True))))
+    scene = empty_scene(
+        model, model.merge(model.default_positions(), dict(zip(model.group(GROUP).joints, HOME, strict=True)))
+    )
     pipeline = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), CommandPlanner(None), ())
     goal = JointGoal({"wrist_3_joint": 1.0})
-    motion = pipeline.plan(PlanningRequest(scene, GROUP, (goal,), "PTP", velocity_scaling=1.0,
-                                           acceleration_scaling=1.0)).trajectory
+    motion = pipeline.plan(
+        PlanningRequest(scene, GROUP, (goal,), "PTP", velocity_scaling=1.0, acceleration_scaling=1.0)
+    ).trajectory
     assert motion.duration_s == pytest.approx(1.0 / 0.5 + 0.5 * (0.5 / 0.8 + 0.5 / 0.4) + ROUNDING_S, abs=1e-9)
     _, speed, change, _ = motion.at(motion.sample_times())
     assert speed.max() == pytest.approx(0.5, rel=1e-6)
@@ -123,8 +140,9 @@ def test_a_deceleration_that_is_not_below_0_is_refused(robot: object, value: flo
         RobotModel(robot.urdf, robot.srdf, {"elbow_joint": {"max_deceleration": value}})
 
 
-def test_lin_is_straight_at_every_millisecond(model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene,
-                                              follower: PoseFollower, home: pin.SE3) -> None:
+def test_lin_is_straight_at_every_millisecond(
+    model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, follower: PoseFollower, home: pin.SE3
+) -> None:
     for shift, turn in (((0.2, 0.1, -0.2), (0, 0, 0.5)), ((-0.1, 0.0, 0.15), (0.4, 0, 0)), ((0, 0, 0), (0, 0.3, 0.2))):
         target = moved(home, shift, turn)
         motion = pipeline.plan(lin(scene, target)).trajectory
@@ -144,8 +162,9 @@ def test_lin_is_straight_at_every_millisecond(model: RobotModel, pipeline: Plann
         check_limits(model, motion)
 
 
-def test_lin_keeps_the_cartesian_limits(pipeline: PlanningPipeline, scene: PlanningScene, follower: PoseFollower,
-                                        home: pin.SE3) -> None:
+def test_lin_keeps_the_cartesian_limits(
+    pipeline: PlanningPipeline, scene: PlanningScene, follower: PoseFollower, home: pin.SE3
+) -> None:
     motion = pipeline.plan(lin(scene, moved(home, (0.25, 0.0, 0.0)))).trajectory
     peak = 0.3 * 1.0
     rise, fall = peak / (0.3 * 2.25), peak / (0.3 * 5.0)
@@ -159,7 +178,8 @@ def test_lin_keeps_the_cartesian_limits(pipeline: PlanningPipeline, scene: Plann
 
 
 def test_lin_to_joint_values_ends_there_or_says_that_the_posture_is_another(
-        model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3) -> None:
+    model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
+) -> None:
     end = pipeline.plan(lin(scene, moved(home, (0.1, 0.05, -0.1)))).trajectory.positions[-1]
     again = pipeline.plan(dataclasses.replace(lin(scene, home), goals=(joint_goal(model, end),))).trajectory
     assert np.allclose(again.positions[-1], end, atol=1e-6)
@@ -168,17 +188,32 @@ def test_lin_to_joint_values_ends_there_or_says_that_the_posture_is_another(
     assert error.code == ErrorCode.GOAL_CONSTRAINTS_VIOLATED and "wrist_3_joint" in error.reason
 
 
-@pytest.mark.parametrize(("name", "point", "goal", "angle"), [
-    ("center", (0.1, 0.0, 0.0), (0.1, 0.0, -0.1), np.pi / 2),
-    ("interim", (0.1, 0.0, -0.1), (0.2, 0.0, 0.0), np.pi),
-    ("interim", (0.2, 0.0, 0.0), (0.1, 0.0, 0.1), 3 * np.pi / 2),
-])
-def test_circ_stays_on_the_circle(model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene,
-                                  follower: PoseFollower, home: pin.SE3, name: str, point: tuple[float, ...],
-                                  goal: tuple[float, ...], angle: float) -> None:
-    request = dataclasses.replace(lin(scene, moved(home, goal)), planner_id="CIRC", velocity_scaling=0.1,
-                                  acceleration_scaling=0.1,
-                                  auxiliary_point=AuxiliaryPoint(name, home.translation + np.array(point)))
+@pytest.mark.parametrize(
+    ("name", "point", "goal", "angle"),
+    [
+        ("center", (0.1, 0.0, 0.0), (0.1, 0.0, -0.1), np.pi / 2),
+        ("interim", (0.1, 0.0, -0.1), (0.2, 0.0, 0.0), np.pi),
+        ("interim", (0.2, 0.0, 0.0), (0.1, 0.0, 0.1), 3 * np.pi / 2),
+    ],
+)
+def test_circ_stays_on_the_circle(
+    model: RobotModel,
+    pipeline: PlanningPipeline,
+    scene: PlanningScene,
+    follower: PoseFollower,
+    home: pin.SE3,
+    name: str,
+    point: tuple[float, ...],
+    goal: tuple[float, ...],
+    angle: float,
+) -> None:
+    request = dataclasses.replace(
+        lin(scene, moved(home, goal)),
+        planner_id="CIRC",
+        velocity_scaling=0.1,
+        acceleration_scaling=0.1,
+        auxiliary_point=AuxiliaryPoint(name, home.translation + np.array(point)),
+    )
     motion = pipeline.plan(request).trajectory
     centre = home.translation + np.array([0.1, 0.0, 0.0])
     points = np.array([follower.pose(values).translation for values in motion.at(motion.sample_times())[0]])
@@ -196,29 +231,34 @@ def failure(pipeline: PlanningPipeline, request: PlanningRequest) -> PlanningErr
     return caught.value
 
 
-def test_nothing_is_gone_around(model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene,
-                                home: pin.SE3) -> None:
+def test_nothing_is_gone_around(
+    model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
+) -> None:
     pose = pin.SE3(np.eye(3), home.translation + np.array([0.15, 0.0, -0.1]))
     blocked = scene.with_object(CollisionObject("post", pose, ((Box(0.02, 0.02, 0.5), pin.SE3.Identity()),)))
     goal = moved(home, (0.3, 0.0, 0.0))
     values = pipeline.plan(lin(scene, goal)).trajectory.positions[-1]
-    for request in (lin(blocked, goal), dataclasses.replace(lin(blocked, goal), planner_id="PTP",
-                                                            goals=(joint_goal(model, values),))):
+    for request in (
+        lin(blocked, goal),
+        dataclasses.replace(lin(blocked, goal), planner_id="PTP", goals=(joint_goal(model, values),)),
+    ):
         error = failure(pipeline, request)
         assert error.code == ErrorCode.INVALID_MOTION_PLAN
         assert re.search("'post'.* mm deep", error.reason), error.reason
 
 
 def test_a_joint_that_would_be_too_fast_refuses_the_line_and_is_named(
-        pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3) -> None:
+    pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
+) -> None:
     far = moved(home, (0.3, 0.1, -0.1), (0, 0, 1.5))
     error = failure(pipeline, lin(scene, far, velocity_scaling=1.0, acceleration_scaling=1.0))
     assert error.code == ErrorCode.INVALID_MOTION_PLAN
     assert re.search("joint '.*' would need (velocity|acceleration) .*; allowed is .*scaling_factor", error.reason)
 
 
-def test_refusals_have_a_code_and_a_reason(model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene,
-                                           home: pin.SE3) -> None:
+def test_refusals_have_a_code_and_a_reason(
+    model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
+) -> None:
     line = lin(scene, moved(home, (0.1, 0, 0)))
     circle = dataclasses.replace(line, planner_id="CIRC")
     half = AuxiliaryPoint("center", home.translation + np.array([0.05, 0, 0]))
@@ -246,14 +286,16 @@ def test_refusals_have_a_code_and_a_reason(model: RobotModel, pipeline: Planning
         CommandPlanner(None, 0.0)
 
 
-def test_being_there_already_gives_a_motion_of_one_point(pipeline: PlanningPipeline, scene: PlanningScene,
-                                                         home: pin.SE3) -> None:
+def test_being_there_already_gives_a_motion_of_one_point(
+    pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
+) -> None:
     for planner in ("PTP", "LIN"):
         assert len(pipeline.plan(dataclasses.replace(lin(scene, home), planner_id=planner)).trajectory.times) == 1
 
 
-def test_the_sampling_time_changes_the_points_and_not_the_motion(model: RobotModel, pipeline: PlanningPipeline,
-                                                                 scene: PlanningScene, home: pin.SE3) -> None:
+def test_the_sampling_time_changes_the_points_and_not_the_motion(
+    model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
+) -> None:
     fine = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), CommandPlanner(LIMITS, 0.02), ())
     request = lin(scene, moved(home, (0.2, 0.0, 0.0)))
     one, other = pipeline.plan(request).trajectory, fine.plan(request).trajectory

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Speed profiles keep the closed form of a trapezoid and its limits; lines and arcs are lines and arcs."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -26,26 +27,32 @@ def at(x: float, y: float, z: float, rpy: tuple[float, float, float] = (0.0, 0.0
 
 
 # rise = v / a, fall = v / d, cruise = s / v - (rise + fall) / 2; a triangle peaks at sqrt(2 s a d / (a + d))
-@pytest.mark.parametrize(("distance", "limits", "phases"), [
-    (1.0, (0.5, 2.0, 1.0), (0.25, 1.625, 0.5)),
-    (10.0, (2.0, 4.0, 4.0), (0.5, 4.5, 0.5)),
-    (0.75, (9.0, 1.0, 2.0), (1.0, 0.0, 0.5)),
-    (0.02, (1.0, 2.0, 2.0), (0.1, 0.0, 0.1)),
-])
-def test_phases_are_those_of_the_closed_form(distance: float, limits: tuple[float, float, float],
-                                             phases: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize(
+    ("distance", "limits", "phases"),
+    [
+        (1.0, (0.5, 2.0, 1.0), (0.25, 1.625, 0.5)),
+        (10.0, (2.0, 4.0, 4.0), (0.5, 4.5, 0.5)),
+        (0.75, (9.0, 1.0, 2.0), (1.0, 0.0, 0.5)),
+        (0.02, (1.0, 2.0, 2.0), (0.1, 0.0, 0.1)),
+    ],
+)
+def test_phases_are_those_of_the_closed_form(
+    distance: float, limits: tuple[float, float, float], phases: tuple[float, float, float]
+) -> None:
     profile = fastest_profile(distance, *limits)
     assert (profile.rise_s, profile.cruise_s, profile.fall_s) == pytest.approx(phases, abs=1e-9)
     assert profile.duration_s == pytest.approx(sum(phases) + ROUNDING_S, abs=1e-9)
     middle = 0.5 * ROUNDING_S
     assert profile.at(np.array([phases[0] + middle]))[0][0] == pytest.approx(
-        0.5 * limits[1] * phases[0]**2, abs=limits[1] * ROUNDING_S**2), "the end of the rise, a s^2 / 2"
+        0.5 * limits[1] * phases[0] ** 2, abs=limits[1] * ROUNDING_S**2
+    ), "the end of the rise, a s^2 / 2"
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.floats(1e-5, 50.0), st.floats(0.05, 5.0), st.floats(0.01, 20.0), st.floats(0.01, 20.0))
 def test_profiles_go_the_distance_within_limits_and_rest_at_both_ends(
-        distance: float, velocity: float, acceleration: float, deceleration: float) -> None:
+    distance: float, velocity: float, acceleration: float, deceleration: float
+) -> None:
     profile = fastest_profile(distance, velocity, acceleration, deceleration)
     times = np.linspace(0.0, profile.duration_s, 2001)
     position, speed, change = profile.at(times)
@@ -94,8 +101,10 @@ def test_a_centre_gives_the_shorter_arc() -> None:
     assert np.allclose(path.pose(1.0).translation, [0, -1, 0])
 
 
-@pytest.mark.parametrize(("interim", "angle"), [((np.sqrt(0.5), np.sqrt(0.5)), np.pi / 2),
-                                                ((-1.0, 0.0), 3 * np.pi / 2), ((0.0, -1.0), 3 * np.pi / 2)])
+@pytest.mark.parametrize(
+    ("interim", "angle"),
+    [((np.sqrt(0.5), np.sqrt(0.5)), np.pi / 2), ((-1.0, 0.0), 3 * np.pi / 2), ((0.0, -1.0), 3 * np.pi / 2)],
+)
 def test_an_interim_point_lies_on_the_arc_whichever_way_round(interim: tuple[float, float], angle: float) -> None:
     point = np.array([*interim, 0.0])
     path = arc_through_interim(at(1, 0, 0), at(0, 1, 0), point)
@@ -118,17 +127,21 @@ def test_a_centre_that_is_a_little_off_still_leads_exactly_to_the_goal() -> None
     assert np.allclose(path.pose(0.0).translation, [1, 0, 0]) and np.allclose(path.pose(1.0).translation, [0, 1.005, 0])
 
 
-@pytest.mark.parametrize(("build", "goal", "point", "text"), [
-    (arc_around_centre, (-1, 0, 0), (0, 0, 0), "half or a full circle"),
-    (arc_around_centre, (1, 0, 0), (0, 0, 0), "half or a full circle"),
-    (arc_around_centre, (0, 1.02, 0), (0, 0, 0), "1.0000 m from the centre and goal 1.0200 m"),
-    (arc_around_centre, (0, 1, 0), (1, 0, 0), "0.000000 m from start or goal"),
-    (arc_through_interim, (1, 0, 0), (0, 1, 0), "two arcs"),
-    (arc_through_interim, (3, 0, 0), (2, 0, 0), "lie on one line"),
-    (arc_through_interim, (0, 1, 0), (1, 0, 0), "coincide"),
-])
-def test_points_that_give_no_circle_are_refused(build: object, goal: tuple[float, ...], point: tuple[float, ...],
-                                                text: str) -> None:
+@pytest.mark.parametrize(
+    ("build", "goal", "point", "text"),
+    [
+        (arc_around_centre, (-1, 0, 0), (0, 0, 0), "half or a full circle"),
+        (arc_around_centre, (1, 0, 0), (0, 0, 0), "half or a full circle"),
+        (arc_around_centre, (0, 1.02, 0), (0, 0, 0), "1.0000 m from the centre and goal 1.0200 m"),
+        (arc_around_centre, (0, 1, 0), (1, 0, 0), "0.000000 m from start or goal"),
+        (arc_through_interim, (1, 0, 0), (0, 1, 0), "two arcs"),
+        (arc_through_interim, (3, 0, 0), (2, 0, 0), "lie on one line"),
+        (arc_through_interim, (0, 1, 0), (1, 0, 0), "coincide"),
+    ],
+)
+def test_points_that_give_no_circle_are_refused(
+    build: object, goal: tuple[float, ...], point: tuple[float, ...], text: str
+) -> None:
     with pytest.raises(PlanningError) as caught:
         build(at(1, 0, 0), at(*goal), np.array(point, dtype=float))
     assert caught.value.code == ErrorCode.INVALID_MOTION_PLAN and text in caught.value.reason
@@ -139,6 +152,10 @@ def test_limits_that_cannot_be_are_all_named() -> None:
     assert read_cartesian_limits(good) == LIMITS
     with pytest.raises(ModelError) as caught:
         read_cartesian_limits({"max_trans_vel": 0.0, "max_trans_acc": float("nan"), "max_trans_dec": 5.0})
-    for text in ("max_trans_vel is 0.0", "max_trans_acc is nan", "max_trans_dec is 5.0; a number below 0",
-                 "max_rot_vel is missing"):
+    for text in (
+        "max_trans_vel is 0.0",
+        "max_trans_acc is nan",
+        "max_trans_dec is 5.0; a number below 0",
+        "max_rot_vel is missing",
+    ):
         assert text in caught.value.reason

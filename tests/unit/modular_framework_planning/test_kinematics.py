@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Inverse kinematics: every solution is right, none is lost, and failures have a cause."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -39,7 +40,8 @@ def random_positions(model: RobotModel, rng: np.random.Generator) -> np.ndarray:
 
 
 def test_every_solution_reaches_the_pose_and_the_state_it_came_from_is_among_them(
-        model: RobotModel, solver: InverseKinematics) -> None:
+    model: RobotModel, solver: InverseKinematics
+) -> None:
     rng = np.random.default_rng(1)
     assert solver.is_analytic
     for _ in range(200):
@@ -56,7 +58,8 @@ def test_every_solution_reaches_the_pose_and_the_state_it_came_from_is_among_the
 
 
 def test_solutions_come_nearest_first_and_include_whole_turns_within_bounds(
-        model: RobotModel, solver: InverseKinematics) -> None:
+    model: RobotModel, solver: InverseKinematics
+) -> None:
     positions = model.default_positions()
     positions[solver.group.indices] = [0.3, -1.2, 1.1, -1.4, -1.5, 0.2]
     found = solver.solutions(TIP, model.link_transforms(positions)[TIP], positions)
@@ -87,7 +90,8 @@ def test_measured_gripper_joints_stay_as_they_are(model: RobotModel, solver: Inv
 
 
 def test_a_pose_too_far_away_is_called_out_of_reach_with_the_distance(
-        model: RobotModel, solver: InverseKinematics) -> None:
+    model: RobotModel, solver: InverseKinematics
+) -> None:
     target = pin.SE3(np.eye(3), np.array([3.0, 0.0, 1.0]))
     assert solver.solutions(TIP, target, model.default_positions()) == []
     text = solver.explain_unreachable(TIP, target, model.default_positions())
@@ -116,10 +120,18 @@ def test_solutions_agree_with_the_published_lengths_of_the_ur5(model: RobotModel
         assert all(max(pose_gap(ur5_tool(item[solver.group.indices]), wanted)) < 1e-6 for item in found)
 
 
-@pytest.mark.parametrize("values", [(0.3, -1.2, 0.0, -1.4, -1.5, 0.2), (0.3, -1.2, 1.1, -1.4, 0.0, 0.2),
-                                    (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)])
-def test_stretched_and_aligned_postures_are_solved_too(model: RobotModel, solver: InverseKinematics,
-                                                       values: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    "values",
+    [
+        (0.3, -1.2, 0.0, -1.4, -1.5, 0.2),
+        (0.3, -1.2, 1.1, -1.4, 0.0, 0.2),
+        (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0),
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    ],
+)
+def test_stretched_and_aligned_postures_are_solved_too(
+    model: RobotModel, solver: InverseKinematics, values: tuple[float, ...]
+) -> None:
     positions = model.default_positions()
     positions[solver.group.indices] = values
     target = model.link_transforms(positions)[TIP]
@@ -210,8 +222,9 @@ def test_a_position_alone_is_reached_by_the_least_motion_found(arm_of: str, requ
     for _ in range(30):
         ends = part.default_positions(), part.default_positions()
         for positions in ends:
-            positions[group.indices] = rng.uniform(np.maximum(part.lower, -2.0), np.minimum(part.upper, 2.0)
-                                                   )[group.indices]
+            positions[group.indices] = rng.uniform(np.maximum(part.lower, -2.0), np.minimum(part.upper, 2.0))[
+                group.indices
+            ]
         seed, there = ends
         position = part.link_transforms(there)[group.tip_link].act(point)
         found = solver.position_solutions(group.tip_link, point, position, seed, 0.5)
@@ -231,13 +244,26 @@ def test_a_position_out_of_reach_has_no_solution(model: RobotModel, solver: Inve
 
 
 def test_kinematics_yaml_is_read_and_its_faults_are_told(model: RobotModel) -> None:
-    read = settings_from({"arm": {"kinematics_solver": "kdl_kinematics_plugin/KDLKinematicsPlugin",
-                                  "kinematics_solver_search_resolution": 0.005, "kinematics_solver_timeout": 0.01,
-                                  "kinematics_solver_attempts": 3, "position_only_ik": True}})
+    read = settings_from(
+        {
+            "arm": {
+                "kinematics_solver": "kdl_kinematics_plugin/KDLKinematicsPlugin",
+                "kinematics_solver_search_resolution": 0.005,
+                "kinematics_solver_timeout": 0.01,
+                "kinematics_solver_attempts": 3,
+                "position_only_ik": True,
+            }
+        }
+    )
     assert read["arm"] == KinematicsSettings("kdl_kinematics_plugin/KDLKinematicsPlugin", 0.005, 0.01, 3, True)
     assert KinematicsPool(model, read).solver("arm").settings.attempts == 3
-    for bad in ({"arm": 3}, {"arm": {"kinematics_solver_timeout": "soon"}}, {"arm": {"kinematics_solver_timeout": 0}},
-                {"arm": {"kinematics_solver_search_resolution": -0.1}}, {"arm": {"position_only_ik": "yes"}}):
+    for bad in (
+        {"arm": 3},
+        {"arm": {"kinematics_solver_timeout": "soon"}},
+        {"arm": {"kinematics_solver_timeout": 0}},
+        {"arm": {"kinematics_solver_search_resolution": -0.1}},
+        {"arm": {"position_only_ik": "yes"}},
+    ):
         with pytest.raises(PlanningError, match="kinematics.yaml"):
             settings_from(bad)
 
@@ -252,8 +278,10 @@ def test_of_about_equally_near_solutions_the_one_with_most_clearance_is_taken() 
 
 def test_warming_up_compiles_every_loop_for_the_types_it_is_used_with(model: RobotModel, seven: RobotModel) -> None:
     compiled_kinematics.warm_up()
-    loops = [getattr(compiled_kinematics, name) for name in ("polish", "search", "approach_seed", "unique_rows",
-                                                             "whole_turns", "joint_placements")]
+    loops = [
+        getattr(compiled_kinematics, name)
+        for name in ("polish", "search", "approach_seed", "unique_rows", "whole_turns", "joint_placements")
+    ]
     before = [len(loop.signatures) for loop in loops]
     for robot, group in ((model, "arm"), (seven, "arm")):
         solver, seed = InverseKinematics(robot, robot.group(group)), robot.default_positions()

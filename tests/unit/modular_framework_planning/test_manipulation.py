@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Grippers are found in the SRDF, straight motions are read in the frame they are given in, and short ones refused."""
+
 from __future__ import annotations
 
 from types import SimpleNamespace
@@ -18,8 +19,12 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_urdf.mimics import Mimic
 
 EFFECTOR = "ezgripper_finger_1_ee"
-HAND = Hand("ee_link", ("ezgripper_palm_link",), frozenset({"ezgripper_knuckle_palm_L1_1"}),
-            {"ezgripper_knuckle_palm_L1_2": Mimic("ezgripper_knuckle_palm_L1_1", 2.0, 0.1)})
+HAND = Hand(
+    "ee_link",
+    ("ezgripper_palm_link",),
+    frozenset({"ezgripper_knuckle_palm_L1_1"}),
+    {"ezgripper_knuckle_palm_L1_2": Mimic("ezgripper_knuckle_palm_L1_1", 2.0, 0.1)},
+)
 
 
 @pytest.fixture
@@ -27,18 +32,29 @@ def scene(model: RobotModel) -> PlanningScene:
     return empty_scene(model)
 
 
-@pytest.mark.parametrize(("group", "name", "arm"), [
-    ("arm", "", "arm"), ("arm", EFFECTOR, "arm"), ("arm_and_manipulator", "", "arm_and_manipulator"),
-    ("", EFFECTOR, "arm"),
-])
+@pytest.mark.parametrize(
+    ("group", "name", "arm"),
+    [
+        ("arm", "", "arm"),
+        ("arm", EFFECTOR, "arm"),
+        ("arm_and_manipulator", "", "arm_and_manipulator"),
+        ("", EFFECTOR, "arm"),
+    ],
+)
 def test_the_end_effector_of_a_group_is_found(model: RobotModel, group: str, name: str, arm: str) -> None:
     found, effector = choose_end_effector(model, group, name)
     assert found.name == arm and effector.name == EFFECTOR and effector.parent_link == "ee_link"
 
 
-@pytest.mark.parametrize(("group", "name", "word"), [
-    ("", "", "group_name"), ("nobody", "", "nobody"), ("arm", "nobody", "nobody"), ("ezgripper", "", "0 end effectors"),
-])
+@pytest.mark.parametrize(
+    ("group", "name", "word"),
+    [
+        ("", "", "group_name"),
+        ("nobody", "", "nobody"),
+        ("arm", "nobody", "nobody"),
+        ("ezgripper", "", "0 end effectors"),
+    ],
+)
 def test_a_choice_that_is_not_clear_is_refused(model: RobotModel, group: str, name: str, word: str) -> None:
     with pytest.raises(PlanningError, match=word) as error:
         choose_end_effector(model, group, name)
@@ -72,8 +88,13 @@ def test_a_direction_turns_with_the_hand_only_in_a_frame_fixed_to_it(scene: Plan
 def test_no_direction_is_fine_only_for_no_distance(scene: PlanningScene) -> None:
     assert translation(scene, moving(0, 0, 0, "", 0.0, 0.0), "ee_link", "retreat").desired_distance_m == 0.0
     assert translation(scene, moving(0, 0, 1, "world", 0.0, 0.2), "ee_link", "retreat").desired_distance_m == 0.2
-    for bad in (moving(0, 0, 0, "world"), moving(0, 0, np.nan, "world"), moving(0, 0, 1, "world", -1.0, 0.0),
-                moving(0, 0, 1, "world", np.inf, 0.0), moving(0, 0, 1, "world", 0.1, -0.1)):
+    for bad in (
+        moving(0, 0, 0, "world"),
+        moving(0, 0, np.nan, "world"),
+        moving(0, 0, 1, "world", -1.0, 0.0),
+        moving(0, 0, 1, "world", np.inf, 0.0),
+        moving(0, 0, 1, "world", 0.1, -0.1),
+    ):
         with pytest.raises(PlanningError, match="retreat"):
             translation(scene, bad, "ee_link", "retreat")
 
@@ -86,8 +107,9 @@ def test_the_last_point_of_a_posture_counts() -> None:
     both = [joint, *HAND.mimics]
     two = [SimpleNamespace(positions=[0.2, 0.4])]
     assert posture(SimpleNamespace(joint_names=both, points=two), HAND, "grasp") == {joint: 0.2}
-    assert posture(SimpleNamespace(joint_names=both[1:], points=[SimpleNamespace(positions=[0.5])]), HAND,
-                   "grasp") == pytest.approx({joint: 0.2}), "0.5 is twice 0.2, and 0.1"
+    assert posture(
+        SimpleNamespace(joint_names=both[1:], points=[SimpleNamespace(positions=[0.5])]), HAND, "grasp"
+    ) == pytest.approx({joint: 0.2}), "0.5 is twice 0.2, and 0.1"
     for names, given in ((["elbow_joint"], points), ([joint], []), ([joint, joint], points)):
         with pytest.raises(PlanningError, match="grasp"):
             posture(SimpleNamespace(joint_names=names, points=given), HAND, "grasp")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A process with many planning threads keeps its memory in few arenas and lets short requests in between."""
+
 from __future__ import annotations
 
 import subprocess

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Motions of every pipeline have the properties a robot relies on; all 200 problems each: benchmarks/properties."""
+
 from __future__ import annotations
 
 import os

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sequences: blended motions leave their paths only within the radius, smoothly and within limits; rules are kept."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -49,10 +50,12 @@ class Robot:
     def planned(self, steps: list[Step], world: PlanningScene | None = None, pace: float = 0.2) -> list[PlannedItem]:
         items, scene = [], world or self.scene
         for planner, position, turn, radius in steps:
-            target = pin.SE3(self.home.rotation @ pin.exp3(np.array(turn, dtype=float)),
-                             self.home.translation + np.array(position))
-            request = PlanningRequest(scene, GROUP, (PoseGoal(LINK, target),), planner, velocity_scaling=pace,
-                                      acceleration_scaling=pace)
+            target = pin.SE3(
+                self.home.rotation @ pin.exp3(np.array(turn, dtype=float)), self.home.translation + np.array(position)
+            )
+            request = PlanningRequest(
+                scene, GROUP, (PoseGoal(LINK, target),), planner, velocity_scaling=pace, acceleration_scaling=pace
+            )
             if planner == "CIRC":
                 here = self.follower.pose(scene.positions[self.model.group(GROUP).indices]).translation
                 middle = 0.5 * (here + target.translation) + np.array([0.0, 0.0, -0.03])
@@ -72,13 +75,18 @@ def robot_at_home(model: RobotModel) -> Robot:
 
 
 SQUARE: list[Step] = [("LIN", (0.2, 0, 0), (0, 0, 0), 0.05), ("LIN", (0.2, 0, -0.2), (0, 0, 0.3), 0.0)]
-MIXED: list[Step] = [("PTP", (0.15, 0.05, 0), (0, 0, 0), 0.04), ("LIN", (0.15, 0.05, -0.15), (0, 0, 0.4), 0.03),
-                     ("CIRC", (-0.05, 0.05, -0.15), (0, 0, 0), 0.05), ("PTP", (0, 0, 0), (0, 0, 0), 0.0)]
+MIXED: list[Step] = [
+    ("PTP", (0.15, 0.05, 0), (0, 0, 0), 0.04),
+    ("LIN", (0.15, 0.05, -0.15), (0, 0, 0.4), 0.03),
+    ("CIRC", (-0.05, 0.05, -0.15), (0, 0, 0), 0.05),
+    ("PTP", (0, 0, 0), (0, 0, 0), 0.0),
+]
 
 
 @pytest.mark.parametrize("steps", [SQUARE, MIXED])
 def test_a_blended_motion_is_off_the_paths_only_within_the_radius_and_never_stops(
-        robot_at_home: Robot, steps: list[Step]) -> None:
+    robot_at_home: Robot, steps: list[Step]
+) -> None:
     robot = robot_at_home
     items = robot.planned(steps)
     parts = robot.joiner.join(items)
@@ -101,7 +109,8 @@ def test_a_blended_motion_is_off_the_paths_only_within_the_radius_and_never_stop
 
 @pytest.mark.parametrize("steps", [SQUARE, MIXED])
 def test_a_blended_motion_has_continuous_velocity_within_the_joints_limits(
-        robot_at_home: Robot, model: RobotModel, steps: list[Step]) -> None:
+    robot_at_home: Robot, model: RobotModel, steps: list[Step]
+) -> None:
     motion = robot_at_home.joiner.join(robot_at_home.planned(steps))[0].trajectory
     assert (np.diff(motion.times) > 0.0).all() and motion.times[0] == 0.0
     times = motion.sample_times()
@@ -132,8 +141,14 @@ def refused(robot: Robot, steps: list[Step], world: PlanningScene | None = None,
 
 
 def test_spheres_that_overlap_are_refused(robot_at_home: Robot) -> None:
-    error = refused(robot_at_home, [("LIN", (0.1, 0, 0), (0, 0, 0), 0.06), ("LIN", (0.1, 0, -0.1), (0, 0, 0), 0.04),
-                                    ("LIN", (0, 0, -0.1), (0, 0, 0), 0.0)])
+    error = refused(
+        robot_at_home,
+        [
+            ("LIN", (0.1, 0, 0), (0, 0, 0), 0.06),
+            ("LIN", (0.1, 0, -0.1), (0, 0, 0), 0.04),
+            ("LIN", (0, 0, -0.1), (0, 0, 0), 0.0),
+        ],
+    )
     assert error.code == ErrorCode.INVALID_MOTION_PLAN
     assert "items[0] and items[1]" in error.reason and "below the distance 0.1000 m" in error.reason
 
@@ -152,11 +167,13 @@ def world_with_cube(robot: Robot, items: list[PlannedItem], joined: Trajectory) 
     for aside in np.linspace(0.09, 0.12, 4):
         for below in np.linspace(-0.03, 0.01, 5):
             pose = pin.SE3(np.eye(3), corner + np.array([-aside, 0.0, -below]))
-            world = robot.scene.with_object(CollisionObject("cube", pose, ((Box(0.01, 0.01, 0.01),
-                                                                            pin.SE3.Identity()),)))
+            world = robot.scene.with_object(
+                CollisionObject("cube", pose, ((Box(0.01, 0.01, 0.01), pin.SE3.Identity()),))
+            )
             motion = MotionChecker(ExactCollisionChecker(world, indices), indices, world.positions)
             if all(motion.colliding_state(item.answer.trajectory.curve(0.02), 0.02) is None for item in items) and (
-                    motion.colliding_state(joined.curve(0.02), 0.02) is not None):
+                motion.colliding_state(joined.curve(0.02), 0.02) is not None
+            ):
                 return world
     raise AssertionError("there is a place that only the short cut touches")
 
@@ -175,13 +192,20 @@ def spec(group: str = GROUP, radius: float = 0.0, start: bool = False) -> ItemSp
     return ItemSpec(group, radius, start)
 
 
-@pytest.mark.parametrize(("items", "code", "text"), [
-    ([spec(radius=-0.1), spec()], ErrorCode.INVALID_MOTION_PLAN, "items[0].blend_radius is -0.1"),
-    ([spec(radius=float("nan")), spec()], ErrorCode.INVALID_MOTION_PLAN, "items[0].blend_radius is nan"),
-    ([spec(), spec(radius=0.1)], ErrorCode.INVALID_MOTION_PLAN, "items[1].blend_radius is 0.1; the last one must be 0"),
-    ([spec(start=True), spec(start=True)], ErrorCode.INVALID_ROBOT_STATE, "items[1].start_state"),
-    ([spec(), spec("ezgripper"), spec(start=True)], ErrorCode.INVALID_ROBOT_STATE, "items[2].start_state"),
-])
+@pytest.mark.parametrize(
+    ("items", "code", "text"),
+    [
+        ([spec(radius=-0.1), spec()], ErrorCode.INVALID_MOTION_PLAN, "items[0].blend_radius is -0.1"),
+        ([spec(radius=float("nan")), spec()], ErrorCode.INVALID_MOTION_PLAN, "items[0].blend_radius is nan"),
+        (
+            [spec(), spec(radius=0.1)],
+            ErrorCode.INVALID_MOTION_PLAN,
+            "items[1].blend_radius is 0.1; the last one must be 0",
+        ),
+        ([spec(start=True), spec(start=True)], ErrorCode.INVALID_ROBOT_STATE, "items[1].start_state"),
+        ([spec(), spec("ezgripper"), spec(start=True)], ErrorCode.INVALID_ROBOT_STATE, "items[2].start_state"),
+    ],
+)
 def test_rules_of_a_sequence(items: list[ItemSpec], code: ErrorCode, text: str) -> None:
     with pytest.raises(PlanningError) as caught:
         checked_radii(items)

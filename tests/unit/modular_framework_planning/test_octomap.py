@@ -4,6 +4,7 @@
 octomap_reference.json was written by a program that uses the OctoMap library (1.9): looks at random points, the leaves
 afterwards, and its own streams.
 """
+
 from __future__ import annotations
 
 import json
@@ -71,8 +72,12 @@ def test_a_file_of_octomap_is_read_and_a_written_one_says_the_same(tmp_path: Pat
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.dictionaries(st.tuples(*[st.integers(32750, 32790)] * 3), st.sampled_from([-2.0, -0.4, 0.85, 3.5]),
-                       min_size=1, max_size=300), st.booleans())
+@given(
+    st.dictionaries(
+        st.tuples(*[st.integers(32750, 32790)] * 3), st.sampled_from([-2.0, -0.4, 0.85, 3.5]), min_size=1, max_size=300
+    ),
+    st.booleans(),
+)
 def test_a_map_survives_its_streams(cells: dict[tuple[int, int, int], float], whole_block: bool) -> None:
     if whole_block:  # 64 equal voxels that are pruned into one leaf
         cells |= {(32768 + x, 32768 + y, 32768 + z): 3.5 for x in range(4) for y in range(4) for z in range(4)}
@@ -92,20 +97,33 @@ def test_equal_neighbours_are_pruned_into_one_leaf() -> None:
     assert len(write_full(voxels)) == 5 * 14, "13 levels above a leaf of 8 x 8 x 8 voxels"
 
 
-@pytest.mark.parametrize(("data", "binary", "text"), [
-    (b"abc", False, "multiple of the 5 bytes"), (b"abc", True, "multiple of the 2 bytes"),
-    (b"\x00\x00\x00\x00\x01", False, "ends early"), (b"\xff\xff", True, "ends early"),
-    (b"\x00\x00\x00\x00\x00" * 2, False, "after the end"), (b"\x03\x00" * 17, True, "deeper than 16"),
-    (b"\x00\x00\x00\x00\x00", False, "allowed are 16000000"), (b"\x00\x00\xc0\x7f\x00", False, "not finite")])
+@pytest.mark.parametrize(
+    ("data", "binary", "text"),
+    [
+        (b"abc", False, "multiple of the 5 bytes"),
+        (b"abc", True, "multiple of the 2 bytes"),
+        (b"\x00\x00\x00\x00\x01", False, "ends early"),
+        (b"\xff\xff", True, "ends early"),
+        (b"\x00\x00\x00\x00\x00" * 2, False, "after the end"),
+        (b"\x03\x00" * 17, True, "deeper than 16"),
+        (b"\x00\x00\x00\x00\x00", False, "allowed are 16000000"),
+        (b"\x00\x00\xc0\x7f\x00", False, "not finite"),
+    ],
+)
 def test_broken_streams_are_refused(data: bytes, binary: bool, text: str) -> None:
     with pytest.raises(GeometryError, match=text):
         read_stream(data, 0.1, binary)
 
 
-@pytest.mark.parametrize(("content", "text"), [
-    (b"PNG", "begins with 'PNG'"), (b"# Octomap OcTree file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n", "ColorOcTree"),
-    (b"# Octomap OcTree file\nid OcTree\nsize 1\nres x\ndata\n", "numbers after"),
-    (b"# Octomap OcTree file\nid OcTree\nsize 1\nres -1\ndata\n", "0.001")])
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        (b"PNG", "begins with 'PNG'"),
+        (b"# Octomap OcTree file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n", "ColorOcTree"),
+        (b"# Octomap OcTree file\nid OcTree\nsize 1\nres x\ndata\n", "numbers after"),
+        (b"# Octomap OcTree file\nid OcTree\nsize 1\nres -1\ndata\n", "0.001"),
+    ],
+)
 def test_files_that_are_no_maps_are_refused(tmp_path: Path, content: bytes, text: str) -> None:
     path = tmp_path / "map.bt"
     path.write_bytes(content)
@@ -125,7 +143,8 @@ def test_a_ray_clears_what_it_goes_through_and_repeated_looks_win() -> None:
     assert value_at(voxels, wall[0]) < 0.0, "three looks through it against one that saw it"
     assert value_at(voxels.with_point_cloud(origin, NOTHING, behind, NOTHING), behind[0]) < 0.0, "robot: free at once"
     assert value_at(voxels.with_point_cloud(origin, NOTHING, NOTHING, 2 * behind), behind[0]) == pytest.approx(
-        value_at(voxels, behind[0]) - 0.405, abs=1e-3), "rays that end beyond the range clear"
+        value_at(voxels, behind[0]) - 0.405, abs=1e-3
+    ), "rays that end beyond the range clear"
 
 
 def test_points_beyond_the_tree_are_left_out_and_a_sensor_there_is_refused() -> None:
@@ -137,9 +156,17 @@ def test_points_beyond_the_tree_are_left_out_and_a_sensor_there_is_refused() -> 
         empty_map(0.0)
 
 
-@pytest.mark.parametrize("geometry", [
-    coal.Box(0.1, 0.2, 0.3), coal.Sphere(0.1), coal.Cylinder(0.1, 0.3), coal.Cone(0.1, 0.3),
-    coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0)], ids=["box", "sphere", "cylinder", "cone", "plane"])
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        coal.Box(0.1, 0.2, 0.3),
+        coal.Sphere(0.1),
+        coal.Cylinder(0.1, 0.3),
+        coal.Cone(0.1, 0.3),
+        coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0),
+    ],
+    ids=["box", "sphere", "cylinder", "cone", "plane"],
+)
 @pytest.mark.parametrize("margin", [0.0, 0.03])
 def test_the_octree_touches_what_one_of_its_cubes_touches(geometry: object, margin: float) -> None:
     rng = np.random.default_rng(3)

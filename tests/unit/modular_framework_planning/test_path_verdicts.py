@@ -3,6 +3,7 @@
 
 That the verdict on one sample is right is shown in test_collision_verdicts.
 """
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
@@ -28,13 +29,23 @@ FINE_STEP = 1.0e-6  # [rad or m]
 LONGEST_WAY = 60  # [STEP]
 THICK, LONG = 0.02, 0.4  # of a bar [m]
 BARS = (("continuous", "0 0 1"), ("revolute", "0 1 0"), ("revolute", "0 1 0"), ("prismatic", "1 0 0"))
-BARS_URDF = '<robot name="bars"><link name="link0"/>' + "".join(f"""
+BARS_URDF = (
+    '<robot name="bars"><link name="link0"/>'
+    + "".join(
+        f"""
 <link name="link{n}"><collision><origin xyz="{LONG / 2} 0 0"/><geometry><mesh filename="bar"/></geometry></collision>
 </link><joint name="joint{n}" type="{kind}"><parent link="link{n - 1}"/><child link="link{n}"/>
 <origin xyz="{LONG if n > 1 else 0} 0 0"/><axis xyz="{axis}"/>
-<limit lower="-7" upper="7" velocity="1" effort="1"/></joint>""" for n, (kind, axis) in enumerate(BARS, 1)) + "</robot>"
-BARS_SRDF = '<robot name="bars"><group name="arm"><chain base_link="link0" tip_link="link4"/></group>' + "".join(
-    f'<disable_collisions link1="link{n}" link2="link{n + 1}" reason="Adjacent"/>' for n in range(4)) + "</robot>"
+<limit lower="-7" upper="7" velocity="1" effort="1"/></joint>"""
+        for n, (kind, axis) in enumerate(BARS, 1)
+    )
+    + "</robot>"
+)
+BARS_SRDF = (
+    '<robot name="bars"><group name="arm"><chain base_link="link0" tip_link="link4"/></group>'
+    + "".join(f'<disable_collisions link1="link{n}" link2="link{n + 1}" reason="Adjacent"/>' for n in range(4))
+    + "</robot>"
+)
 
 
 class Neighbourhood:
@@ -53,8 +64,14 @@ class Neighbourhood:
 
     def free_steps(self, start: np.ndarray, way: np.ndarray) -> int:
         """How many times that way can be gone before something touches, at most LONGEST_WAY."""
-        return next((number - 1 for number in range(1, LONGEST_WAY + 1)
-                     if not self.ours.is_free(self.whole(start + number * way))), LONGEST_WAY)
+        return next(
+            (
+                number - 1
+                for number in range(1, LONGEST_WAY + 1)
+                if not self.ours.is_free(self.whole(start + number * way))
+            ),
+            LONGEST_WAY,
+        )
 
     def way_into_contact(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int]:
         """Free joint values, a way of about STEP, and how many of those are free before the first contact.
@@ -87,8 +104,9 @@ class Neighbourhood:
         apart, touching = float(free), free + 1.0
         while (touching - apart) * STEP > FINE_STEP:
             middle = 0.5 * (apart + touching)
-            apart, touching = (middle, touching) if self.ours.is_free(self.whole(start + middle * way)) \
-                else (apart, middle)
+            apart, touching = (
+                (middle, touching) if self.ours.is_free(self.whole(start + middle * way)) else (apart, middle)
+            )
         return np.array([self.whole(start + free * way), self.whole(start + apart * way)])
 
     def touching_samples(self, path: np.ndarray) -> int:
@@ -96,7 +114,7 @@ class Neighbourhood:
         samples = samples_of(path)
         touching = np.array([not self.ours.is_free(sample) for sample in samples])
         assert self.ours.path_is_free(path, STEP) == (not touching.any())
-        later = touching[len(samples_of(path[:2])):]
+        later = touching[len(samples_of(path[:2])) :]
         assert self.ours.path_is_free(path[1:], STEP, 1) == (not later.any())
         found = self.ours.colliding_state(path, STEP)
         assert (found is None) == (not touching.any())
@@ -141,11 +159,13 @@ def assert_many_graze(counts: list[int]) -> None:
 
 @pytest.mark.parametrize("undecided_rows", [exact_collision_checker.UNDECIDED_ROWS, 1])
 def test_no_touching_sample_of_an_arms_path_is_passed_over_and_no_free_path_is_refused(
-        robot: object, monkeypatch: pytest.MonkeyPatch, undecided_rows: int) -> None:
+    robot: object, monkeypatch: pytest.MonkeyPatch, undecided_rows: int
+) -> None:
     monkeypatch.setattr(exact_collision_checker, "UNDECIDED_ROWS", undecided_rows)
     rng = np.random.default_rng(31 + undecided_rows)
-    assert_many_graze([world.touching_samples(world.grazing_path(rng)) for world in arm_worlds(robot, rng)
-                       for _ in range(ARM_PATHS)])
+    assert_many_graze(
+        [world.touching_samples(world.grazing_path(rng)) for world in arm_worlds(robot, rng) for _ in range(ARM_PATHS)]
+    )
 
 
 def test_no_touching_sample_of_thin_bars_path_is_passed_over_and_no_free_path_is_refused(bars: Neighbourhood) -> None:
@@ -154,7 +174,8 @@ def test_no_touching_sample_of_thin_bars_path_is_passed_over_and_no_free_path_is
 
 
 def test_a_path_that_stays_close_to_contact_asks_the_exact_check_about_undecided_pairs_only(
-        bars: Neighbourhood, monkeypatch: pytest.MonkeyPatch) -> None:
+    bars: Neighbourhood, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng(44)
     paths = [bars.path_up_to_contact(rng) for _ in range(5)]
     asked: list[int] = []
@@ -183,7 +204,13 @@ def test_the_end_of_an_edge_is_looked_at_and_its_start_is_not(bars: Neighbourhoo
     for _ in range(20):
         start, way, number = bars.way_into_contact(rng)
         free, touching = bars.whole(start), bars.whole(start + (number + 1) * way)
-        for edge, first, is_free in (((free, touching), 1, False), ((touching, free), 1, True),
-                                     ((touching, free), 0, False), ((touching, touching), 1, False),
-                                     ((free, free), 1, True), ((touching,), 0, False), ((free,), 0, True)):
+        for edge, first, is_free in (
+            ((free, touching), 1, False),
+            ((touching, free), 1, True),
+            ((touching, free), 0, False),
+            ((touching, touching), 1, False),
+            ((free, free), 1, True),
+            ((touching,), 0, False),
+            ((free,), 0, True),
+        ):
             assert bars.ours.path_is_free(np.array(edge), STEP, first) is is_free

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """While the robot moves, a change of the scene matters only where the rest of the motion goes."""
+
 from __future__ import annotations
 
 import numpy as np

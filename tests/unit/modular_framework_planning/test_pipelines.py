@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pipelines: planners and adapters by name, settings, path constraints, mended starts, repeated plans."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -60,8 +61,9 @@ def goal(model: RobotModel, values: tuple[float, ...] = GOAL) -> tuple[JointGoal
 
 
 def wall_request(model: RobotModel, **changes: Any) -> PlanningRequest:
-    request = PlanningRequest(wall_scene(model), GROUP, goal(model), allowed_time_s=60.0, velocity_scaling=1.0,
-                              acceleration_scaling=1.0)
+    request = PlanningRequest(
+        wall_scene(model), GROUP, goal(model), allowed_time_s=60.0, velocity_scaling=1.0, acceleration_scaling=1.0
+    )
     return dataclasses.replace(request, **changes)
 
 
@@ -89,17 +91,20 @@ def arrives(answer: PlanningAnswer, values: tuple[float, ...] = GOAL) -> bool:
     return bool(np.allclose(answer.trajectory.positions[-1], values, atol=1e-9))
 
 
-@pytest.mark.parametrize("name", ["RRTConnect", "geometric::KPIECE", "LBKPIECEkConfigDefault", "PRM",
-                                  "arm_and_manipulator[BKPIECE]"])
-def test_planners_answer_to_the_names_moveit_gives_them(model: RobotModel, pipeline: PlanningPipeline,
-                                                        name: str) -> None:
+@pytest.mark.parametrize(
+    "name", ["RRTConnect", "geometric::KPIECE", "LBKPIECEkConfigDefault", "PRM", "arm_and_manipulator[BKPIECE]"]
+)
+def test_planners_answer_to_the_names_moveit_gives_them(
+    model: RobotModel, pipeline: PlanningPipeline, name: str
+) -> None:
     answer = pipeline.plan(wall_request(model, planner_id=name))
     assert arrives(answer) and answer.planner_id in name
 
 
 @pytest.mark.parametrize("name", ["BITstar", "RRTstar"])
 def test_planners_that_improve_their_path_stop_with_the_time_and_return_what_they_have(
-        model: RobotModel, pipeline: PlanningPipeline, name: str) -> None:
+    model: RobotModel, pipeline: PlanningPipeline, name: str
+) -> None:
     begun = time.monotonic()
     request = wall_request(model, planner_id=name, allowed_time_s=6.0)
     try:
@@ -111,7 +116,8 @@ def test_planners_that_improve_their_path_stop_with_the_time_and_return_what_the
 
 
 def test_a_planner_that_is_not_there_is_replaced_by_the_default_one(
-        model: RobotModel, pipeline: PlanningPipeline, caplog: pytest.LogCaptureFixture) -> None:
+    model: RobotModel, pipeline: PlanningPipeline, caplog: pytest.LogCaptureFixture
+) -> None:
     default = pipeline.plan(wall_request(model)).planner_id
     answer = pipeline.plan(wall_request(model, planner_id="BiTRRT"))
     assert arrives(answer) and answer.planner_id == default
@@ -178,18 +184,29 @@ def test_a_planner_of_ones_own_is_named_by_module_and_class(model: RobotModel, p
     assert "touches object 'wall'" in error.reason
 
 
-@pytest.mark.parametrize(("names", "part"), [
-    ("default_planner_request_adapters/AddEverything", "default_planner_request_adapters/FixWorkspaceBounds"),
-    ("no_module/Adapter", "module/Class"), ("json/JSONDecoder", "no method adapt_and_plan")])
+@pytest.mark.parametrize(
+    ("names", "part"),
+    [
+        ("default_planner_request_adapters/AddEverything", "default_planner_request_adapters/FixWorkspaceBounds"),
+        ("no_module/Adapter", "module/Class"),
+        ("json/JSONDecoder", "no method adapt_and_plan"),
+    ],
+)
 def test_an_unknown_adapter_is_refused_with_the_list(names: str, part: str) -> None:
     with pytest.raises(ModelError, match=part) as caught:
         make_adapters(names)
     assert names in caught.value.reason
 
 
-@pytest.mark.parametrize(("plugin", "part"), [
-    ("chomp_interface/CHOMPPlanner", "ompl_interface/OMPLPlanner"), ("Nothing", "module/Class"),
-    ("json/JSONDecoder", "no method plan"), ("this_module_is_missing/Planner", "this_module_is_missing")])
+@pytest.mark.parametrize(
+    ("plugin", "part"),
+    [
+        ("chomp_interface/CHOMPPlanner", "ompl_interface/OMPLPlanner"),
+        ("Nothing", "module/Class"),
+        ("json/JSONDecoder", "no method plan"),
+        ("this_module_is_missing/Planner", "this_module_is_missing"),
+    ],
+)
 def test_an_unknown_planner_plugin_is_refused_with_the_list(model: RobotModel, plugin: str, part: str) -> None:
     with pytest.raises(ModelError, match=part) as caught:
         make_planner(plugin, model, PipelineSettings())
@@ -202,7 +219,8 @@ def test_every_adapter_of_moveit_is_known() -> None:
 
 
 def test_a_start_beyond_a_bound_is_left_from_where_the_robot_is_or_refused(
-        model: RobotModel, pipeline: PlanningPipeline) -> None:
+    model: RobotModel, pipeline: PlanningPipeline
+) -> None:
     upper = float(model.upper[model.index["wrist_3_joint"]])
     far = empty_scene(model, place(model, (1.57, -1.57, 1.2, -1.2, -1.57, upper + 0.5)))
     error = failure(pipeline, PlanningRequest(far, GROUP, goal(model)))
@@ -218,15 +236,19 @@ def level(model: RobotModel, tolerance: float) -> KinematicConstraints:
     """The tip keeps the direction of its axis at the start."""
     frame = model.pin_model.frames[model.frame_ids[TIP]]
     target = model.link_transforms(place(model, START))[TIP].rotation
-    turn = OrientationConstraint(FrameOnRobot(TIP, frame.parentJoint, frame.placement),
-                                 FrameOnRobot("world", 0, pin.SE3.Identity()), target,
-                                 np.array([tolerance, tolerance, 7.0]))
+    turn = OrientationConstraint(
+        FrameOnRobot(TIP, frame.parentJoint, frame.placement),
+        FrameOnRobot("world", 0, pin.SE3.Identity()),
+        target,
+        np.array([tolerance, tolerance, 7.0]),
+    )
     return KinematicConstraints(model, (), (), (turn,))
 
 
 @pytest.mark.parametrize("tolerance", [0.8, 0.1, 0.02])
-def test_path_constraints_hold_along_the_whole_motion(model: RobotModel, pipeline: PlanningPipeline,
-                                                      tolerance: float) -> None:
+def test_path_constraints_hold_along_the_whole_motion(
+    model: RobotModel, pipeline: PlanningPipeline, tolerance: float
+) -> None:
     constraints = level(model, tolerance)
     answer = pipeline.plan(wall_request(model, path_constraints=constraints))
     motion = MotionChecker(ExactCollisionChecker(wall_scene(model)), model.group(GROUP).indices, answer.start)
@@ -259,8 +281,10 @@ def test_requests_reach_another_process_whole(model: RobotModel) -> None:
 
 
 def same(first: Trajectory, second: Trajectory) -> bool:
-    return all(np.array_equal(getattr(first, name), getattr(second, name))
-               for name in ("times", "positions", "velocities", "accelerations"))
+    return all(
+        np.array_equal(getattr(first, name), getattr(second, name))
+        for name in ("times", "positions", "velocities", "accelerations")
+    )
 
 
 @pytest.fixture(scope="module")
@@ -274,7 +298,8 @@ def seeded(model: RobotModel) -> Iterator[list[SeededPlanning]]:
 
 
 def test_a_seed_repeats_a_plan_bit_for_bit_in_two_runs_and_at_the_same_time(
-        model: RobotModel, pipeline: PlanningPipeline, seeded: list[SeededPlanning]) -> None:
+    model: RobotModel, pipeline: PlanningPipeline, seeded: list[SeededPlanning]
+) -> None:
     request = wall_request(model)
     answers = [seeded[0].plan(pipeline, request, 7), seeded[1].plan(pipeline, request, 7)]
     assert len(answers[0].path) > 2, "the problem needs a search"
@@ -292,10 +317,13 @@ def test_a_seed_repeats_a_plan_bit_for_bit_in_two_runs_and_at_the_same_time(
 
 
 def test_seeded_plans_fail_with_a_reason_and_can_be_cancelled(
-        model: RobotModel, pipeline: PlanningPipeline, seeded: list[SeededPlanning]) -> None:
-    cases = [(wall_request(model, planner_id="PRM"), 1, ErrorCode.PLANNING_FAILED, "threads"),
-             (wall_request(model, cancelled=lambda: True), 1, ErrorCode.PREEMPTED, "cancelled"),
-             (wall_request(model), -1, ErrorCode.FAILURE, "0 or more")]
+    model: RobotModel, pipeline: PlanningPipeline, seeded: list[SeededPlanning]
+) -> None:
+    cases = [
+        (wall_request(model, planner_id="PRM"), 1, ErrorCode.PLANNING_FAILED, "threads"),
+        (wall_request(model, cancelled=lambda: True), 1, ErrorCode.PREEMPTED, "cancelled"),
+        (wall_request(model), -1, ErrorCode.FAILURE, "0 or more"),
+    ]
     for request, seed, code, text in cases:
         with pytest.raises(PlanningError, match=text) as caught:
             seeded[0].plan(pipeline, request, seed)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plans are safe, timed within limits and honest about failure; verdicts equal those of an independent checker."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -117,7 +118,8 @@ def check_timing(model: RobotModel, answer: PlanningAnswer, factor: float) -> No
 
 
 def test_random_plans_are_free_at_a_hundredth_rad_timed_within_limits_and_end_at_the_goal(
-        model: RobotModel, pipeline: PlanningPipeline, checker: IndependentChecker) -> None:
+    model: RobotModel, pipeline: PlanningPipeline, checker: IndependentChecker
+) -> None:
     rng = np.random.default_rng(11)
     solved = 0
     for _ in range(PLANS // 10):
@@ -126,13 +128,15 @@ def test_random_plans_are_free_at_a_hundredth_rad_timed_within_limits_and_end_at
         start = free_positions(model, scene, rng)
         for _ in range(10):
             goal = free_positions(model, scene, rng)
-            request = PlanningRequest(scene.with_positions(start), GROUP, (goal_at(model, goal),), "", 1, 10.0, 0.5,
-                                      0.5)
+            request = PlanningRequest(
+                scene.with_positions(start), GROUP, (goal_at(model, goal),), "", 1, 10.0, 0.5, 0.5
+            )
             answer = pipeline.plan(request)
             check_timing(model, answer, 0.5)
             assert np.allclose(answer.trajectory.positions[-1], goal[model.group(GROUP).indices])
-            hits = checker.colliding_states(answer.trajectory.joint_names, answer.trajectory.positions,
-                                            named(model, answer.start))
+            hits = checker.colliding_states(
+                answer.trajectory.joint_names, answer.trajectory.positions, named(model, answer.start)
+            )
             assert hits == 0
             solved += 1
             start = goal
@@ -140,8 +144,10 @@ def test_random_plans_are_free_at_a_hundredth_rad_timed_within_limits_and_end_at
 
 
 def table_scene(model: RobotModel) -> PlanningScene:
-    positions = model.merge(model.default_positions(), dict(zip(
-        model.group(GROUP).joints, (1.57, -1.57, 1.2, -1.2, -1.57, 0.0), strict=True)))
+    positions = model.merge(
+        model.default_positions(),
+        dict(zip(model.group(GROUP).joints, (1.57, -1.57, 1.2, -1.2, -1.57, 0.0), strict=True)),
+    )
     scene = empty_scene(model, positions)
     return scene.with_object(CollisionObject("table", at(0, 0.56, 0.82), ((Box(1.2, 0.8, 0.04), at(0, 0, 0)),)))
 
@@ -162,7 +168,8 @@ def test_scaling_makes_the_motion_slower_in_proportion(model: RobotModel, pipeli
     full = pipeline.plan(request).trajectory.duration_s
     half = pipeline.plan(dataclasses.replace(request, velocity_scaling=0.5, acceleration_scaling=0.25))
     assert half.trajectory.duration_s - WINDOW_S == pytest.approx(2.0 * (full - WINDOW_S), rel=0.005), (
-        "but for the time over which the acceleration is averaged")
+        "but for the time over which the acceleration is averaged"
+    )
 
 
 def test_the_same_seed_gives_the_same_direct_motion(model: RobotModel, pipeline: PlanningPipeline) -> None:
@@ -194,8 +201,11 @@ def test_failures_have_a_code_and_name_the_culprit(model: RobotModel, pipeline: 
         (PlanningRequest(scene, GROUP, (JointGoal({"elbow_joint": 99.0}),)), ErrorCode.GOAL_STATE_INVALID, "elbow"),
         (PlanningRequest(scene, GROUP, (JointGoal({"no_joint": 1.0}),)), bad, "no_joint"),
         (PlanningRequest(scene, GROUP, (down(0.1, 0.5, 1),), velocity_scaling=np.nan), invalid, "nan"),
-        (PlanningRequest(scene.with_positions(scene.positions * np.nan), GROUP, (down(0, 0.5, 1),)),
-         ErrorCode.INVALID_ROBOT_STATE, "not finite"),
+        (
+            PlanningRequest(scene.with_positions(scene.positions * np.nan), GROUP, (down(0, 0.5, 1),)),
+            ErrorCode.INVALID_ROBOT_STATE,
+            "not finite",
+        ),
     ]
     for request, code, text in cases:
         error = failure(pipeline, request)
@@ -222,8 +232,9 @@ def test_time_that_runs_out_is_told(model: RobotModel, pipeline: PlanningPipelin
 def holding(model: RobotModel, sunk_m: float) -> PlanningScene:
     """The gripper holds a block whose lower side is `sunk_m` below the table's surface."""
     scene = table_scene(model)
-    found = KinematicsPool(model).solver(GROUP).solutions("eg_manipulator", down(0.1, 0.5, 0.90).target,
-                                                          scene.positions)
+    found = (
+        KinematicsPool(model).solver(GROUP).solutions("eg_manipulator", down(0.1, 0.5, 0.90).target, scene.positions)
+    )
     scene = scene.with_positions(found[0])
     palm = model.link_transforms(scene.positions)[PALM]
     pose = palm.actInv(at(0.1, 0.5, 0.84 - sunk_m + 0.04))
@@ -234,14 +245,16 @@ def holding(model: RobotModel, sunk_m: float) -> PlanningScene:
 
 def test_a_held_block_may_leave_the_table_it_stands_on(model: RobotModel, pipeline: PlanningPipeline) -> None:
     answer = pipeline.plan(PlanningRequest(holding(model, 0.002), GROUP, (down(0.1, 0.5, 1.1),)))
-    heights = [model.link_transforms(model.merge(answer.start, dict(zip(answer.trajectory.joint_names, row,
-                                                                        strict=True))))["eg_manipulator"].translation[2]
-               for row in answer.trajectory.positions[::5]]
+    heights = [
+        model.link_transforms(model.merge(answer.start, dict(zip(answer.trajectory.joint_names, row, strict=True))))[
+            "eg_manipulator"
+        ].translation[2]
+        for row in answer.trajectory.positions[::5]
+    ]
     assert min(heights) > 0.90 - 1e-3, "the block never goes deeper into the table than it was"
 
 
-def test_a_held_block_deep_in_the_table_is_a_start_in_collision(
-        model: RobotModel, pipeline: PlanningPipeline) -> None:
+def test_a_held_block_deep_in_the_table_is_a_start_in_collision(model: RobotModel, pipeline: PlanningPipeline) -> None:
     error = failure(pipeline, PlanningRequest(holding(model, 0.03), GROUP, (down(0.1, 0.5, 1.1),)))
     assert error.code == ErrorCode.START_STATE_IN_COLLISION
     assert "'block'" in error.reason and "'table'" in error.reason

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The scene: snapshots never change, attaching and detaching keep the place, bad geometry is refused."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -94,11 +95,19 @@ def test_a_state_that_touches_an_object_says_which_link_touches_what_and_how_dee
     assert ExactCollisionChecker(allowed).is_free(scene.positions)
 
 
-@pytest.mark.parametrize("shape", [
-    Sphere(0.06), Cylinder(0.1, 0.05), Plane(0, 0, 1, 0),
-    Mesh(np.array([[0, 0, -0.1], [0.1, 0, 0.1], [-0.1, 0.1, 0.1], [-0.1, -0.1, 0.1]], float),
-         np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])),
-], ids=["sphere", "cylinder", "plane", "mesh"])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Sphere(0.06),
+        Cylinder(0.1, 0.05),
+        Plane(0, 0, 1, 0),
+        Mesh(
+            np.array([[0, 0, -0.1], [0.1, 0, 0.1], [-0.1, 0.1, 0.1], [-0.1, -0.1, 0.1]], float),
+            np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]]),
+        ),
+    ],
+    ids=["sphere", "cylinder", "plane", "mesh"],
+)
 def test_every_kind_of_shape_is_hit_and_missed(model: RobotModel, shape: object) -> None:
     scene = upright(model)
     tip = model.link_transforms(scene.positions)["wrist_2_link"].translation
@@ -143,7 +152,8 @@ def test_a_link_without_default_collisions_touches_nothing_but_what_is_enabled()
     assert touching(off) == {frozenset({"held", "crate"})}
     assert touching(off + enabled) == {base, frozenset({"held", "crate"})}
     assert touching(off + '<disable_collisions link1="upper_coarse" link2="base"/>' + enabled) == {
-        frozenset({"held", "crate"})}, "a disabled pair goes before an enabled one, wherever they stand"
+        frozenset({"held", "crate"})
+    }, "a disabled pair goes before an enabled one, wherever they stand"
 
 
 def test_a_matrix_that_is_not_square_is_refused() -> None:
@@ -151,16 +161,21 @@ def test_a_matrix_that_is_not_square_is_refused() -> None:
         matrix_from_rows(["a", "b"], [[True]], {})
 
 
-@pytest.mark.parametrize(("build", "text"), [
-    (lambda: Box(0.1, -1.0, 0.1), "y is -1.0"), (lambda: Sphere(float("nan")), "radius is nan"),
-    (lambda: Cylinder(0.0, 0.1), "height is 0.0"), (lambda: Plane(0, 0, 0, 1), "no normal"),
-    (lambda: Mesh(np.zeros((3, 3)), np.array([[0, 1, 7]])), "names vertex 7"),
-    (lambda: Mesh(np.zeros((0, 3)), np.zeros((0, 3))), "0 vertices"),
-    (lambda: Box(1.0, 1.0e30, 1.0), r"y is 1e\+30 m; .* up to 10000 m"),
-    (lambda: Mesh(np.eye(3) * 1.0e30, np.array([[0, 1, 2]])), "beyond all reach; .* 10000 m"),
-    (lambda: make_transform((0, 0, 0), (0, 0, 0, 0)), "length 0"),
-    (lambda: make_transform((0, float("nan"), 0), (0, 0, 0, 1)), "not finite"),
-])
+@pytest.mark.parametrize(
+    ("build", "text"),
+    [
+        (lambda: Box(0.1, -1.0, 0.1), "y is -1.0"),
+        (lambda: Sphere(float("nan")), "radius is nan"),
+        (lambda: Cylinder(0.0, 0.1), "height is 0.0"),
+        (lambda: Plane(0, 0, 0, 1), "no normal"),
+        (lambda: Mesh(np.zeros((3, 3)), np.array([[0, 1, 7]])), "names vertex 7"),
+        (lambda: Mesh(np.zeros((0, 3)), np.zeros((0, 3))), "0 vertices"),
+        (lambda: Box(1.0, 1.0e30, 1.0), r"y is 1e\+30 m; .* up to 10000 m"),
+        (lambda: Mesh(np.eye(3) * 1.0e30, np.array([[0, 1, 2]])), "beyond all reach; .* 10000 m"),
+        (lambda: make_transform((0, 0, 0), (0, 0, 0, 0)), "length 0"),
+        (lambda: make_transform((0, float("nan"), 0), (0, 0, 0, 1)), "not finite"),
+    ],
+)
 def test_bad_geometry_is_refused_with_what_was_got(build: object, text: str) -> None:
     with pytest.raises(GeometryError, match=text):
         build()
@@ -179,8 +194,10 @@ def test_objects_without_shape_or_name_or_with_a_links_name_are_refused(model: R
 
 def test_objects_of_a_problem_file_are_in_the_frame_it_names(model: RobotModel, tmp_path: Path) -> None:
     file = tmp_path / "scene0001.yaml"
-    text = ("world: {collision_objects: [{id: crate, header: {frame_id: FRAME}, primitives: [{type: box, dimensions: "
-            "[0.1, 0.1, 0.1]}], pose: {position: [0.1, 0.2, 0.3], orientation: [0, 0, 0, 1]}}]}\n")
+    text = (
+        "world: {collision_objects: [{id: crate, header: {frame_id: FRAME}, primitives: [{type: box, dimensions: "
+        "[0.1, 0.1, 0.1]}], pose: {position: [0.1, 0.2, 0.3], orientation: [0, 0, 0, 1]}}]}\n"
+    )
     for frame in ("", "tool0"):
         file.write_text(text.replace("FRAME", f"'{frame}'"))
         scene = read_scene(model, file)

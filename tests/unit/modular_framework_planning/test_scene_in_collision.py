@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the scene keeps beyond objects counts in collision checks: padding, scale, held margins and the octomap."""
+
 from __future__ import annotations
 
 import coal
@@ -34,8 +35,10 @@ def scene(model: RobotModel) -> PlanningScene:
 
 def top_of(scene: PlanningScene) -> float:
     """Height of the robot's highest point [m]."""
-    return max(_top(item.geometry, pose) for (_, pose), item in
-               zip(bodies_in_scene(scene, scene.positions), scene.model.link_geometries, strict=True))
+    return max(
+        _top(item.geometry, pose)
+        for (_, pose), item in zip(bodies_in_scene(scene, scene.positions), scene.model.link_geometries, strict=True)
+    )
 
 
 def _top(geometry: object, pose: pin.SE3) -> float:
@@ -51,8 +54,11 @@ def _top(geometry: object, pose: pin.SE3) -> float:
 
 def ceiling(scene: PlanningScene, gap: float = GAP) -> CollisionObject:
     """A ceiling with a gap [m] above the robot."""
-    return CollisionObject("ceiling", pin.SE3(np.eye(3), np.array([0.0, 0.0, top_of(scene) + gap + 0.5])),
-                           ((Box(5.0, 5.0, 1.0), pin.SE3.Identity()),))
+    return CollisionObject(
+        "ceiling",
+        pin.SE3(np.eye(3), np.array([0.0, 0.0, top_of(scene) + gap + 0.5])),
+        ((Box(5.0, 5.0, 1.0), pin.SE3.Identity()),),
+    )
 
 
 def is_free(scene: PlanningScene) -> bool:
@@ -83,8 +89,9 @@ def test_a_held_object_keeps_its_own_margin(scene: PlanningScene) -> None:
     ball_at = np.array([hand.translation[0], hand.translation[1], top_of(scene) + 0.2])
     ball = CollisionObject("ball", hand.actInv(pin.SE3(np.eye(3), ball_at)), ((Sphere(0.05), pin.SE3.Identity()),))
     holding = scene.with_attached(AttachedObject(ball, HAND, frozenset({HAND})))
-    roof = CollisionObject("roof", pin.SE3(np.eye(3), ball_at + [0.0, 0.0, 0.05 + GAP + 0.5]),
-                           ((Box(5.0, 5.0, 1.0), pin.SE3.Identity()),))
+    roof = CollisionObject(
+        "roof", pin.SE3(np.eye(3), ball_at + [0.0, 0.0, 0.05 + GAP + 0.5]), ((Box(5.0, 5.0, 1.0), pin.SE3.Identity()),)
+    )
     holding = holding.with_object(roof)
     for margin, free in ((GAP - 0.001, True), (GAP + 0.001, False)):
         assert is_free(holding.with_padding(Padding(attached=margin))) is free
@@ -96,8 +103,11 @@ def test_voxels_are_obstacles_that_an_entry_for_the_octomap_allows(scene: Planni
     seen = empty_map(0.05).with_point_cloud(np.zeros(3) + 3.0, points, NOTHING, NOTHING)
     blocked = scene.with_octomap(Octree(seen))
     assert not is_free(blocked)
-    names = {name for item in ExactCollisionChecker(blocked).contacts(blocked.positions)
-             for name in (item.first.name, item.second.name)}
+    names = {
+        name
+        for item in ExactCollisionChecker(blocked).contacts(blocked.positions)
+        for name in (item.first.name, item.second.name)
+    }
     assert "<octomap>" in names
     acm = blocked.acm
     assert is_free(blocked.with_acm(AllowedCollisionMatrix(acm.entries, {"<octomap>": True}, acm.names)))
@@ -113,10 +123,16 @@ BOX_LINK_SRDF = '<robot name="box"><group name="arm"><joint name="turn"/></group
 CUBE = trimesh.creation.box((0.05, 0.05, 0.05))
 
 
-@pytest.mark.parametrize("thing", [
-    Box(0.05, 0.05, 0.05), Sphere(0.03), Mesh(np.asarray(CUBE.vertices), np.asarray(CUBE.faces, dtype=np.int64)),
-    Octree(empty_map(0.05).with_point_cloud(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING))],
-    ids=lambda item: type(item).__name__)
+@pytest.mark.parametrize(
+    "thing",
+    [
+        Box(0.05, 0.05, 0.05),
+        Sphere(0.03),
+        Mesh(np.asarray(CUBE.vertices), np.asarray(CUBE.faces, dtype=np.int64)),
+        Octree(empty_map(0.05).with_point_cloud(np.full(3, 3.0), np.zeros((1, 3)), NOTHING, NOTHING)),
+    ],
+    ids=lambda item: type(item).__name__,
+)
 def test_a_thing_wholly_inside_a_link_that_is_a_box_collides(thing: Shape) -> None:
     scene = empty_scene(RobotModel(BOX_LINK_URDF, BOX_LINK_SRDF, {}, lambda name: name))
     for place, free in ((0.0, False), (0.5, True)):

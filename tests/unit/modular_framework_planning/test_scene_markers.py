@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What RViz shows of the planning scene: objects in their own colours and opaque, the robot's ghost transparent."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -17,8 +18,9 @@ RED = (0.75, 0.12, 0.12, 1.0)
 
 
 def box(name: str) -> CollisionObject:
-    return CollisionObject(name, pin.SE3(np.eye(3), np.array([0.5, 0.0, 1.0])),
-                           ((Box(0.1, 0.1, 0.1), pin.SE3.Identity()),))
+    return CollisionObject(
+        name, pin.SE3(np.eye(3), np.array([0.5, 0.0, 1.0])), ((Box(0.1, 0.1, 0.1), pin.SE3.Identity()),)
+    )
 
 
 @pytest.fixture
@@ -30,8 +32,7 @@ def published(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return messages
 
 
-def test_objects_have_their_own_colours_and_are_opaque_without_one_too(model: RobotModel,
-                                                                       published: list[Any]) -> None:
+def test_objects_have_their_own_colours_and_are_opaque_without_one_too(model: RobotModel, published: list[Any]) -> None:
     scene = empty_scene(model, model.default_positions()).with_object(box("can")).with_object(box("crate"))
     held = AttachedObject(box("held"), "ezgripper_palm_link", frozenset())
     scene = scene.with_attached(held).with_colors({"can": RED, "held": RED})

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scene messages: objects, attaching, the matrix, padding and octomaps on the wire, and diffs a client can follow."""
+
 from __future__ import annotations
 
 import random
@@ -41,8 +42,12 @@ from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 
 PALM, WRIST = "ezgripper_palm_link", "wrist_3_link"
-OPERATIONS = {"add": CollisionObject.ADD, "append": CollisionObject.APPEND, "move": CollisionObject.MOVE,
-              "remove": CollisionObject.REMOVE}
+OPERATIONS = {
+    "add": CollisionObject.ADD,
+    "append": CollisionObject.APPEND,
+    "move": CollisionObject.MOVE,
+    "remove": CollisionObject.REMOVE,
+}
 
 
 def pose(x: float = 0.0, y: float = 0.0, z: float = 0.0, turn: float = 0.0) -> Pose:
@@ -60,10 +65,12 @@ def body(name: str, operation: str = "add", at: Pose | None = None, boxes: int =
 def everything(name: str) -> CollisionObject:
     """An object of every kind of shape, with a subframe."""
     message = CollisionObject(id=name, operation=CollisionObject.ADD, pose=pose(1.0, 0.0, 0.5, 1.0))
-    message.primitives = [SolidPrimitive(SolidPrimitive.BOX, [0.1, 0.2, 0.3]),
-                          SolidPrimitive(SolidPrimitive.SPHERE, [0.1]),
-                          SolidPrimitive(SolidPrimitive.CYLINDER, [0.4, 0.1]),
-                          SolidPrimitive(SolidPrimitive.CONE, [0.5, 0.2])]
+    message.primitives = [
+        SolidPrimitive(SolidPrimitive.BOX, [0.1, 0.2, 0.3]),
+        SolidPrimitive(SolidPrimitive.SPHERE, [0.1]),
+        SolidPrimitive(SolidPrimitive.CYLINDER, [0.4, 0.1]),
+        SolidPrimitive(SolidPrimitive.CONE, [0.5, 0.2]),
+    ]
     message.primitive_poses = [pose(0.1 * number) for number in range(4)]
     message.meshes = [Mesh([MeshTriangle([0, 1, 2])], [Point(0, 0, 0), Point(0.1, 0, 0), Point(0, 0.1, 0)])]
     message.mesh_poses = [pose(0, 0.5)]
@@ -83,7 +90,7 @@ def translation(scene: Scene, frame: str) -> np.ndarray:
 
 def test_every_kind_of_shape_comes_back_as_it_was_sent(scene: Scene) -> None:
     sent = everything("all")
-    got, = scene_message(apply_collision_object(scene, sent), 0).world.collision_objects
+    (got,) = scene_message(apply_collision_object(scene, sent), 0).world.collision_objects
     assert [tuple(item.dimensions) for item in got.primitives] == [tuple(item.dimensions) for item in sent.primitives]
     assert got.meshes == sent.meshes and list(got.planes[0].coef) == [0.0, 0.0, 1.0, 3.0]
     assert got.subframe_names == ["handle"] and got.pose.position == sent.pose.position
@@ -127,8 +134,11 @@ def test_subframes_are_frames_for_objects_attached_ones_and_slashes_in_names(sce
     held.object.header.frame_id = PALM
     attached = apply_attached_object(scene, held)
     palm = attached.model.link_transforms(attached.positions)[PALM]
-    expected = palm * pin.SE3(pin.utils.rotate("z", 1.0), np.array([1.0, 0.0, 0.5])) * pin.SE3(
-        np.eye(3), np.array([0, 0, 0.2]))
+    expected = (
+        palm
+        * pin.SE3(pin.utils.rotate("z", 1.0), np.array([1.0, 0.0, 0.5]))
+        * pin.SE3(np.eye(3), np.array([0, 0, 0.2]))
+    )
     assert np.allclose(attached.frame_transform(handle).homogeneous, expected.homogeneous)
     with pytest.raises(PlanningError, match="shelf/upper/handle"):
         scene.frame_transform("shelf/upper/door")
@@ -168,8 +178,9 @@ def test_detaching_asks_for_the_right_link_and_without_a_name_takes_all_of_a_lin
 def test_a_matrix_that_was_read_and_sent_back_means_the_same(scene: Scene) -> None:
     message = PlanningScene().allowed_collision_matrix
     message.entry_names = ["a", "b", "c"]
-    message.entry_values = [AllowedCollisionEntry(row) for row in
-                            ([False, True, False], [True, False, False], [False, False, False])]
+    message.entry_values = [
+        AllowedCollisionEntry(row) for row in ([False, True, False], [True, False, False], [False, False, False])
+    ]
     message.default_entry_names, message.default_entry_values = ["a", "<octomap>"], [True, True]
     matrix = with_matrix_of(scene, message).acm
     assert matrix.allows("a", "b") and not matrix.allows("a", "c"), "an entry goes before a default"
@@ -276,8 +287,9 @@ def test_an_octomap_comes_and_goes_in_both_encodings(scene: Scene) -> None:
     sent = scene_message(mapped, PlanningSceneComponents.OCTOMAP)
     assert not sent.world.collision_objects and not sent.world.octomap.octomap.binary
     sent.is_diff = True
-    assert np.array_equal(apply_scene(scene, sent).obstacles()[-1].shapes[0][0].voxels.keys,
-                          octree.shapes[0][0].voxels.keys)
+    assert np.array_equal(
+        apply_scene(scene, sent).obstacles()[-1].shapes[0][0].voxels.keys, octree.shapes[0][0].voxels.keys
+    )
     assert apply_scene(mapped, PlanningScene(is_diff=True)).octomap is octree, "no octomap in a diff: no change"
     assert apply_scene(mapped, PlanningScene(is_diff=False)).octomap is None
     gone = PlanningScene(is_diff=True)
@@ -306,7 +318,8 @@ def test_each_component_is_answered_alone(scene: Scene) -> None:
         parts.TRANSFORMS: lambda m: {item.child_frame_id for item in m.fixed_frame_transforms} == {"world", "camera"},
         parts.ALLOWED_COLLISION_MATRIX: lambda m: m.allowed_collision_matrix.entry_names,
         parts.LINK_PADDING_AND_SCALING: lambda m: m.link_padding and m.link_scale,
-        parts.OBJECT_COLORS: lambda m: m.object_colors[0].color.r == 1.0 if m.object_colors else False}
+        parts.OBJECT_COLORS: lambda m: m.object_colors[0].color.r == 1.0 if m.object_colors else False,
+    }
     for part in filled:
         message = scene_message(scene, part)
         for other, is_filled in filled.items():
@@ -319,22 +332,36 @@ def test_each_component_is_answered_alone(scene: Scene) -> None:
 
 def summary(scene: Scene) -> dict[str, object]:
     """What two scenes must have in common to be the same."""
-    def of(thing: object) -> tuple[object, ...]:
-        return (np.round(thing.pose.homogeneous, 6).tolist(),
-                [(type(shape).__name__, np.round(place.homogeneous, 6).tolist()) for shape, place in thing.shapes],
-                {name: np.round(place.homogeneous, 6).tolist() for name, place in thing.subframes.items()})
 
-    octomap = None if scene.octomap is None or not len(scene.octomap.shapes[0][0].centers) else (
-        scene.octomap.shapes[0][0].voxels.keys.tolist(), np.round(scene.octomap.pose.homogeneous, 6).tolist())
+    def of(thing: object) -> tuple[object, ...]:
+        return (
+            np.round(thing.pose.homogeneous, 6).tolist(),
+            [(type(shape).__name__, np.round(place.homogeneous, 6).tolist()) for shape, place in thing.shapes],
+            {name: np.round(place.homogeneous, 6).tolist() for name, place in thing.subframes.items()},
+        )
+
+    octomap = (
+        None
+        if scene.octomap is None or not len(scene.octomap.shapes[0][0].centers)
+        else (scene.octomap.shapes[0][0].voxels.keys.tolist(), np.round(scene.octomap.pose.homogeneous, 6).tolist())
+    )
     names = scene.acm.names
     links = scene.model.frame_ids
-    return {"objects": {name: of(item) for name, item in scene.objects.items()},
-            "attached": {name: (of(item.body), item.link, item.touch_links) for name, item in scene.attached.items()},
-            "positions": np.round(scene.positions, 3).tolist(), "name": scene.name, "colors": scene.colors,
-            "matrix": (set(names), [scene.acm.allows(a, b) for a in sorted(names) for b in sorted(names)],
-                       scene.acm.defaults), "octomap": octomap,
-            "frames": {name: np.round(place.homogeneous, 6).tolist() for name, place in scene.fixed_frames.items()},
-            "padding": [(scene.padding.links.get(n, 0.0), scene.padding.scales.get(n, 1.0)) for n in links]}
+    return {
+        "objects": {name: of(item) for name, item in scene.objects.items()},
+        "attached": {name: (of(item.body), item.link, item.touch_links) for name, item in scene.attached.items()},
+        "positions": np.round(scene.positions, 3).tolist(),
+        "name": scene.name,
+        "colors": scene.colors,
+        "matrix": (
+            set(names),
+            [scene.acm.allows(a, b) for a in sorted(names) for b in sorted(names)],
+            scene.acm.defaults,
+        ),
+        "octomap": octomap,
+        "frames": {name: np.round(place.homogeneous, 6).tolist() for name, place in scene.fixed_frames.items()},
+        "padding": [(scene.padding.links.get(n, 0.0), scene.padding.scales.get(n, 1.0)) for n in links],
+    }
 
 
 def random_change(scene: Scene, dice: random.Random) -> Scene:
@@ -361,12 +388,17 @@ def random_change(scene: Scene, dice: random.Random) -> Scene:
         lambda: apply_collision_object(scene, body(name, "append", at, 1)),
         lambda: apply_collision_object(scene, CollisionObject(id=name, operation=CollisionObject.MOVE, pose=at)),
         lambda: apply_collision_object(scene, CollisionObject(id=name, operation=CollisionObject.REMOVE)),
-        lambda: apply_collision_object(scene, everything(name)), lambda: apply_attached_object(scene, attach),
-        lambda: apply_attached_object(scene, attach), lambda: apply_attached_object(scene, release),
-        lambda: scene.with_acm(matrix), lambda: scene.with_positions(pan), lambda: apply_scene(scene, diff),
+        lambda: apply_collision_object(scene, everything(name)),
+        lambda: apply_attached_object(scene, attach),
+        lambda: apply_attached_object(scene, attach),
+        lambda: apply_attached_object(scene, release),
+        lambda: scene.with_acm(matrix),
+        lambda: scene.with_positions(pan),
+        lambda: apply_scene(scene, diff),
         lambda: apply_scene(scene, PlanningScene(is_diff=True, object_colors=[color], fixed_frame_transforms=[frame])),
         lambda: scene.with_octomap(Octree(voxels(dice.randint(0, 9))) if dice.random() < 0.6 else None),
-        lambda: apply_scene(scene, whole) if dice.random() < 0.3 else scene]
+        lambda: apply_scene(scene, whole) if dice.random() < 0.3 else scene,
+    ]
     try:
         return dice.choice(choices)()
     except PlanningError:  # nothing to move, to attach or to detach

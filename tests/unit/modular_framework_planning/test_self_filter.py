@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Depth images and clouds become points in the right places, and robot and known objects are told from the rest."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -36,9 +37,25 @@ from modular_framework_planning.planning_scene.planning_scene import CollisionOb
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 CAMERA = Pinhole(100.0, 100.0, 31.5, 23.5)
-CUBE = Mesh(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.1,
-            np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
-                      [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]))
+CUBE = Mesh(
+    np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.1,
+    np.array(
+        [
+            [0, 1, 3],
+            [0, 3, 2],
+            [4, 6, 7],
+            [4, 7, 5],
+            [0, 4, 5],
+            [0, 5, 1],
+            [2, 3, 7],
+            [2, 7, 6],
+            [0, 2, 6],
+            [0, 6, 4],
+            [1, 5, 7],
+            [1, 7, 3],
+        ]
+    ),
+)
 
 
 def test_a_box_in_front_of_a_camera_is_where_the_pixels_say() -> None:
@@ -58,11 +75,13 @@ def test_millimetres_and_metres_and_padded_rows_are_read(big_endian: bool) -> No
     order = ">" if big_endian else "<"
     millimetres = np.zeros((2, 4), order + "u2")
     millimetres[:, :3] = [[1000, 0, 2500], [1, 2, 3]]
-    assert np.allclose(depth_array(millimetres.tobytes(), "16UC1", (2, 3), 8, big_endian),
-                       [[1.0, 0.0, 2.5], [0.001, 0.002, 0.003]])
+    assert np.allclose(
+        depth_array(millimetres.tobytes(), "16UC1", (2, 3), 8, big_endian), [[1.0, 0.0, 2.5], [0.001, 0.002, 0.003]]
+    )
     metres = np.array([[0.5, np.nan]], order + "f4")
-    assert np.array_equal(depth_array(metres.tobytes(), "32FC1", (1, 2), 8, big_endian), [[0.5, np.nan]],
-                          equal_nan=True)
+    assert np.array_equal(
+        depth_array(metres.tobytes(), "32FC1", (1, 2), 8, big_endian), [[0.5, np.nan]], equal_nan=True
+    )
     with pytest.raises(GeometryError, match="rgb8"):
         depth_array(b"", "rgb8", (1, 1), 3, False)
     with pytest.raises(GeometryError, match="need 8"):
@@ -76,10 +95,18 @@ def cloud_message(points: np.ndarray, **changes: object) -> SimpleNamespace:
     rows = np.zeros(points.shape[:2], item)
     for number, name in enumerate("xyz"):
         rows[name] = points[..., number]
-    fields = [SimpleNamespace(name=name, offset=item.fields[name][1], datatype=8 if name == "y" else 7)
-              for name in item.names]
-    values = {"height": points.shape[0], "width": points.shape[1], "fields": fields, "is_bigendian": False,
-              "point_step": item.itemsize, "row_step": item.itemsize * points.shape[1], "data": rows.tobytes()}
+    fields = [
+        SimpleNamespace(name=name, offset=item.fields[name][1], datatype=8 if name == "y" else 7) for name in item.names
+    ]
+    values = {
+        "height": points.shape[0],
+        "width": points.shape[1],
+        "fields": fields,
+        "is_bigendian": False,
+        "point_step": item.itemsize,
+        "row_step": item.itemsize * points.shape[1],
+        "data": rows.tobytes(),
+    }
     return SimpleNamespace(**{**values, **changes})
 
 
@@ -98,8 +125,11 @@ def test_clouds_are_read_field_by_field_and_thinned_out() -> None:
     assert cloud_array(cloud_message(np.empty((0, 0, 3)))).shape == (0, 0, 3)
 
 
-@pytest.mark.parametrize("shape", [Box(0.2, 0.3, 0.4), Sphere(0.15), Cylinder(0.4, 0.1), Cone(0.4, 0.1), CUBE],
-                         ids=lambda shape: type(shape).__name__)
+@pytest.mark.parametrize(
+    "shape",
+    [Box(0.2, 0.3, 0.4), Sphere(0.15), Cylinder(0.4, 0.1), Cone(0.4, 0.1), CUBE],
+    ids=lambda shape: type(shape).__name__,
+)
 @pytest.mark.parametrize("padding", [0.0, 0.05])
 def test_a_region_holds_all_of_the_padded_shape_and_little_more(shape: object, padding: float) -> None:
     rng = np.random.default_rng(1)
@@ -108,8 +138,14 @@ def test_a_region_holds_all_of_the_padded_shape_and_little_more(shape: object, p
     points = pose.translation + rng.uniform(-0.4, 0.4, (1500, 3))
     solid = coal.Box(0.2, 0.2, 0.2) if shape is CUBE else shape.geometry
     place, point = coal.Transform3s(pose.rotation, pose.translation), coal.Sphere(1.0e-6)
-    distances = np.array([coal.distance(solid, place, point, coal.Transform3s(np.eye(3), at), coal.DistanceRequest(),
-                                        coal.DistanceResult()) for at in points])
+    distances = np.array(
+        [
+            coal.distance(
+                solid, place, point, coal.Transform3s(np.eye(3), at), coal.DistanceRequest(), coal.DistanceResult()
+            )
+            for at in points
+        ]
+    )
     hidden = mask.hides(points, np.zeros(3))
     assert hidden[distances <= padding - 1e-4].all()
     assert not hidden[distances > 1.8 * padding + 0.02].any()
@@ -134,8 +170,11 @@ def test_depth_noise_grows_with_the_square_of_the_distance() -> None:
 def test_links_and_objects_are_masked_and_planes_are_not(model: RobotModel) -> None:
     scene = empty_scene(model)
     turned = model.merge(scene.positions, {"shoulder_pan_joint": 1.0})
-    wall = CollisionObject("wall", pin.SE3(np.eye(3), np.array([3.0, 0, 0])),
-                           ((Box(0.1, 1, 1), pin.SE3.Identity()), (Plane(0, 0, 1, 0), pin.SE3.Identity())))
+    wall = CollisionObject(
+        "wall",
+        pin.SE3(np.eye(3), np.array([3.0, 0, 0])),
+        ((Box(0.1, 1, 1), pin.SE3.Identity()), (Plane(0, 0, 1, 0), pin.SE3.Identity())),
+    )
     bodies = bodies_in_scene(scene.with_object(wall), turned)
     assert len(bodies) == len(model.link_geometries) + 1
     mask = self_filter_of(RegionCache(), bodies, 1.0, 0.0)
@@ -148,22 +187,51 @@ def test_links_and_objects_are_masked_and_planes_are_not(model: RobotModel) -> N
 
 
 def test_sensors_are_read_as_moveit_writes_them_and_faults_are_named() -> None:
-    cloud = {"sensor_plugin": "occupancy_map_monitor/PointCloudOctomapUpdater", "point_cloud_topic": "/points",
-             "padding_offset": 0.1, "point_subsample": 2, "filtered_cloud_topic": "left", "ns": "kinect"}
-    image = {"sensor_plugin": "occupancy_map_monitor/DepthImageOctomapUpdater", "image_topic": "/depth",
-             "shadow_threshold": 0.2, "padding_scale": 4.0, "queue_size": 3, "sensor_type": "kinect"}
+    cloud = {
+        "sensor_plugin": "occupancy_map_monitor/PointCloudOctomapUpdater",
+        "point_cloud_topic": "/points",
+        "padding_offset": 0.1,
+        "point_subsample": 2,
+        "filtered_cloud_topic": "left",
+        "ns": "kinect",
+    }
+    image = {
+        "sensor_plugin": "occupancy_map_monitor/DepthImageOctomapUpdater",
+        "image_topic": "/depth",
+        "shadow_threshold": 0.2,
+        "padding_scale": 4.0,
+        "queue_size": 3,
+        "sensor_type": "kinect",
+    }
     off = {"sensor_plugin": "~occupancy_map_monitor/DepthImageOctomapUpdater"}
     sensors, faults = read_sensors([cloud, image, off, {}], 2.5)
     assert sensors == [
         PointCloudSettings("/points", 2.5, 2, 0.1, filtered_cloud_topic="left", ns="kinect"),
-        DepthImageSettings("/depth", 3, shadow_threshold=0.2, padding_scale=4.0)]
+        DepthImageSettings("/depth", 3, shadow_threshold=0.2, padding_scale=4.0),
+    ]
     assert not faults
-    wrong = [{"sensor_plugin": "x"}, {**cloud, "max_rang": 1}, {**cloud, "max_range": "far"},
-             {**cloud, "point_subsample": 0}, {**cloud, "point_cloud_topic": ""}, "cloud"]
+    wrong = [
+        {"sensor_plugin": "x"},
+        {**cloud, "max_rang": 1},
+        {**cloud, "max_range": "far"},
+        {**cloud, "point_subsample": 0},
+        {**cloud, "point_cloud_topic": ""},
+        "cloud",
+    ]
     sensors, faults = read_sensors(wrong, None)
     assert not sensors
-    for fault, text in zip(faults, ["allowed are occupancy", "unknown key 'max_rang'", "type float", "1 or more",
-                                    "point_cloud_topic is missing", "str"], strict=True):
+    for fault, text in zip(
+        faults,
+        [
+            "allowed are occupancy",
+            "unknown key 'max_rang'",
+            "type float",
+            "1 or more",
+            "point_cloud_topic is missing",
+            "str",
+        ],
+        strict=True,
+    ):
         assert text in fault
     assert read_sensors({}, None)[1]
 
@@ -191,8 +259,9 @@ def test_a_look_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) ->
         caches.append(cache)
         return self_filter_of(cache, bodies, 1.0, 0.0)
 
-    monitor = SimpleNamespace(model=model, positions_at=lambda *_: scene.positions, snapshot=lambda: seen,
-                              apply=lambda change: change(seen))
+    monitor = SimpleNamespace(
+        model=model, positions_at=lambda *_: scene.positions, snapshot=lambda: seen, apply=lambda change: change(seen)
+    )
     octomap, looked = OctomapMonitor(monitor), SeenPoints(np.full((1, 3), 3.0), np.empty((0, 3)))
     for number in range(5):
         thing = CollisionObject("thing", pin.SE3.Identity(), ((Box(0.1, 0.1, 1.0 + number), pin.SE3.Identity()),))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """STOMP bends motions round obstacles, repeats itself with a seed, keeps path constraints and says why it failed."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -37,19 +38,25 @@ def scene_with(model: RobotModel, height_m: float) -> PlanningScene:
     group_base = model.link_transforms(scene.positions)[model.group(GROUP).base_link].translation
     middle = model.link_transforms(model.merge(scene.positions, {joints[0]: 0.0}))[model.group(GROUP).tip_link]
     place = np.array([middle.translation[0], middle.translation[1], group_base[2] + height_m / 2.0])
-    return scene.with_object(CollisionObject("post", pin.SE3(np.eye(3), place),
-                                             ((Box(0.06, 0.06, height_m), pin.SE3.Identity()),)))
+    return scene.with_object(
+        CollisionObject("post", pin.SE3(np.eye(3), place), ((Box(0.06, 0.06, height_m), pin.SE3.Identity()),))
+    )
 
 
-def planned(model: RobotModel, height_m: float, parameters: dict[str, object] | None = None,
-            **request: object) -> PlanningAnswer:
+def planned(
+    model: RobotModel, height_m: float, parameters: dict[str, object] | None = None, **request: object
+) -> PlanningAnswer:
     settings = PipelineSettings(seed=4, parameters=parameters or {})
-    pipeline = PlanningPipeline(model, KinematicsPool(model), settings, StompPlanner.configure(model, settings),
-                                make_adapters())
+    pipeline = PlanningPipeline(
+        model, KinematicsPool(model), settings, StompPlanner.configure(model, settings), make_adapters()
+    )
     joints = model.group(GROUP).joints
     goal = JointGoal(dict(zip(joints, GOAL, strict=True)))
-    return pipeline.plan(PlanningRequest(scene_with(model, height_m), GROUP, (goal,),
-                                         **{"planner_id": "STOMP", "allowed_time_s": 600.0, **request}))
+    return pipeline.plan(
+        PlanningRequest(
+            scene_with(model, height_m), GROUP, (goal,), **{"planner_id": "STOMP", "allowed_time_s": 600.0, **request}
+        )
+    )
 
 
 def test_a_motion_bends_round_a_post_and_repeats_itself(model: RobotModel) -> None:
@@ -92,8 +99,9 @@ def test_parameters_of_both_moveits_are_read_and_checked() -> None:
 
 
 def test_update_moves_towards_the_cheaper_copies_and_keeps_the_ends() -> None:
-    optimiser = Optimiser(StompSettings(exponentiated_cost_sensitivity=10.0), np.full(2, -5.0), np.full(2, 5.0),
-                          np.random.default_rng(1))
+    optimiser = Optimiser(
+        StompSettings(exponentiated_cost_sensitivity=10.0), np.full(2, -5.0), np.full(2, 5.0), np.random.default_rng(1)
+    )
     line = optimiser.line(np.zeros(2), np.ones(2))
     copies = optimiser.disturbed(line, np.full(200, 0.3))
     assert np.array_equal(copies[:, [0, -1]], np.repeat(line[None, [0, -1]], 200, axis=0))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Straight lines with six and with seven joints: on the line, without jumps, and honest about where they end."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -88,29 +89,45 @@ def test_an_objection_ends_the_line_with_its_reason(solver: InverseKinematics) -
     assert line.code == ErrorCode.INVALID_MOTION_PLAN and len(line.rows) == 4
 
 
-@pytest.mark.parametrize(("jumps", "text"), [(JumpThresholds(revolute=1e-4), "revolute_jump_threshold allows 0.0001"),
-                                             (JumpThresholds(factor=1.0001), "jump_threshold 1.0001 times the mean")])
+@pytest.mark.parametrize(
+    ("jumps", "text"),
+    [
+        (JumpThresholds(revolute=1e-4), "revolute_jump_threshold allows 0.0001"),
+        (JumpThresholds(factor=1.0001), "jump_threshold 1.0001 times the mean"),
+    ],
+)
 def test_jumps_end_the_line_and_name_the_joint(solver: InverseKinematics, jumps: JumpThresholds, text: str) -> None:
     line = straight_line(solver, "flange", BENT, [ahead((0.15, 0.1, 0))], 0.01, jumps)
     assert line.fraction < 1.0 and "joint 'joint" in line.stop and text in line.stop
 
 
-@pytest.mark.parametrize(("changes", "text"), [
-    ({"max_step_m": 0.0}, "max_step is 0.0"), ({"max_step_m": float("nan")}, "max_step is nan"),
-    ({"max_step_m": 1e-9}, "at most 50000 are followed"),
-    ({"waypoints": [pin.SE3.Identity()] * 50_001}, "waypoints: 50001; at most 50000"),
-    ({"waypoints": []}, "at least one pose"), ({"jumps": JumpThresholds(factor=-1.0)}, "'factor' is -1.0"),
-    ({"link": "nobody"}, "nobody")])
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"max_step_m": 0.0}, "max_step is 0.0"),
+        ({"max_step_m": float("nan")}, "max_step is nan"),
+        ({"max_step_m": 1e-9}, "at most 50000 are followed"),
+        ({"waypoints": [pin.SE3.Identity()] * 50_001}, "waypoints: 50001; at most 50000"),
+        ({"waypoints": []}, "at least one pose"),
+        ({"jumps": JumpThresholds(factor=-1.0)}, "'factor' is -1.0"),
+        ({"link": "nobody"}, "nobody"),
+    ],
+)
 def test_requests_without_meaning_are_refused(solver: InverseKinematics, changes: dict[str, object], text: str) -> None:
-    arguments: dict[str, object] = {"link": "flange", "start": BENT, "waypoints": [ahead((0.1, 0, 0))],
-                                    "max_step_m": 0.01}
+    arguments: dict[str, object] = {
+        "link": "flange",
+        "start": BENT,
+        "waypoints": [ahead((0.1, 0, 0))],
+        "max_step_m": 0.01,
+    }
     with pytest.raises(PlanningError) as caught:
         straight_line(solver, **(arguments | changes))
     assert text in caught.value.reason
 
 
-def test_the_curve_that_touches_something_is_run_with_stops_or_not_at_all(solver: InverseKinematics,
-                                                                          seven: RobotModel) -> None:
+def test_the_curve_that_touches_something_is_run_with_stops_or_not_at_all(
+    solver: InverseKinematics, seven: RobotModel
+) -> None:
     rows = straight_line(solver, "flange", BENT, [ahead((0.03, 0, 0))], 0.01).rows
     verdicts = iter([False, True])
     motion = time_line(solver.group.joints, rows, seven.max_velocity, seven.max_acceleration, lambda _: next(verdicts))
@@ -124,16 +141,20 @@ def test_seven_joints_end_a_line_at_joint_values_and_blend(seven: RobotModel) ->
     kinematics, settings = KinematicsPool(seven), PipelineSettings()
     pipeline = PlanningPipeline(seven, kinematics, settings, CommandPlanner(LIMITS), ())
     scene = empty_scene(seven, BENT)
-    first = PlanningRequest(scene, "arm", (PoseGoal("flange", ahead((0.15, 0, 0))),), "LIN", velocity_scaling=0.2,
-                            acceleration_scaling=0.2)
+    first = PlanningRequest(
+        scene, "arm", (PoseGoal("flange", ahead((0.15, 0, 0))),), "LIN", velocity_scaling=0.2, acceleration_scaling=0.2
+    )
     middle = pipeline.plan(first)
     wanted = middle.goal + np.array([0.1, 0.05, 0.1, -0.2, 0.0, 0.1, 0.0])
     goal = JointGoal(dict(zip(seven.group("arm").joints, wanted.tolist(), strict=True)))
     second = dataclasses.replace(first, scene=scene.with_positions(middle.goal), goals=(goal,))
     end = pipeline.plan(second)
     assert np.allclose(end.trajectory.positions[-1], wanted, atol=1e-6)
-    joined = SequenceJoiner(kinematics, pipeline.checker, 0.1, 0.01).join(
-        [PlannedItem(first, middle, 0.04), PlannedItem(second, end, 0.0)])[0].trajectory
+    joined = (
+        SequenceJoiner(kinematics, pipeline.checker, 0.1, 0.01)
+        .join([PlannedItem(first, middle, 0.04), PlannedItem(second, end, 0.0)])[0]
+        .trajectory
+    )
     times = joined.sample_times()
     position, velocity, acceleration, _ = joined.at(times)
     assert (np.abs(velocity) <= 2.0).all() and (np.abs(acceleration) <= 10.0 * 1.01).all()

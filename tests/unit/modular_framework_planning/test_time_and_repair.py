@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A path that collides between the states a search looked at is repaired; messages name what failed."""
+
 from __future__ import annotations
 
 import time
@@ -54,8 +55,9 @@ def at_start(model: RobotModel, scene: PlanningScene) -> PlanningScene:
 def request(model: RobotModel, values: tuple[float, ...] = GOAL, board: bool = True) -> PlanningRequest:
     scene = empty_scene(model)
     if board:
-        scene = scene.with_object(CollisionObject("board", pin.SE3(np.eye(3), BOARD_AT), (
-            (Box(*THIN), pin.SE3.Identity()),)))
+        scene = scene.with_object(
+            CollisionObject("board", pin.SE3(np.eye(3), BOARD_AT), ((Box(*THIN), pin.SE3.Identity()),))
+        )
     goal = JointGoal(dict(zip(model.group(GROUP).joints, values, strict=True)))
     return PlanningRequest(at_start(model, scene), GROUP, (goal,), "RRTConnect", 1, 60.0)
 
@@ -80,7 +82,8 @@ class Stubborn(Coarse):
 
 
 def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
-        model: RobotModel, robot: object, pool: KinematicsPool) -> None:
+    model: RobotModel, robot: object, pool: KinematicsPool
+) -> None:
     planner, asked = Coarse(), request(model)
     answer = PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(asked)
     assert len(planner.asked) == 1 and len(answer.path) > 2
@@ -102,7 +105,8 @@ def test_what_could_not_be_repaired_is_named_with_bodies_and_state(model: RobotM
 
 
 def test_a_later_search_without_a_path_does_not_hide_what_the_first_one_failed_by(
-        model: RobotModel, pool: KinematicsPool) -> None:
+    model: RobotModel, pool: KinematicsPool
+) -> None:
     class Once(Stubborn):
         def plan(self, problem: PlanningProblem) -> PlannedPath:
             if self.asked:
@@ -114,7 +118,8 @@ def test_a_later_search_without_a_path_does_not_hide_what_the_first_one_failed_b
 
 
 def test_the_planner_leaves_time_for_the_check_and_no_message_counts_from_a_later_begin(
-        model: RobotModel, pool: KinematicsPool) -> None:
+    model: RobotModel, pool: KinematicsPool
+) -> None:
     planner = Coarse()
     PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
     problem = planner.asked[0]
@@ -122,7 +127,8 @@ def test_the_planner_leaves_time_for_the_check_and_no_message_counts_from_a_late
     assert problem.end_s - problem.deadline_s == pytest.approx(0.25)
     improving = Coarse()
     PlanningPipeline(model, pool, PipelineSettings(seed=1), improving, make_adapters()).plan(
-        replace(request(model, board=False), planner_id="BITstar"))
+        replace(request(model, board=False), planner_id="BITstar")
+    )
     assert improving.asked[0].end_s - improving.asked[0].deadline_s == pytest.approx(1.0), "it always uses all its time"
     late = replace(problem, begun_s=time.monotonic() - 60.0, deadline_s=time.monotonic() - 0.3)
     error = no_path(late, "BITstar", 5)
@@ -135,9 +141,14 @@ def test_a_check_does_not_go_on_long_after_the_allowed_time() -> None:
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), np.ones(1), np.ones(1))
     looked: list[float] = []
     problem = SimpleNamespace(
-        settings=PipelineSettings(), constraints=None, checker=None, cancelled=lambda: False,
-        end_s=time.monotonic() - GRACE_S - 1.0, request=SimpleNamespace(allowed_time_s=2.0),
-        motion=SimpleNamespace(colliding_state=lambda line, step: looked.append(step)))
+        settings=PipelineSettings(),
+        constraints=None,
+        checker=None,
+        cancelled=lambda: False,
+        end_s=time.monotonic() - GRACE_S - 1.0,
+        request=SimpleNamespace(allowed_time_s=2.0),
+        motion=SimpleNamespace(colliding_state=lambda line, step: looked.append(step)),
+    )
     with pytest.raises(PlanningError, match="unchecked motion is not returned") as caught:
         TrajectoryValidator().fault(problem, PlannedPath(motion.positions, motion))
     assert caught.value.code == ErrorCode.TIMED_OUT and not looked
@@ -159,8 +170,9 @@ def test_a_goal_a_hair_beyond_a_bound_ends_on_the_bound(model: RobotModel, pool:
 def test_industrial_motions_in_collision_are_invalid_motion_plans(model: RobotModel, pool: KinematicsPool) -> None:
     pipeline = PlanningPipeline(model, pool, PipelineSettings(), CommandPlanner(None), ())
     inside = request(model)
-    tip = model.link_transforms(model.merge(inside.scene.positions, dict(zip(
-        model.group(GROUP).joints, GOAL, strict=True))))["wrist_2_link"].translation
+    tip = model.link_transforms(
+        model.merge(inside.scene.positions, dict(zip(model.group(GROUP).joints, GOAL, strict=True)))
+    )["wrist_2_link"].translation
     start = model.link_transforms(inside.scene.positions)["wrist_2_link"].translation
     for where, words in ((tip, "goal in collision"), (start, "start state in collision"), (BOARD_AT, "last check")):
         block = CollisionObject("block", pin.SE3(np.eye(3), where), ((Box(0.05, 0.05, 0.05), pin.SE3.Identity()),))
@@ -185,7 +197,8 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
 
 
 def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock(
-        model: RobotModel, pool: KinematicsPool, monkeypatch: pytest.MonkeyPatch) -> None:
+    model: RobotModel, pool: KinematicsPool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     step_to = ConstrainedSearch._step_to
     delay_s, looked = 0.0, 0
 
@@ -201,15 +214,22 @@ def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock
     problem = planner.asked[0]
     tip = problem.group.tip_link
     frame = model.pin_model.frames[model.frame_ids[tip]]
-    level = OrientationConstraint(FrameOnRobot(tip, int(frame.parentJoint), frame.placement.copy()),
-                                  FrameOnRobot("world", 0, pin.SE3.Identity()),
-                                  model.link_transforms(problem.start)[tip].rotation, np.array([0.02, 0.02, 0.02]))
+    level = OrientationConstraint(
+        FrameOnRobot(tip, int(frame.parentJoint), frame.placement.copy()),
+        FrameOnRobot("world", 0, pin.SE3.Identity()),
+        model.link_transforms(problem.start)[tip].rotation,
+        np.array([0.02, 0.02, 0.02]),
+    )
     tilted = np.array([*START[:4], -1.0, 0.0])  # it violates the constraint, so that no way leads there
     steps = []
     for slowness_s in (0.0, 0.02):
         delay_s, looked = slowness_s, 0
-        own = replace(problem, constraints=KinematicConstraints(model, orientations=[level]), repeatable=True,
-                      rng=np.random.default_rng(3))
+        own = replace(
+            problem,
+            constraints=KinematicConstraints(model, orientations=[level]),
+            repeatable=True,
+            rng=np.random.default_rng(3),
+        )
         assert connection(own, np.array(START), tilted) is None
         steps.append(looked)
     assert steps[0] == steps[1] > 10
@@ -221,7 +241,8 @@ def sphere_mesh(subdivisions: int) -> Mesh:
 
 
 def test_the_allowed_time_covers_building_the_world_and_what_was_built_is_kept(
-        model: RobotModel, pool: KinematicsPool) -> None:
+    model: RobotModel, pool: KinematicsPool
+) -> None:
     asked = request(model, board=False)
     meshes = [sphere_mesh(3) for _ in range(3)]
     scene = asked.scene
@@ -241,16 +262,27 @@ def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel,
     indices = model.group(GROUP).indices
     checker = ExactCollisionChecker(asked.scene, indices)
     motion = MotionChecker(checker, indices, asked.scene.positions)
-    free, hit = request(model, START).goals, JointGoal(dict(zip(model.group(GROUP).joints, (
-        1.57, 0.6, 0.0, 0.0, 0.0, 0.0), strict=True)))
+    free, hit = (
+        request(model, START).goals,
+        JointGoal(dict(zip(model.group(GROUP).joints, (1.57, 0.6, 0.0, 0.0, 0.0, 0.0), strict=True))),
+    )
 
     def found(*goals: object) -> np.ndarray:
-        return GoalResolver(replace(asked, goals=goals), model.group(GROUP), pool, checker, motion,
-                            np.random.default_rng(1), None, lambda: True).resolve()
+        return GoalResolver(
+            replace(asked, goals=goals),
+            model.group(GROUP),
+            pool,
+            checker,
+            motion,
+            np.random.default_rng(1),
+            None,
+            lambda: True,
+        ).resolve()
 
     assert len(found(*free, hit, hit)) == 1
-    block = CollisionObject("block", pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), (
-        (Box(3.0, 3.0, 3.0), pin.SE3.Identity()),))
+    block = CollisionObject(
+        "block", pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), ((Box(3.0, 3.0, 3.0), pin.SE3.Identity()),)
+    )
     checker = ExactCollisionChecker(asked.scene.with_object(block), indices)
     motion = MotionChecker(checker, indices, asked.scene.positions)
     with pytest.raises(PlanningError, match="1 of 3 alternatives were looked at.*'block'") as caught:

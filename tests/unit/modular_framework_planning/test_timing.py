@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Timed motions keep the limits along the whole curve a controller runs, follow their path and are nearly fastest."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -51,14 +52,18 @@ def test_limits_hold_at_every_millisecond_of_the_controllers_curve() -> None:
 
 
 def test_curve_is_the_one_a_joint_trajectory_controller_runs() -> None:
-    control = pytest.importorskip("modular_framework_control.trajectory.joint_trajectory",
-                                  reason="source the workspace")
+    control = pytest.importorskip(
+        "modular_framework_control.trajectory.joint_trajectory", reason="source the workspace"
+    )
     rng = np.random.default_rng(2)
     vertices, blends = random_polyline(rng)
     motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)
-    points = tuple(control.TrajectoryPoint(*(tuple(np.atleast_1d(item).tolist()) if number else float(item)
-                                             for number, item in enumerate(row)))
-                   for row in zip(motion.times, motion.positions, motion.velocities, motion.accelerations, strict=True))
+    points = tuple(
+        control.TrajectoryPoint(
+            *(tuple(np.atleast_1d(item).tolist()) if number else float(item) for number, item in enumerate(row))
+        )
+        for row in zip(motion.times, motion.positions, motion.velocities, motion.accelerations, strict=True)
+    )
     spline = control.Spline(control.JointTrajectory(JOINTS, points))
     assert np.allclose(motion.coefficients(), spline.coefficients, rtol=1e-6, atol=1e-6)
 
@@ -91,13 +96,18 @@ def fastest_duration(path: BlendedPath, velocity: np.ndarray, acceleration: np.n
             values = path.evaluate(np.atleast_1d(positions), order)
             return values if np.ndim(positions) else values[0]
 
-    grid = np.unique(np.concatenate([path.breaks, path.breaks[1:-1] + 1e-6,
-                                     np.linspace(0.0, path.length, int(path.length / 0.004))]))
-    limits = [JointVelocityConstraint(np.column_stack([-velocity, velocity])),
-              JointAccelerationConstraint(np.column_stack([-acceleration, acceleration]),
-                                          discretization_scheme=DiscretizationType.Collocation)]
-    speeds = toppra.algorithm.TOPPRA(limits, Path(), gridpoints=grid,
-                                     solver_wrapper="seidel").compute_parameterization(0.0, 0.0)[1]
+    grid = np.unique(
+        np.concatenate([path.breaks, path.breaks[1:-1] + 1e-6, np.linspace(0.0, path.length, int(path.length / 0.004))])
+    )
+    limits = [
+        JointVelocityConstraint(np.column_stack([-velocity, velocity])),
+        JointAccelerationConstraint(
+            np.column_stack([-acceleration, acceleration]), discretization_scheme=DiscretizationType.Collocation
+        ),
+    ]
+    speeds = toppra.algorithm.TOPPRA(limits, Path(), gridpoints=grid, solver_wrapper="seidel").compute_parameterization(
+        0.0, 0.0
+    )[1]
     return float((2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])).sum())
 
 
@@ -149,9 +159,15 @@ def checked_problem(colliding_state: Callable[[np.ndarray, float], np.ndarray | 
         def contacts(self, _: np.ndarray, include_fixed: bool) -> list[object]:
             return []
 
-    return SimpleNamespace(settings=PipelineSettings(), constraints=None, checker=Checker(), end_s=np.inf,
-                           cancelled=lambda: False, group=SimpleNamespace(joints=("a",)), motion=SimpleNamespace(
-        colliding_state=colliding_state, full_positions=lambda values: values))
+    return SimpleNamespace(
+        settings=PipelineSettings(),
+        constraints=None,
+        checker=Checker(),
+        end_s=np.inf,
+        cancelled=lambda: False,
+        group=SimpleNamespace(joints=("a",)),
+        motion=SimpleNamespace(colliding_state=colliding_state, full_positions=lambda values: values),
+    )
 
 
 def test_the_validator_looks_at_every_motion_once() -> None:

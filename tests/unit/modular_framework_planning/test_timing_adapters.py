@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Request adapters that time a path: scaling, jerk, speed of a link, their parameters and what they refuse."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -57,15 +58,27 @@ class OverTwoPoints:
         return PlannedPath(np.array([START, *BETWEEN, GOAL]), is_short=True)
 
 
-def planned(model: RobotModel, adapters: Sequence[RequestAdapter], parameters: dict[str, object] | None = None,
-            planner: object = None, **request: object) -> PlanningAnswer:
-    settings = PipelineSettings(parameters=parameters or {}, default_velocity_scaling_factor=0.1,
-                                default_acceleration_scaling_factor=0.2)
+def planned(
+    model: RobotModel,
+    adapters: Sequence[RequestAdapter],
+    parameters: dict[str, object] | None = None,
+    planner: object = None,
+    **request: object,
+) -> PlanningAnswer:
+    settings = PipelineSettings(
+        parameters=parameters or {}, default_velocity_scaling_factor=0.1, default_acceleration_scaling_factor=0.2
+    )
     pipeline = PlanningPipeline(model, KinematicsPool(model), settings, planner or OverTwoPoints(), adapters)
     joints = model.group(GROUP).joints
     scene = empty_scene(model, model.merge(model.default_positions(), dict(zip(joints, START, strict=True))))
-    return pipeline.plan(PlanningRequest(scene, GROUP, (JointGoal(dict(zip(joints, GOAL, strict=True))),),
-                                         **{"velocity_scaling": 1.0, "acceleration_scaling": 1.0, **request}))
+    return pipeline.plan(
+        PlanningRequest(
+            scene,
+            GROUP,
+            (JointGoal(dict(zip(joints, GOAL, strict=True))),),
+            **{"velocity_scaling": 1.0, "acceleration_scaling": 1.0, **request},
+        )
+    )
 
 
 def largest(motion: Trajectory, order: int) -> np.ndarray:
@@ -73,14 +86,17 @@ def largest(motion: Trajectory, order: int) -> np.ndarray:
     return np.abs(motion.at(motion.sample_times(0.001))[order]).max(axis=0)
 
 
-@pytest.mark.parametrize("adapter", [AddTimeOptimalParameterization(), AddIterativeSplineParameterization(),
-                                     AddTimeParameterization()])
+@pytest.mark.parametrize(
+    "adapter", [AddTimeOptimalParameterization(), AddIterativeSplineParameterization(), AddTimeParameterization()]
+)
 def test_scaling_factors_scale_the_limits_and_0_means_the_default(model: RobotModel, adapter: RequestAdapter) -> None:
     indices = model.group(GROUP).indices
     for given, expected in (((0.5, 0.3), (0.5, 0.3)), ((0.0, 0.0), (0.1, 0.2)), ((1.0, 1.0), (1.0, 1.0))):
         motion = planned(model, [adapter], velocity_scaling=given[0], acceleration_scaling=given[1]).trajectory
-        shares = (largest(motion, 1) / model.max_velocity[indices],
-                  largest(motion, 2) / model.max_acceleration[indices])
+        shares = (
+            largest(motion, 1) / model.max_velocity[indices],
+            largest(motion, 2) / model.max_acceleration[indices],
+        )
         for share, factor in zip(shares, expected, strict=True):
             assert share.max() <= factor
         assert max(shares[0].max() / expected[0], shares[1].max() / expected[1]) > 0.98, "as fast as allowed"
@@ -88,8 +104,12 @@ def test_scaling_factors_scale_the_limits_and_0_means_the_default(model: RobotMo
 
 @pytest.mark.parametrize("factor", [-0.1, 1.01])
 def test_scaling_factors_out_of_range_are_1(model: RobotModel, factor: float, caplog: pytest.LogCaptureFixture) -> None:
-    full, other = (planned(model, [AddTimeOptimalParameterization()], velocity_scaling=value, acceleration_scaling=value
-                           ).trajectory for value in (1.0, factor))
+    full, other = (
+        planned(
+            model, [AddTimeOptimalParameterization()], velocity_scaling=value, acceleration_scaling=value
+        ).trajectory
+        for value in (1.0, factor)
+    )
     assert other.times.tolist() == full.times.tolist()
     assert f"max_velocity_scaling_factor is {factor:g}; allowed is 0 < factor <= 1" in caplog.text
 
@@ -102,8 +122,10 @@ def test_scaling_factors_that_are_no_numbers_are_refused(model: RobotModel, fact
 
 
 def test_path_tolerance_and_resample_dt_are_honoured(model: RobotModel) -> None:
-    wide, narrow = (planned(model, [AddTimeOptimalParameterization()], {"path_tolerance": value}).trajectory
-                    for value in (0.1, 0.005))
+    wide, narrow = (
+        planned(model, [AddTimeOptimalParameterization()], {"path_tolerance": value}).trajectory
+        for value in (0.1, 0.005)
+    )
     corner = np.array(BETWEEN[0])
     near = [float(np.linalg.norm(item.curve(0.002) - corner, axis=1).min()) for item in (wide, narrow)]
     assert near[0] > 0.02 and near[1] < 0.006
@@ -147,8 +169,11 @@ def test_every_way_of_smoothing_keeps_the_limits_of_random_motions() -> None:
         jerk = np.full(6, rng.choice([5.0, 50.0, 500.0]))
         timed = parameterize(tuple("abcdef"), vertices, np.full(len(vertices) - 2, 0.1), velocity, acceleration)
         straight = along_straight_lines(timed.joint_names, vertices, velocity, acceleration, jerk)
-        for motion in (straight, averaged_curve(timed, velocity, acceleration, jerk),
-                       slowed_to_limits(timed, velocity, acceleration, jerk)):
+        for motion in (
+            straight,
+            averaged_curve(timed, velocity, acceleration, jerk),
+            slowed_to_limits(timed, velocity, acceleration, jerk),
+        ):
             assert (largest(motion, 1) <= velocity).all() and (largest(motion, 2) <= acceleration).all()
             assert (largest(motion, 3) <= jerk).all()
             assert np.diff(motion.times).min() > 1e-3
@@ -186,8 +211,9 @@ def test_speed_of_the_link_stays_below_the_limit_and_near_it(model: RobotModel, 
     indices = model.group(GROUP).indices
     plain = planned(model, adapters).trajectory
     assert speeds_by_difference(model, plain, "ezgripper_palm_link").max() > 0.7
-    motion = planned(model, adapters, max_cartesian_speed=highest,
-                     cartesian_speed_limited_link="ezgripper_palm_link").trajectory
+    motion = planned(
+        model, adapters, max_cartesian_speed=highest, cartesian_speed_limited_link="ezgripper_palm_link"
+    ).trajectory
     speeds = speeds_by_difference(model, motion, "ezgripper_palm_link")
     assert speeds.max() <= highest
     assert np.quantile(speeds, 0.6) > 0.7 * highest, "only as slow as needed"
@@ -201,10 +227,14 @@ def test_speed_limit_of_the_tip_and_what_is_refused(model: RobotModel) -> None:
     motion = planned(model, adapters, max_cartesian_speed=0.1).trajectory
     assert speeds_by_difference(model, motion, model.group(GROUP).tip_link).max() <= 0.1
     for request, code, text in (
-            ({"max_cartesian_speed": -1.0}, ErrorCode.INVALID_MOTION_PLAN, "allowed is a speed above 0"),
-            ({"max_cartesian_speed": float("nan")}, ErrorCode.INVALID_MOTION_PLAN, "allowed is a speed above 0"),
-            ({"max_cartesian_speed": 1.0, "cartesian_speed_limited_link": "no_link"}, ErrorCode.INVALID_LINK_NAME,
-             "no_link")):
+        ({"max_cartesian_speed": -1.0}, ErrorCode.INVALID_MOTION_PLAN, "allowed is a speed above 0"),
+        ({"max_cartesian_speed": float("nan")}, ErrorCode.INVALID_MOTION_PLAN, "allowed is a speed above 0"),
+        (
+            {"max_cartesian_speed": 1.0, "cartesian_speed_limited_link": "no_link"},
+            ErrorCode.INVALID_LINK_NAME,
+            "no_link",
+        ),
+    ):
         with pytest.raises(PlanningError, match=text) as caught:
             planned(model, adapters, **request)
         assert caught.value.code == code
@@ -221,8 +251,9 @@ def test_a_trajectory_of_the_planner_is_slowed_too_but_not_timed_anew(model: Rob
 
     class Timed:
         def plan(self, problem: PlanningProblem) -> Trajectory:
-            return parameterize(names, np.array([START, GOAL]), np.zeros(0), problem.max_velocity,
-                                problem.max_acceleration)
+            return parameterize(
+                names, np.array([START, GOAL]), np.zeros(0), problem.max_velocity, problem.max_acceleration
+            )
 
     adapters = [LimitMaxCartesianLinkSpeed(), AddTimeOptimalParameterization()]
     plain = planned(model, adapters, planner=Timed()).trajectory

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a robot looks like is kept for the markers, beside what Pinocchio reads."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -27,7 +28,7 @@ def test_primitives_and_meshes_of_a_link_are_kept_with_their_poses() -> None:
     sizes = [tuple(getattr(shape, name) for name in shape.__match_args__) for shape, _ in shapes]
     assert sizes == [(0.1, 0.2, 0.3), (0.4, 0.1), (0.2,)]
     assert np.allclose(shapes[0][1].translation, [0.0, 0.0, 0.5])
-    (uri, pose, scale), = document.visual_meshes["a"]
+    ((uri, pose, scale),) = document.visual_meshes["a"]
     assert (uri, scale) == ("package://p/m.dae", (2.0, 2.0, 2.0)) and np.allclose(pose.homogeneous, np.eye(4))
 
 

@@ -4,6 +4,7 @@
 Run as a program: a loop that an earlier test has called would hide that compile_all() leaves it out. Reads the URDF and
 the SRDF of the shipped robot as a JSON list from standard input.
 """
+
 from __future__ import annotations
 
 import json
@@ -35,8 +36,13 @@ START = (0.9, -1.57, 1.2, -1.2, -1.57, 0.0)
 
 def loops() -> dict[str, Dispatcher]:
     """Every compiled loop of the modules loaded by now."""
-    return {f"{module}.{name}": value for module in sorted(sys.modules) if module.split(".")[-1].startswith("compiled_")
-            for name, value in vars(sys.modules[module]).items() if isinstance(value, Dispatcher)}
+    return {
+        f"{module}.{name}": value
+        for module in sorted(sys.modules)
+        if module.split(".")[-1].startswith("compiled_")
+        for name, value in vars(sys.modules[module]).items()
+        if isinstance(value, Dispatcher)
+    }
 
 
 def signatures() -> set[tuple[str, str]]:

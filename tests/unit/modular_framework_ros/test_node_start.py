@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A node that is interrupted while it starts ends without a traceback; one that cannot start says why."""
+
 from __future__ import annotations
 
 import signal
@@ -24,6 +25,7 @@ def interrupts() -> Iterator[None]:
 @pytest.fixture()
 def node(monkeypatch: pytest.MonkeyPatch) -> str:
     """Name of a module whose main() fails as rospy.init_node() does."""
+
     def main() -> int:
         raise rospy.exceptions.ROSInitException("init_node interrupted before it could complete")
 
@@ -34,7 +36,8 @@ def node(monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_an_interrupt_while_rospy_starts_the_node_ends_it_like_a_shell_would_say(
-        node: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    node: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(rospy.core, "is_shutdown", lambda: True)
     with pytest.raises(SystemExit) as ended:
         run_node(node)

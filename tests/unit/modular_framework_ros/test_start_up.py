@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Waits at the start have one configurable limit, and say every ten seconds what is missing."""
+
 from __future__ import annotations
 
 from types import SimpleNamespace
@@ -20,10 +21,17 @@ def node(monkeypatch: pytest.MonkeyPatch) -> Any:
         state.now_s += period_s
 
     monkeypatch.setattr(start_up, "time", SimpleNamespace(monotonic=lambda: state.now_s, sleep=sleep))
-    monkeypatch.setattr(start_up, "rospy", SimpleNamespace(
-        get_param=state.parameters.get, is_shutdown=lambda: False, resolve_name=str,
-        logwarn=lambda text, *values: state.warnings.append(text % values),
-        logerr_throttle=lambda period_s, text: state.errors.append(text)))
+    monkeypatch.setattr(
+        start_up,
+        "rospy",
+        SimpleNamespace(
+            get_param=state.parameters.get,
+            is_shutdown=lambda: False,
+            resolve_name=str,
+            logwarn=lambda text, *values: state.warnings.append(text % values),
+            logerr_throttle=lambda period_s, text: state.errors.append(text),
+        ),
+    )
     return state
 
 

@@ -205,8 +205,10 @@ LINK = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz=
 
 def two_links(robot: str = "r", link: str = "a", joint: str = "j") -> str:
     """An object whose names are given."""
-    return (f"<robot name='{robot}'><link name='{link}'>{LINK}<link name='b'>{LINK}<joint name='{joint}' type='fixed'>"
-            f"<parent link='{link}'/><child link='b'/></joint></robot>")
+    return (
+        f"<robot name='{robot}'><link name='{link}'>{LINK}<link name='b'>{LINK}<joint name='{joint}' type='fixed'>"
+        f"<parent link='{link}'/><child link='b'/></joint></robot>"
+    )
 
 
 @pytest.mark.parametrize("part", ["robot", "link", "joint"])

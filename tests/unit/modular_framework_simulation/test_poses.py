@@ -16,9 +16,7 @@ from modular_framework_urdf.rotations import rpy_from_quaternion
 
 ANGLE = st.floats(-3.1, 3.1)
 LENGTH = st.floats(-10.0, 10.0)
-POSES = st.builds(
-    Pose.from_xyz_rpy, st.tuples(LENGTH, LENGTH, LENGTH), st.tuples(ANGLE, st.floats(-1.5, 1.5), ANGLE)
-)
+POSES = st.builds(Pose.from_xyz_rpy, st.tuples(LENGTH, LENGTH, LENGTH), st.tuples(ANGLE, st.floats(-1.5, 1.5), ANGLE))
 
 
 def matrix(pose: Pose) -> np.ndarray:

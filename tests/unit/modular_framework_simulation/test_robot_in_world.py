@@ -61,9 +61,7 @@ class Lifter:
         self.hardware = PyBulletRobotHW(self.robot)
         assert self.hardware.init(MappingNodeHandle(), MappingNodeHandle())
         self.commander = Commander()
-        self.loop = SimulationLoop(
-            world, Pacer(0.0), RequestQueue(), Actors(self.robot, self.hardware, self.commander)
-        )
+        self.loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(self.robot, self.hardware, self.commander))
         self.states = {each.name: each for each in self.hardware.get(JointStateInterface).handles}
         self.commands = {each.name: each for each in self.hardware.get(PositionJointInterface).handles}
 
@@ -248,8 +246,12 @@ def test_a_robot_with_a_name_the_engine_has_no_room_for_is_refused(
 ) -> None:
     urdf = lift_robot_urdf()
     for name in ("lift", "slide_1"):
-        description = read_robot(urdf.replace(f"'{name}'", f"'{'n' * 2000}'").replace(f'"{name}"', f'"{"n" * 2000}"'),
-                                 no_packages, convex_parts, False)
+        description = read_robot(
+            urdf.replace(f"'{name}'", f"'{'n' * 2000}'").replace(f'"{name}"', f'"{"n" * 2000}"'),
+            no_packages,
+            convex_parts,
+            False,
+        )
         with pytest.raises(DescriptionError, match=r"model 'r': <joint name='n+\.\.\.'>: is 2,000 bytes long"):
             RobotBody(world, description, "r", Pose(), {})
     with pytest.raises(DescriptionError, match="n{2000}.*allowed: lift, slide_1, slide_2"):
@@ -267,19 +269,35 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
     [
         ("<robot", "well-formed"),
         ("<sdf/>", "expected a URDF"),
-        ("<robot name='r'><link name='a'><collision><geometry><mesh filename='package://p/x.stl'/></geometry>"
-         "</collision></link></robot>", "package 'p' is not found"),
-        ("<robot name='r'><link name='a'><collision><geometry><mesh filename='/nowhere/x.stl'/></geometry>"
-         "</collision></link></robot>", "'/nowhere/x.stl' does not exist"),
-        ("<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'><parent link='a'/>"
-         "<child link='b'/><limit lower='x'/></joint></robot>", "joint 'j'.*got 'x'"),
-        ("<robot name='r'><link name='a'/><joint name='j' type='revolute'><parent link='a'/></joint></robot>",
-         "joint 'j'.*has no <child"),
-        (lift_robot_urdf().replace("<mimic joint=\"slide_1\"", "<mimic joint=\"slide_2\""),
-         "'slide_2': it mimics itself through slide_2 -> slide_2; a joint may mimic one of lift, slide_1"),
-        (lift_robot_urdf().replace("<mimic joint=\"slide_1\"", "<mimic joint=\"knee\""), "'knee', which is no joint"),
-        ("<robot name='r'><link name='a'><collision><geometry><box size='1 1e30 1'/></geometry></collision></link>"
-         "</robot>", "link 'a', <box size=...>: got '1 1e30 1'; allowed: lengths of at most 10000 m"),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><mesh filename='package://p/x.stl'/></geometry>"
+            "</collision></link></robot>",
+            "package 'p' is not found",
+        ),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><mesh filename='/nowhere/x.stl'/></geometry>"
+            "</collision></link></robot>",
+            "'/nowhere/x.stl' does not exist",
+        ),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'><parent link='a'/>"
+            "<child link='b'/><limit lower='x'/></joint></robot>",
+            "joint 'j'.*got 'x'",
+        ),
+        (
+            "<robot name='r'><link name='a'/><joint name='j' type='revolute'><parent link='a'/></joint></robot>",
+            "joint 'j'.*has no <child",
+        ),
+        (
+            lift_robot_urdf().replace('<mimic joint="slide_1"', '<mimic joint="slide_2"'),
+            "'slide_2': it mimics itself through slide_2 -> slide_2; a joint may mimic one of lift, slide_1",
+        ),
+        (lift_robot_urdf().replace('<mimic joint="slide_1"', '<mimic joint="knee"'), "'knee', which is no joint"),
+        (
+            "<robot name='r'><link name='a'><collision><geometry><box size='1 1e30 1'/></geometry></collision></link>"
+            "</robot>",
+            "link 'a', <box size=...>: got '1 1e30 1'; allowed: lengths of at most 10000 m",
+        ),
     ],
 )
 def test_a_faulty_robot_description_is_refused(urdf: str, said: str, tmp_path: Path) -> None:

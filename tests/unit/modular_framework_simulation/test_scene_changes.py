@@ -90,8 +90,10 @@ BALL, TABLE = ("ball", "link"), ("table", "link")
 
 def three(cube_at: float = 0.0, held_at: float | None = None) -> WorldSnapshot:
     """The world with a table, a ball and the cube."""
-    models = tuple(ModelSnapshot(name, number, False, (LinkSnapshot(LINK, at(x)),))
-                   for number, (name, x) in enumerate((("table", 1.0), ("ball", 2.0), ("cube", cube_at))))
+    models = tuple(
+        ModelSnapshot(name, number, False, (LinkSnapshot(LINK, at(x)),))
+        for number, (name, x) in enumerate((("table", 1.0), ("ball", 2.0), ("cube", cube_at)))
+    )
     return WorldSnapshot(0.0, models, HeldObject("cube", "palm", at(held_at)) if held_at is not None else None)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A timeout may be infinite: the state then waits until it has what it waits for, or is stopped."""
+
 from __future__ import annotations
 
 import math
@@ -26,14 +27,24 @@ from modular_framework_states.states.wait_for_message import WaitForMessage
 
 INF, NAN = math.inf, math.nan
 ENDLESS = [
-    (CallAction, {"action_name": "a"}, "timeout"), (CallAction, {"action_name": "a"}, "server_timeout"),
-    (CallService, {"service_name": "s"}, "timeout"), (Gripper, {"posture": "open"}, "timeout"),
-    (Grasp, {"grasp_type": "pregrasp"}, "timeout"), (Wait, {"duration": 1.0}, "timeout"), (Wait, {}, "duration"),
-    (WaitForMessage, {"topic_name": "t"}, "timeout"), (Move, {}, "start_tolerance"), (Move, {}, "goal_tolerance"),
-    (ExecuteTrajectory, {}, "goal_tolerance"), (ExecuteTrajectory, {}, "step"),
+    (CallAction, {"action_name": "a"}, "timeout"),
+    (CallAction, {"action_name": "a"}, "server_timeout"),
+    (CallService, {"service_name": "s"}, "timeout"),
+    (Gripper, {"posture": "open"}, "timeout"),
+    (Grasp, {"grasp_type": "pregrasp"}, "timeout"),
+    (Wait, {"duration": 1.0}, "timeout"),
+    (Wait, {}, "duration"),
+    (WaitForMessage, {"topic_name": "t"}, "timeout"),
+    (Move, {}, "start_tolerance"),
+    (Move, {}, "goal_tolerance"),
+    (ExecuteTrajectory, {}, "goal_tolerance"),
+    (ExecuteTrajectory, {}, "step"),
 ]
-FINITE = [(CartesianMove, {"pose_name": "p"}, "max_step"), (CartesianMove, {"pose_name": "p"}, "speed"),
-          (SetPlanner, {}, "planning_time")]
+FINITE = [
+    (CartesianMove, {"pose_name": "p"}, "max_step"),
+    (CartesianMove, {"pose_name": "p"}, "speed"),
+    (SetPlanner, {}, "planning_time"),
+]
 
 
 @pytest.fixture()

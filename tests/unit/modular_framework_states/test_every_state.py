@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What holds for every state of the framework, and for the one to begin with: found, documented, typed, explained."""
+
 from __future__ import annotations
 
 import ast
@@ -24,10 +25,30 @@ STATES = ROOT / "src" / "modular_framework_states" / "src" / "modular_framework_
 EXAMPLES = ROOT / "docs" / "examples"
 CATALOGUE = StateCatalogue([STATES, EXAMPLES])
 NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_")]
-EXPECTED = {"wait_for_signal", "select", "plan", "move", "grasp", "allow_manipulator_collisions", "execute_trajectory",
-            "cartesian_move", "gripper", "call_service", "call_action", "wait", "wait_for_message", "counter",
-            "reinitialise_managers", "store", "load", "spawn_object", "delete_object", "set_planner", "log_metric",
-            "release"}
+EXPECTED = {
+    "wait_for_signal",
+    "select",
+    "plan",
+    "move",
+    "grasp",
+    "allow_manipulator_collisions",
+    "execute_trajectory",
+    "cartesian_move",
+    "gripper",
+    "call_service",
+    "call_action",
+    "wait",
+    "wait_for_message",
+    "counter",
+    "reinitialise_managers",
+    "store",
+    "load",
+    "spawn_object",
+    "delete_object",
+    "set_planner",
+    "log_metric",
+    "release",
+}
 
 
 def test_all_promised_states_are_there() -> None:
@@ -62,15 +83,24 @@ def test_every_option_has_a_type_and_a_meaning(name: str) -> None:
 
 def parts(kind: OptionType) -> list[OptionType]:
     """Return a type and all it consists of."""
-    inner = kind.types if isinstance(kind, AnyOf) else (kind.item,) if isinstance(kind, ListOf) else (
-        (kind.value,) if isinstance(kind, MappingOf) else ())
+    inner = (
+        kind.types
+        if isinstance(kind, AnyOf)
+        else (kind.item,)
+        if isinstance(kind, ListOf)
+        else ((kind.value,) if isinstance(kind, MappingOf) else ())
+    )
     return [kind, *(part for item in inner for part in parts(item))]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_number_says_its_limits(name: str) -> None:
-    unlimited = [option.name for option in CATALOGUE.get(name).options.values() for part in parts(option.type)
-                 if isinstance(part, Plain) and part.kind in ("float", "int") and part.limits is None]
+    unlimited = [
+        option.name
+        for option in CATALOGUE.get(name).options.values()
+        for part in parts(option.type)
+        if isinstance(part, Plain) and part.kind in ("float", "int") and part.limits is None
+    ]
     assert unlimited == []
 
 
@@ -90,11 +120,22 @@ def test_it_is_a_framework_state_that_does_nothing_while_it_is_imported(name: st
     assert "execute" in vars(state)
     source = inspect.getsource(state.execute)
     ends = "self.fail(" in source and "self.succeed()" in source
-    assert ends or "_run" in source or "run_to_end(self," in source or "self._end(" in source or (
-        "end_with(self," in source) or name in {"wait"}
+    assert (
+        ends
+        or "_run" in source
+        or "run_to_end(self," in source
+        or "self._end(" in source
+        or ("end_with(self," in source)
+        or name in {"wait"}
+    )
 
 
 def test_the_state_to_begin_with_passes_its_own_test() -> None:
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", str(EXAMPLES / "test_my_state.py")],
-                          capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", str(EXAMPLES / "test_my_state.py")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Who starts at a stage of a grasp finds the joint positions with which the others arrive there."""
+
 from __future__ import annotations
 
 from types import SimpleNamespace
@@ -45,8 +46,9 @@ def grasp(*xs: float):
     stages = {}
     for name, x in zip(("pregrasp", "grasp", "postgrasp"), xs, strict=True):
         posture = SimpleNamespace(name=["f"], position=[0.4 if name == "pregrasp" else 1.9])
-        stages[name] = SimpleNamespace(pose=SimpleNamespace(header=SimpleNamespace(frame_id="world"), x=x),
-                                       posture=posture)
+        stages[name] = SimpleNamespace(
+            pose=SimpleNamespace(header=SimpleNamespace(frame_id="world"), x=x), posture=posture
+        )
     return SimpleNamespace(grasp_id="g", **stages)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Letting go counts once the fingers are open and nothing is attached to them."""
+
 from __future__ import annotations
 
 from types import SimpleNamespace

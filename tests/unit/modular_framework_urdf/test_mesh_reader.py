@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes are compared with a second reader, a few plain lines a format that share no code with the first one."""
+
 from __future__ import annotations
 
 import re
@@ -105,18 +106,23 @@ def ply_corners(content: bytes) -> np.ndarray:
     if b"format ascii" in header:
         lines = [line.split() for line in body.decode().splitlines()]
         points = np.array([line[:3] for line in lines[:vertices]], dtype=float)
-        return fans([[points[int(word)] for word in line[1:1 + int(line[0])]]
-                     for line in lines[vertices:vertices + faces]])
+        return fans(
+            [[points[int(word)] for word in line[1 : 1 + int(line[0])]] for line in lines[vertices : vertices + faces]]
+        )
     points = np.array([struct.unpack_from("<3f", body, 12 * number) for number in range(vertices)])
-    return np.array([points[list(struct.unpack_from("<3i", body, 12 * vertices + 13 * number + 1))]
-                     for number in range(faces)])
+    return np.array(
+        [points[list(struct.unpack_from("<3i", body, 12 * vertices + 13 * number + 1))] for number in range(faces)]
+    )
 
 
 def node_matrix(node: ET.Element) -> np.ndarray:
     result = np.eye(4)
     for step in node:
-        values = np.array((step.text or "").split(), dtype=float) if step.tag in (
-            "matrix", "translate", "scale", "rotate") else np.zeros(0)
+        values = (
+            np.array((step.text or "").split(), dtype=float)
+            if step.tag in ("matrix", "translate", "scale", "rotate")
+            else np.zeros(0)
+        )
         one = np.eye(4)
         if step.tag == "matrix":
             one = values.reshape(4, 4)
@@ -138,7 +144,7 @@ def geometry_corners(geometry: ET.Element, known: dict[str, ET.Element]) -> np.n
         vertex = next(one for one in inputs if one.get("semantic") == "VERTEX")
         positions = known[known[vertex.get("source")[1:]].find("input[@semantic='POSITION']").get("source")[1:]]
         points = np.array(positions.findtext("float_array").split(), dtype=float).reshape(-1, 3)
-        numbers = np.array(primitive.findtext("p").split(), dtype=int)[int(vertex.get("offset"))::stride]
+        numbers = np.array(primitive.findtext("p").split(), dtype=int)[int(vertex.get("offset")) :: stride]
         counts = primitive.findtext("vcount")
         sizes = [3] * (len(numbers) // 3) if counts is None else [int(word) for word in counts.split()]
         found.append(fans([list(points[one]) for one in np.split(numbers, np.cumsum(sizes)[:-1])]))
@@ -184,12 +190,15 @@ def compare(mesh: TriangleMesh, corners: np.ndarray) -> None:
 
 def written(folder: Path, kind: str) -> Path:
     body = trimesh.creation.annulus(r_min=0.02, r_max=0.05, height=0.1, sections=24)
-    texts = {"two_materials.obj": TWO_MATERIALS, "instances.dae": COLLADA.format(more=""),
-             "two_solids.stl": trimesh.exchange.stl.export_stl_ascii(body)
-             + trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box((3, 2, 1))),
-             "quads.ply": "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
-             "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
-             "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 2\n4 0 1 2 3\n3 0 1 4\n"}
+    texts = {
+        "two_materials.obj": TWO_MATERIALS,
+        "instances.dae": COLLADA.format(more=""),
+        "two_solids.stl": trimesh.exchange.stl.export_stl_ascii(body)
+        + trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box((3, 2, 1))),
+        "quads.ply": "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 2\n4 0 1 2 3\n3 0 1 4\n",
+    }
     file = folder / kind
     if kind in texts:
         file.write_text(texts[kind])
@@ -198,8 +207,9 @@ def written(folder: Path, kind: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize("kind", ["two_materials.obj", "instances.dae", "two_solids.stl", "quads.ply", "binary.stl",
-                                  "binary.ply", "one.obj"])
+@pytest.mark.parametrize(
+    "kind", ["two_materials.obj", "instances.dae", "two_solids.stl", "quads.ply", "binary.stl", "binary.ply", "one.obj"]
+)
 def test_every_format_is_read_as_a_second_reader_reads_it(tmp_path: Path, kind: str) -> None:
     file = written(tmp_path, kind)
     compare(read_mesh(file), SECOND_READERS[file.suffix](file.read_bytes()))
@@ -225,27 +235,44 @@ def test_a_mirrored_mesh_keeps_its_outside(tmp_path: Path) -> None:
 
 
 SKIN = '<library_controllers><controller id="skin"><skin source="#one"/></controller></library_controllers>'
-SKINNED = COLLADA.format(more="").replace("<library_nodes>", SKIN + "<library_nodes>").replace(
-    '<instance_geometry url="#one"/>', '<instance_controller url="#skin"/>')
+SKINNED = (
+    COLLADA.format(more="")
+    .replace("<library_nodes>", SKIN + "<library_nodes>")
+    .replace('<instance_geometry url="#one"/>', '<instance_controller url="#skin"/>')
+)
 STRIP = '<tristrips count="1"><input semantic="VERTEX" source="#v1" offset="0"/><p>0 1 2 3</p></tristrips>'
 
 
-@pytest.mark.parametrize(("name", "content", "words"), [
-    ("skinned.dae", SKINNED.encode(), "8 of the 10 triangles"),
-    ("entity.dae", b'<!DOCTYPE a [<!ENTITY b "c">]>' + COLLADA.format(more="").encode()[21:], "DOCTYPE"),
-    ("other.dae", b"<robot/>", "not <COLLADA>"),
-    ("short.stl", struct.pack("<80sI", b"", 9) + bytes(100), "no whole STL"),
-    ("empty.stl", b"solid a\nendsolid a\n", "no triangle"),
-    ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
-    ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "no whole OBJ"),
-    ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                b"element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
-     "no whole PLY"),
-    ("huge.ply", b"ply\nformat ascii 1.0\nelement vertex 1000000000000\nproperty float x\nend_header\n0\n",
-     "1 values where the header declares 1000000000000"),
-    ("back.ply", b"ply\nformat binary_little_endian 1.0\nelement face 1000000000000\n"
-                 b"property list char char vertex_indices\nend_header\n\xff", "a list has -1 entries"),
-    ("body.step", b"", "'.step'")])
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("skinned.dae", SKINNED.encode(), "8 of the 10 triangles"),
+        ("entity.dae", b'<!DOCTYPE a [<!ENTITY b "c">]>' + COLLADA.format(more="").encode()[21:], "DOCTYPE"),
+        ("other.dae", b"<robot/>", "not <COLLADA>"),
+        ("short.stl", struct.pack("<80sI", b"", 9) + bytes(100), "no whole STL"),
+        ("empty.stl", b"solid a\nendsolid a\n", "no triangle"),
+        ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
+        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "no whole OBJ"),
+        (
+            "cut.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+            b"element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+            "no whole PLY",
+        ),
+        (
+            "huge.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 1000000000000\nproperty float x\nend_header\n0\n",
+            "1 values where the header declares 1000000000000",
+        ),
+        (
+            "back.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement face 1000000000000\n"
+            b"property list char char vertex_indices\nend_header\n\xff",
+            "a list has -1 entries",
+        ),
+        ("body.step", b"", "'.step'"),
+    ],
+)
 def test_a_mesh_that_is_not_whole_is_refused_and_named(tmp_path: Path, name: str, content: bytes, words: str) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshError, match=re.escape(words)) as refusal:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Mimic joints follow one independent joint each; loops and unknown leaders are named."""
+
 from __future__ import annotations
 
 import pytest
@@ -13,15 +14,21 @@ def test_a_chain_of_mimic_joints_follows_its_first_one() -> None:
     assert pytest.approx(-6.0 * 0.2 - 1.5) == -2.0 * (3.0 * 0.2 + 1.0) + 0.5
 
 
-@pytest.mark.parametrize(("mimics", "said"), [
-    ({"a": Mimic("a", 1.0, 0.0)}, "'a': it mimics itself through a -> a; a joint may mimic one of b, c; let one"),
-    ({"a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)}, "itself through a -> b -> a; a joint may mimic one of c"),
-    ({"c": Mimic("a", 1.0, 0.0), "a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)}, "through c -> a -> b -> a"),
-    ({"a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd', which is no joint that moves; allowed are b, c; mend"),
-    ({"b": Mimic("a", 1.0, 0.0), "a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd'"),
-    ({"a": Mimic("b", 0.0, 0.0)}, "'a': it mimics 'b' by multiplier 0.0 and offset 0.0; both must be finite, the"),
-    ({"a": Mimic("b", float("inf"), 0.0)}, "multiplier inf"),
-])
+@pytest.mark.parametrize(
+    ("mimics", "said"),
+    [
+        ({"a": Mimic("a", 1.0, 0.0)}, "'a': it mimics itself through a -> a; a joint may mimic one of b, c; let one"),
+        (
+            {"a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)},
+            "itself through a -> b -> a; a joint may mimic one of c",
+        ),
+        ({"c": Mimic("a", 1.0, 0.0), "a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)}, "through c -> a -> b -> a"),
+        ({"a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd', which is no joint that moves; allowed are b, c; mend"),
+        ({"b": Mimic("a", 1.0, 0.0), "a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd'"),
+        ({"a": Mimic("b", 0.0, 0.0)}, "'a': it mimics 'b' by multiplier 0.0 and offset 0.0; both must be finite, the"),
+        ({"a": Mimic("b", float("inf"), 0.0)}, "multiplier inf"),
+    ],
+)
 def test_what_follows_nothing_that_moves_is_refused(mimics: dict[str, Mimic], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         resolved(mimics, ["a", "b", "c"])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The readers of URDF and SRDF: what they find, and that every fault says its line."""
+
 from __future__ import annotations
 
 import math
@@ -46,7 +47,8 @@ def test_a_urdf_is_read_whole() -> None:
     assert [item.shapes for item in base.collisions] == [(MeshFile("a.stl", (1.0, 1.0, 1.0)),), (Sphere(2.0),)]
     assert [item.shapes for item in arm.collisions] == [(Cylinder(0.1, 0.4),), (UnknownShape("torus"),)]
     assert base.collisions[0].origin.matrix() == pytest.approx(
-        np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]))
+        np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]])
+    )
     turn, mount = robot.joints
     assert (turn.parent, turn.child, turn.axis, turn.line) == ("base", "arm", (0.0, 0.0, 1.0), 8)
     assert turn.limit == Limit(-1.0, 1.0, None, 2.0) and turn.safety == SafetyController(None, 0.5, None, 3.0)
@@ -57,13 +59,24 @@ def test_a_urdf_is_read_whole() -> None:
     assert transmission.actuators[0].reduction == LocatedText("50", 13) and transmission.joints[0].offset is None
 
 
-@pytest.mark.parametrize(("found", "wrong", "fault"), [
-    ('velocity="2"', 'velocity="fast"', "r.urdf:9: <limit> of joint 'turn': velocity is 'fast'; expected a number;"),
-    ('lower="-1"', 'lower="nan"', "r.urdf:9: <limit> of joint 'turn': lower is 'nan'"),
-    ('rpy="0 0 1.5707963267948966"', 'rpy="0 0"', "r.urdf:4: <origin> of collision shape of link 'base': rpy is '0 0'; "
-     "expected three numbers"),
-    ('xyz="0 2 0"', 'xyz="0 inf 0"', "r.urdf:8: <origin> of joint 'turn': xyz is '0 inf 0'"),
-    ('radius="2"', 'radius="two"', "r.urdf:5: <sphere> of collision shape of link 'base': radius is 'two'")])
+@pytest.mark.parametrize(
+    ("found", "wrong", "fault"),
+    [
+        (
+            'velocity="2"',
+            'velocity="fast"',
+            "r.urdf:9: <limit> of joint 'turn': velocity is 'fast'; expected a number;",
+        ),
+        ('lower="-1"', 'lower="nan"', "r.urdf:9: <limit> of joint 'turn': lower is 'nan'"),
+        (
+            'rpy="0 0 1.5707963267948966"',
+            'rpy="0 0"',
+            "r.urdf:4: <origin> of collision shape of link 'base': rpy is '0 0'; expected three numbers",
+        ),
+        ('xyz="0 2 0"', 'xyz="0 inf 0"', "r.urdf:8: <origin> of joint 'turn': xyz is '0 inf 0'"),
+        ('radius="2"', 'radius="two"', "r.urdf:5: <sphere> of collision shape of link 'base': radius is 'two'"),
+    ],
+)
 def test_a_fault_of_a_urdf_says_its_line_and_what_is_allowed(found: str, wrong: str, fault: str) -> None:
     with pytest.raises(AttributeFault) as caught:
         read_urdf(URDF.replace(found, wrong), "r.urdf")
@@ -95,9 +108,13 @@ def test_an_srdf_is_read_whole() -> None:
     assert math.isnan(position)
 
 
-@pytest.mark.parametrize(("found", "wrong", "fault"), [
-    (' base_link="x"', "", "SRDF:1: <chain> {'tip_link': 'y'} has no attribute 'base_link'; add it"),
-    ('"0.5 "', '"high"', "SRDF:3: a group_state holds a value that is not a number ('high' for joint 'b')")])
+@pytest.mark.parametrize(
+    ("found", "wrong", "fault"),
+    [
+        (' base_link="x"', "", "SRDF:1: <chain> {'tip_link': 'y'} has no attribute 'base_link'; add it"),
+        ('"0.5 "', '"high"', "SRDF:3: a group_state holds a value that is not a number ('high' for joint 'b')"),
+    ],
+)
 def test_a_fault_of_an_srdf_says_its_line(found: str, wrong: str, fault: str) -> None:
     with pytest.raises(XmlError) as caught:
         read_srdf(SRDF.replace(found, wrong))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A DOCTYPE is refused by every reader of descriptions, with file and line, before an entity is expanded."""
+
 from __future__ import annotations
 
 import re
@@ -136,9 +137,24 @@ def _file(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-READERS = (_planning_urdf, _planning_srdf, _control, _plugins, _core_bounds, _core_groups, _core_gripper,
-           _simulated_robot, _simulated_sdf, _simulated_urdf, _world_file, _world_to_scene, _mesh, _commander, _xacro,
-           _included_xacro)
+READERS = (
+    _planning_urdf,
+    _planning_srdf,
+    _control,
+    _plugins,
+    _core_bounds,
+    _core_groups,
+    _core_gripper,
+    _simulated_robot,
+    _simulated_sdf,
+    _simulated_urdf,
+    _world_file,
+    _world_to_scene,
+    _mesh,
+    _commander,
+    _xacro,
+    _included_xacro,
+)
 
 
 @pytest.mark.parametrize("read", READERS, ids=lambda reader: reader.__name__[1:])

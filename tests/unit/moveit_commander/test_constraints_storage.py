@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Constraints by name in an SQLite file, in the layout of MoveIt's database plugin."""
+
 from __future__ import annotations
 
 import sqlite3
@@ -45,10 +46,19 @@ def test_the_file_is_laid_out_as_the_plugin_documents_it(tmp_path: Path) -> None
         assert database.execute("PRAGMA user_version").fetchone() == (10,)
         row = database.execute('SELECT * FROM "T_moveit_constraints@constraints"').fetchone()
         assert row[0] == data.getvalue() and row[1] == 1 and row[3:] == (b"low", b"ur5", b"arm")
-        index = database.execute("SELECT MangledTableName, MessageMD5, WarehouseCollectionName, WarehouseDatabaseName, "
-                                 "MessageDataType FROM WarehouseIndex").fetchall()
-    assert index == [("T_moveit_constraints@constraints", bytes.fromhex(Constraints._md5sum), "constraints",
-                      "moveit_constraints", "moveit_msgs/Constraints")]
+        index = database.execute(
+            "SELECT MangledTableName, MessageMD5, WarehouseCollectionName, WarehouseDatabaseName, "
+            "MessageDataType FROM WarehouseIndex"
+        ).fetchall()
+    assert index == [
+        (
+            "T_moveit_constraints@constraints",
+            bytes.fromhex(Constraints._md5sum),
+            "constraints",
+            "moveit_constraints",
+            "moveit_msgs/Constraints",
+        )
+    ]
 
 
 def test_what_is_no_file_of_constraints_is_refused_with_a_reason(tmp_path: Path) -> None:
@@ -80,8 +90,10 @@ def test_what_cannot_be_saved_leaves_what_was_there(tmp_path: Path) -> None:
     storage = ConstraintsStorage(str(tmp_path / "some.sqlite"))
     storage.add_constraints(constraints("low"))
     with sqlite3.connect(storage.path) as database:
-        database.execute('CREATE TRIGGER full BEFORE INSERT ON "T_moveit_constraints@constraints" '
-                         "BEGIN SELECT RAISE(ABORT, 'disk full'); END")
+        database.execute(
+            'CREATE TRIGGER full BEFORE INSERT ON "T_moveit_constraints@constraints" '
+            "BEGIN SELECT RAISE(ABORT, 'disk full'); END"
+        )
     with pytest.raises(MoveItCommanderException, match="disk full"):
         storage.add_constraints(constraints("low", 0.5))
     assert storage.get_constraints("low") == constraints("low")

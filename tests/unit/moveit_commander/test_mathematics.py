@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rotations, Jacobian, timing and regions of moveit_commander."""
+
 from __future__ import annotations
 
 import math
@@ -49,16 +50,21 @@ def test_lists_and_messages_are_turned_into_each_other() -> None:
     copy = Transform()
     conversions.msg_from_string(copy, conversions.msg_to_string(conversions.list_to_transform(numbers)))
     assert conversions.transform_to_list(copy) == numbers
-    for wrong in (lambda: conversions.list_to_pose([1.0]), lambda: conversions.list_to_transform([1.0]),
-                  lambda: conversions.rpy_from_quaternion([0.0] * 4)):
+    for wrong in (
+        lambda: conversions.list_to_pose([1.0]),
+        lambda: conversions.list_to_transform([1.0]),
+        lambda: conversions.rpy_from_quaternion([0.0] * 4),
+    ):
         with pytest.raises(MoveItCommanderException):
             wrong()
 
 
 def test_the_jacobian_of_a_planar_arm_is_the_textbooks() -> None:
-    chain = [Joint("first", "revolute", "base", "one", axis=(0, 0, 1)),
-             Joint("second", "revolute", "one", "two", xyz=(2.0, 0.0, 0.0), axis=(0, 0, 1)),
-             Joint("slide", "prismatic", "two", "three", axis=(1, 0, 0))]
+    chain = [
+        Joint("first", "revolute", "base", "one", axis=(0, 0, 1)),
+        Joint("second", "revolute", "one", "two", xyz=(2.0, 0.0, 0.0), axis=(0, 0, 1)),
+        Joint("slide", "prismatic", "two", "three", axis=(1, 0, 0)),
+    ]
     a, b = 0.3, 0.5
     matrix = jacobian(chain, {"first": a, "second": b, "slide": 0.7}, (0.3, 0.0, 0.0))
     tip = [2.0 * math.cos(a) + math.cos(a + b), 2.0 * math.sin(a) + math.sin(a + b)]
@@ -93,8 +99,10 @@ def test_a_region_holds_objects_by_all_their_shapes() -> None:
 
 
 def test_a_collision_matrix_stays_symmetric() -> None:
-    matrix = AllowedCollisionMatrix(entry_names=["a", "b"], entry_values=[AllowedCollisionEntry([False, False]),
-                                                                          AllowedCollisionEntry([False, False])])
+    matrix = AllowedCollisionMatrix(
+        entry_names=["a", "b"],
+        entry_values=[AllowedCollisionEntry([False, False]), AllowedCollisionEntry([False, False])],
+    )
     set_default(matrix, "a", True)
     set_default(matrix, "a", False)
     set_allowed(matrix, "new", "b")

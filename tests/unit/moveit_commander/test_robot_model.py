@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot model of moveit_commander, on a small robot written for it."""
+
 from __future__ import annotations
 
 import math
@@ -50,8 +51,11 @@ def test_the_root_link_is_the_planning_frame_below_a_virtual_joint_too() -> None
 
 def test_groups_are_chains_links_and_other_groups(model: RobotModel) -> None:
     arm, hand, both = (model.group(name) for name in ("arm", "hand", "all"))
-    assert arm.is_chain and arm.tip == "flange" and [joint.name for joint in arm.active_joints] == ["a_shoulder",
-                                                                                                    "b_elbow"]
+    assert (
+        arm.is_chain
+        and arm.tip == "flange"
+        and [joint.name for joint in arm.active_joints] == ["a_shoulder", "b_elbow"]
+    )
     assert not hand.is_chain and hand.tip == ""
     assert [joint.name for joint in hand.variables] == ["d_left", "e_right"]
     assert [joint.name for joint in hand.active_joints] == ["d_left"]
@@ -77,8 +81,10 @@ def test_mimic_joints_follow(model: RobotModel) -> None:
 
 def test_mimic_joints_follow_through_others_and_a_fixed_one_follows_none() -> None:
     chain = URDF.replace('<mimic joint="d_left" multiplier="2"', '<mimic joint="a_shoulder" multiplier="2"')
-    chain = chain.replace('<joint name="d_left" type="prismatic">',
-                          '<joint name="d_left" type="prismatic"><mimic joint="e_right" multiplier="3"/>')
+    chain = chain.replace(
+        '<joint name="d_left" type="prismatic">',
+        '<joint name="d_left" type="prismatic"><mimic joint="e_right" multiplier="3"/>',
+    )
     found = RobotModel(chain, SRDF.replace("VIRTUAL", ""))
     assert found.complete({"a_shoulder": 0.5}) == pytest.approx({"a_shoulder": 0.5, "e_right": 1.01, "d_left": 3.03})
     mount = '<joint name="c_mount" type="fixed">'
@@ -95,18 +101,33 @@ def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> N
         group_values(hand, [1, 2, 3])
 
 
-@pytest.mark.parametrize(("urdf", "srdf", "words"), [
-    ("no xml", SRDF, "URDF:1: not an XML document"),
-    (URDF, "no xml", "SRDF:1: not an XML document"),
-    (URDF.replace('<link name="base"/>', '<link name="base"/><link name="alone"/>'), SRDF, "2 links have no parent"),
-    (URDF.replace('lower="0.5"', 'lower="low"'), SRDF, "joint 'a_shoulder'"),
-    (URDF.replace('<mimic joint="d_left"', '<mimic joint="e_right"'), SRDF, "mimics itself through e_right -> e_right"),
-    (URDF.replace('<mimic joint="d_left"', '<mimic joint="knee"'), SRDF, "'knee', which is no joint that moves"),
-    (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),
-    (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "'nowhere' is not a link"),
-    (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="nobody"/></group>'), "'nobody', which is not"),
-    (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="all"/></group>'), "contains itself"),
-])
+@pytest.mark.parametrize(
+    ("urdf", "srdf", "words"),
+    [
+        ("no xml", SRDF, "URDF:1: not an XML document"),
+        (URDF, "no xml", "SRDF:1: not an XML document"),
+        (
+            URDF.replace('<link name="base"/>', '<link name="base"/><link name="alone"/>'),
+            SRDF,
+            "2 links have no parent",
+        ),
+        (URDF.replace('lower="0.5"', 'lower="low"'), SRDF, "joint 'a_shoulder'"),
+        (
+            URDF.replace('<mimic joint="d_left"', '<mimic joint="e_right"'),
+            SRDF,
+            "mimics itself through e_right -> e_right",
+        ),
+        (URDF.replace('<mimic joint="d_left"', '<mimic joint="knee"'), SRDF, "'knee', which is no joint that moves"),
+        (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),
+        (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "'nowhere' is not a link"),
+        (
+            URDF,
+            SRDF.replace('<group name="hand"/></group>', '<group name="nobody"/></group>'),
+            "'nobody', which is not",
+        ),
+        (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="all"/></group>'), "contains itself"),
+    ],
+)
 def test_faulty_descriptions_are_refused_with_a_reason(urdf: str, srdf: str, words: str) -> None:
     with pytest.raises(RobotModelError, match=words):
         RobotModel(urdf, srdf.replace("VIRTUAL", ""))

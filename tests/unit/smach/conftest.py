@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the state fixtures of this folder importable, and undoes what a test did to the library's hooks."""
+
 from __future__ import annotations
 
 import sys

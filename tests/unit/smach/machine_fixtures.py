@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """States that tests put into containers."""
+
 from __future__ import annotations
 
 import threading

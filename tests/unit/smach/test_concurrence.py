@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Concurrences: everything runs at once, the outcome follows the children's, stopping reaches all of them."""
+
 from __future__ import annotations
 
 import threading
@@ -78,8 +79,11 @@ def test_the_child_termination_callback_stops_the_others(answer: bool | list[str
         calls.append(outcomes)
         return answer
 
-    tested = concurrence({"A": Give("success"), "B": stay}, child_termination_cb=on_end,
-                         outcome_map={"good": {"A": "success", "B": "preempted"}})
+    tested = concurrence(
+        {"A": Give("success"), "B": stay},
+        child_termination_cb=on_end,
+        outcome_map={"good": {"A": "success", "B": "preempted"}},
+    )
     assert InThread(tested).end() == "good"
     assert calls[0] == {"A": "success", "B": None}
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sequences run in the order of addition; iterators run one state for each item."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -56,7 +57,11 @@ def test_a_state_without_the_connector_outcome_is_refused() -> None:
 
 def iterator(state: smach.State, items: Any, outcomes: list[str] | None = None, **contained: Any) -> smach.Iterator:
     result = smach.Iterator(
-        outcomes=outcomes or ["finished", "fail"], input_keys=[], output_keys=["seen"], it=items, it_label="item",
+        outcomes=outcomes or ["finished", "fail"],
+        input_keys=[],
+        output_keys=["seen"],
+        it=items,
+        it_label="item",
         exhausted_outcome="finished",
     )
     with result:
@@ -92,8 +97,9 @@ def test_a_break_outcome_ends_the_iteration() -> None:
 
 
 def test_the_outcome_that_ended_it_is_translated() -> None:
-    tested = iterator(Give("fail"), range(9), ["finished", "broken"], break_outcomes=["fail"],
-                      final_outcome_map={"fail": "broken"})
+    tested = iterator(
+        Give("fail"), range(9), ["finished", "broken"], break_outcomes=["fail"], final_outcome_map={"fail": "broken"}
+    )
     assert tested.execute() == "broken"
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """States and functions made into states: their interface and the request to stop."""
+
 from __future__ import annotations
 
 import pytest

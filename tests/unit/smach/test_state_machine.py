@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """State machines: construction, consistency, transitions, userdata, callbacks, stopping."""
+
 from __future__ import annotations
 
 from typing import Any

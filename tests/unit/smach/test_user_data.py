@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Userdata: what a state may read and write, and what it gets."""
+
 from __future__ import annotations
 
 import pytest

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fixtures of the task constructor's tests."""
+
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A small world for tests of the task constructor: a folder of states, the shipped templates, and one valid task."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -37,15 +38,15 @@ class Plan(FrameworkState):
     def execute(self, userdata):
         return self.fail("no way") if self.target == "nowhere" else self.succeed()
 ''',
-    "move": '''
+    "move": """
 from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class Move(FrameworkState):
     def execute(self, userdata):
         return self.succeed()
-''',
-    "use_arm": '''
+""",
+    "use_arm": """
 from modular_framework_core.state_api.framework_state import FrameworkState
 
 
@@ -55,8 +56,8 @@ class UseArm(FrameworkState):
 
     def execute(self, userdata):
         return self.succeed() if userdata.arm_commander.stop() else self.fail("it goes on")
-''',
-    "choose": '''
+""",
+    "choose": """
 from typing import Annotated, Literal
 
 from modular_framework_core.state_api.framework_state import FrameworkState
@@ -68,8 +69,8 @@ class Choose(FrameworkState):
                  message_names: Annotated[list[str] | None, Named("option:message_type")] = None,
                  outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-''',
-    "go": '''
+""",
+    "go": """
 from typing import Annotated
 
 from modular_framework_core.state_api.framework_state import FrameworkState
@@ -83,8 +84,8 @@ class Go(FrameworkState):
                  makes: Annotated[str, Named("plan", made=True)] = "", runs: Annotated[str, Named("plan")] = "",
                  outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-''',
-    "ask": '''
+""",
+    "ask": """
 from typing import Annotated, Any
 
 from modular_framework_core.state_api.framework_state import FrameworkState
@@ -97,8 +98,8 @@ class Ask(FrameworkState):
                  outcome_values: Annotated[dict[str, Any] | None, OutcomeNames()] = None,
                  outcomes=("success", "fail"), input_keys=(), output_keys=(), io_keys=()):
         super().__init__(outcomes, input_keys, output_keys, io_keys)
-''',
-    "recall": '''
+""",
+    "recall": """
 import smach
 
 
@@ -109,8 +110,8 @@ class Recall(smach.State):
     def execute(self, userdata):
         count = userdata.count
         return "success" if count else "fail"
-''',
-    "remember": '''
+""",
+    "remember": """
 import smach
 
 
@@ -123,16 +124,25 @@ class Remember(smach.State):
     def execute(self, userdata):
         userdata.notes = [*(userdata.notes if "notes" in userdata else []), self.options]
         return self.outcomes[0]
-''',
+""",
     "broken_file": "class BrokenFile(:\n",
     "wrong_class": "class Wrongclass:\n    pass\n",
 }
 
 KNOWN = KnownNames(
-    {"pose": frozenset({"above", "below"}), "joint_state": frozenset({"home"}),
-     "posture": frozenset({"open", "closed"}), "group": frozenset({"arm", "hand"})},
-    {"pose": "config/named_poses.yaml", "joint_state": "config/named_joint_states.yaml",
-     "posture": "group 'hand' of robot.srdf", "group": "robot.srdf"})
+    {
+        "pose": frozenset({"above", "below"}),
+        "joint_state": frozenset({"home"}),
+        "posture": frozenset({"open", "closed"}),
+        "group": frozenset({"arm", "hand"}),
+    },
+    {
+        "pose": "config/named_poses.yaml",
+        "joint_state": "config/named_joint_states.yaml",
+        "posture": "group 'hand' of robot.srdf",
+        "group": "robot.srdf",
+    },
+)
 
 GOOD_TASK = """\
 name: tiny

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whatever is in a task file: it is a task, or it is refused with faults; never anything else."""
+
 from __future__ import annotations
 
 import re
@@ -12,7 +13,9 @@ from task_folders import GOOD_TASK, World
 from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor import generator
 
-RICH = GOOD_TASK.replace("states:", "params: {place: home, list: [a, b]}\nstates:") + """\
+RICH = (
+    GOOD_TASK.replace("states:", "params: {place: home, list: [a, b]}\nstates:")
+    + """\
   - C:
       source: concurrent_state_machine
       outcomes: params.list
@@ -22,6 +25,7 @@ RICH = GOOD_TASK.replace("states:", "params: {place: home, list: [a, b]}\nstates
       states:
         - D: {source: plan, target: params.place, io_keys: [x]}
 """
+)
 SIGNS = ("&a ", "*a", "<<: ", "!!int ", "|\n", "? ", "- ", "{", "\x85", "\\", "'")
 PIECES = sorted({*re.findall(r"\w+|\W", RICH), *SIGNS})
 SETTINGS = settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -48,7 +52,7 @@ def test_any_text_is_a_task_or_refused(world: World, text: str) -> None:
 def test_any_change_of_a_task_is_a_task_or_refused(world: World, changes: list[tuple[int, int, str]]) -> None:
     text = RICH
     for start, length, piece in changes:
-        text = text[:start] + piece + text[start + length:]
+        text = text[:start] + piece + text[start + length :]
     check(world, text)
 
 

@@ -3,6 +3,7 @@
 
 Each message says where the fault is, what was found, what is allowed, and what was meant.
 """
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -48,8 +49,11 @@ def test_there_are_a_hundred_of_them_and_more() -> None:
     assert len(FOLDERS) >= 100
 
 
-FOLLOWED_UP = {"yaml_key_twice_and_other_faults", "own_outcomes_do_not_match_transitions",
-               "outcome_misspelt_in_transitions_and_missing"}
+FOLLOWED_UP = {
+    "yaml_key_twice_and_other_faults",
+    "own_outcomes_do_not_match_transitions",
+    "outcome_misspelt_in_transitions_and_missing",
+}
 """Several slips, or one with two true statements: a name that is unknown, and one that is missing."""
 
 
@@ -62,7 +66,8 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(world: World) -> N
 
 
 def test_a_missing_key_is_told_beside_wrong_transitions_and_a_repeated_label_beside_what_is_wrong_below_it(
-        world: World) -> None:
+    world: World,
+) -> None:
     states = "{target: home, source: plan, transitions: {success: dne, fail: gave_up}}"
     text = f"name: t\nsource: state_machine\noutcomes: [done, gave_up]\nstates:\n  - A: {states}\n"
     faults = world.faults(text + "  - B: {source: use_arm, transitions: {success: done, fail: gave_up}}\n")
@@ -82,9 +87,13 @@ states:
   - Bbb: {source: use_arm, transitions: {success: done, fail: gave_up}}
   - C: {source: plan, target: home, transitions: {success: C, fail: C}}
 """)
-    expected = (":3:11: the outcome 'never' is never produced", ":5:44: state 'A' (plan): option 'speed'",
-                ":5:74: state 'A': transition target 'Bb'", ":6:5: state 'Bbb' needs the userdata key",
-                ":7:5: state 'C' is never reached")
+    expected = (
+        ":3:11: the outcome 'never' is never produced",
+        ":5:44: state 'A' (plan): option 'speed'",
+        ":5:74: state 'A': transition target 'Bb'",
+        ":6:5: state 'Bbb' needs the userdata key",
+        ":7:5: state 'C' is never reached",
+    )
     assert len(faults) == len(expected)
     assert all(wanted in fault for fault, wanted in zip(faults, expected, strict=True)), faults
 
@@ -98,10 +107,12 @@ class {{ state_machine.type }}(smach.StateMachine):
 """)
     faults = World(tmp_path, tmp_path).faults(GOOD_TASK.replace("source: state_machine", "source: mine"))
     assert len(faults) == 1
-    for said in ("t.yaml:2:9: 'tiny': the template 'mine' cannot be used",
-                 "mine.template:1: state_machine.states_source",
-                 "mine.template:4: state_machine.parameters is now fields of state_machine",
-                 "mine.template:5: state_machine.components is now state_machine.states, which children.add writes"):
+    for said in (
+        "t.yaml:2:9: 'tiny': the template 'mine' cannot be used",
+        "mine.template:1: state_machine.states_source",
+        "mine.template:4: state_machine.parameters is now fields of state_machine",
+        "mine.template:5: state_machine.components is now state_machine.states, which children.add writes",
+    ):
         assert said in faults[0]
 
 
@@ -156,6 +167,8 @@ class Search(FrameworkState):
 
 
 def test_the_good_tasks_have_no_fault(world: World) -> None:
-    shared = NESTED.replace("outcomes: [done, gave_up]\n      states", "outcomes: [done, gave_up]\n      userdata: "
-                            "self.userdata\n      states")
+    shared = NESTED.replace(
+        "outcomes: [done, gave_up]\n      states",
+        "outcomes: [done, gave_up]\n      userdata: self.userdata\n      states",
+    )
     assert [world.faults(text) for text in (GOOD_TASK, CONCURRENT, shared)] == [[], [], []]

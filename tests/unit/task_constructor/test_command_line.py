@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command state_machine_generator: the original's four arguments, and --check."""
+
 from __future__ import annotations
 
 import json
@@ -10,8 +11,10 @@ from task_folders import GOOD_TASK, TEMPLATES, write_states
 
 from modular_framework_core.task_constructor.pipeline import directories_from, main
 
-ONE_STATE = ("name: t\nsource: framework_state_machine\noutcomes: [done, gave_up]\nstates:\n"
-             "  - A: {%s, transitions: {success: done, fail: gave_up}}\n")
+ONE_STATE = (
+    "name: t\nsource: framework_state_machine\noutcomes: [done, gave_up]\nstates:\n"
+    "  - A: {%s, transitions: {success: done, fail: gave_up}}\n"
+)
 
 
 @pytest.fixture()
@@ -39,9 +42,7 @@ def test_check_writes_nothing(arguments: list[str], capsys: pytest.CaptureFixtur
     assert not Path(arguments[3]).exists()
 
 
-def test_a_faulty_task_gives_1_its_faults_and_no_file(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_faulty_task_gives_1_its_faults_and_no_file(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     Path(arguments[0]).write_text(GOOD_TASK.replace("source: plan", "source: paln"))
     assert main(arguments) == 1
     captured = capsys.readouterr()
@@ -64,7 +65,8 @@ def test_states_of_ones_own_are_found_beside_the_frameworks_and_a_folder_without
     (tmp_path / "open_door.py").write_text(
         "from modular_framework_core.state_api.framework_state import FrameworkState\n\n\n"
         'class OpenDoor(FrameworkState):\n    """Opens the door."""\n\n    def execute(self, userdata):\n'
-        "        return self.succeed()\n")
+        "        return self.succeed()\n"
+    )
     assert main(["--explain", "open_door", str(tmp_path)]) == 0
     assert "Opens the door." in capsys.readouterr().out
     assert main(["--explain", "open_door", "", str(tmp_path)]) == 0
@@ -80,29 +82,45 @@ def test_states_of_ones_own_are_found_beside_the_frameworks_and_a_folder_without
     assert f"states directory {tmp_path}/empty has no state" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("state", "reason"), [
-    ("source: plan, target_state_type: joint_state, target_state_name: stabilty_pose",
-     "did you mean 'stability_pose'?"),
-    ("source: plan, target_state_type: pose, target_state_name: nowhere", "the pose 'nowhere' is unknown"),
-    ("source: plan, group: arn, target_state_type: joint_state, target_state_name: initial_pose",
-     "planning group 'arn' is unknown"),
-    ("source: cartesian_move, pose_name: nowhere", "the pose 'nowhere' is unknown"),
-    ("source: execute_trajectory, trajectory_name: exmple_trajectory", "did you mean 'example_trajectory'?"),
-    ("source: gripper, posture: opened", "the posture 'opened' is unknown; allowed: "),
-    ("source: select, message_type: pose, message_names: [nowhere], output_keys: [selected_pose]",
-     "'nowhere' is unknown"),
-    ("source: select, message_type: grasp", "'grasp' writes the userdata key 'selected_grasp'"),
-    ("source: move, plan_name: to_nowhere", "the plan 'to_nowhere' is unknown; there is none; let a state make it"),
-    ("source: plan, target_state_type: grasp, target_state_name: userdata", "takes the userdata key 'selected_grasp'"),
-    ("source: allow_manipulator_collisions, allow: true, collision_type: object-collision, objects: userdata",
-     "takes the userdata key 'selected_grasp'"),
-    ("source: grasp, grasp_type: grasp, io_keys: [max_torque]",
-     "takes the userdata key 'manipulator_controller_client'"),
-    ("source: log_metric, name_of_metric: a, from_key: force", "takes the userdata key 'force'"),
-    ("source: call_service, service_name: s, request: {data: userdata.force}", "takes the userdata key 'force'"),
-    ("source: call_action, action_name: a, keep: {pose: result}", "writes the userdata key 'pose'"),
-    ("source: wait_for_message, topic_name: t, expect: {data: userdata.force}", "takes the userdata key 'force'"),
-])
+@pytest.mark.parametrize(
+    ("state", "reason"),
+    [
+        (
+            "source: plan, target_state_type: joint_state, target_state_name: stabilty_pose",
+            "did you mean 'stability_pose'?",
+        ),
+        ("source: plan, target_state_type: pose, target_state_name: nowhere", "the pose 'nowhere' is unknown"),
+        (
+            "source: plan, group: arn, target_state_type: joint_state, target_state_name: initial_pose",
+            "planning group 'arn' is unknown",
+        ),
+        ("source: cartesian_move, pose_name: nowhere", "the pose 'nowhere' is unknown"),
+        ("source: execute_trajectory, trajectory_name: exmple_trajectory", "did you mean 'example_trajectory'?"),
+        ("source: gripper, posture: opened", "the posture 'opened' is unknown; allowed: "),
+        (
+            "source: select, message_type: pose, message_names: [nowhere], output_keys: [selected_pose]",
+            "'nowhere' is unknown",
+        ),
+        ("source: select, message_type: grasp", "'grasp' writes the userdata key 'selected_grasp'"),
+        ("source: move, plan_name: to_nowhere", "the plan 'to_nowhere' is unknown; there is none; let a state make it"),
+        (
+            "source: plan, target_state_type: grasp, target_state_name: userdata",
+            "takes the userdata key 'selected_grasp'",
+        ),
+        (
+            "source: allow_manipulator_collisions, allow: true, collision_type: object-collision, objects: userdata",
+            "takes the userdata key 'selected_grasp'",
+        ),
+        (
+            "source: grasp, grasp_type: grasp, io_keys: [max_torque]",
+            "takes the userdata key 'manipulator_controller_client'",
+        ),
+        ("source: log_metric, name_of_metric: a, from_key: force", "takes the userdata key 'force'"),
+        ("source: call_service, service_name: s, request: {data: userdata.force}", "takes the userdata key 'force'"),
+        ("source: call_action, action_name: a, keep: {pose: result}", "writes the userdata key 'pose'"),
+        ("source: wait_for_message, topic_name: t, expect: {data: userdata.force}", "takes the userdata key 'force'"),
+    ],
+)
 def test_names_that_are_nowhere_and_keys_that_are_not_declared_are_found_without_running(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], state: str, reason: str
 ) -> None:
@@ -117,8 +135,10 @@ def test_a_plan_that_another_state_makes_under_another_name_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     script = tmp_path / "t.yaml"
-    plans = ("source: plan, target_state_type: joint_state, target_state_name: stability_pose, "
-             "plan_name: to_stability, transitions: {success: B, fail: gave_up}")
+    plans = (
+        "source: plan, target_state_type: joint_state, target_state_name: stability_pose, "
+        "plan_name: to_stability, transitions: {success: B, fail: gave_up}"
+    )
     moves = "  - B: {source: move, plan_name: %s, transitions: {success: done, fail: gave_up}}\n"
     text = (ONE_STATE % plans).replace(", transitions: {success: done, fail: gave_up}}", "}")
     script.write_text(text + moves % "to_stability")
@@ -151,8 +171,10 @@ def test_a_name_that_a_state_of_ones_own_or_a_service_is_called_with_may_be_made
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     script = tmp_path / "t.yaml"
-    makes = ("  - B: {source: call_service, service_name: my_planner, request: {name: %s}, "
-             "transitions: {success: A, fail: gave_up}}\n")
+    makes = (
+        "  - B: {source: call_service, service_name: my_planner, request: {name: %s}, "
+        "transitions: {success: A, fail: gave_up}}\n"
+    )
     moves = "initial_state: B\n" + ONE_STATE % "source: move, plan_name: homing"
     script.write_text(moves + makes % "homing")
     assert main(["--check", str(script)]) == 0, capsys.readouterr().err
@@ -161,10 +183,13 @@ def test_a_name_that_a_state_of_ones_own_or_a_service_is_called_with_may_be_made
     assert "the plan 'homing' is unknown" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("option", "reason"), [
-    (["--config", "/nowhere"], "configuration folder /nowhere is not a directory"),
-    (["--moveit-config", "no_such_config"], "package 'no_such_config' is not found"),
-])
+@pytest.mark.parametrize(
+    ("option", "reason"),
+    [
+        (["--config", "/nowhere"], "configuration folder /nowhere is not a directory"),
+        (["--moveit-config", "no_such_config"], "package 'no_such_config' is not found"),
+    ],
+)
 def test_a_configuration_that_is_not_there_is_refused_and_not_left_unchecked(
     arguments: list[str], capsys: pytest.CaptureFixture[str], option: list[str], reason: str
 ) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The base of the framework's states: outcomes, reasons, waiting, stopping."""
+
 from __future__ import annotations
 
 import threading
@@ -58,9 +59,7 @@ def test_a_request_to_stop_ends_a_wait_at_once(timeout_s: float | None) -> None:
     assert state.preempt_requested()
 
 
-@pytest.mark.parametrize(
-    ("outcomes", "expected"), [(["a", "b"], "b"), (["a", "preempted", "b"], "preempted")]
-)
+@pytest.mark.parametrize(("outcomes", "expected"), [(["a", "b"], "b"), (["a", "preempted", "b"], "preempted")])
 def test_a_stopped_state_services_the_request_and_can_wait_again(outcomes: list[str], expected: str) -> None:
     state = FrameworkState(outcomes)
     state.request_preempt()
@@ -118,8 +117,12 @@ def test_a_request_to_stop_ends_a_call_that_is_not_answered(whole_task: bool) ->
 
 def test_a_concurrence_that_has_its_outcome_ends_the_calls_of_its_other_states() -> None:
     service = SlowService()
-    machine = smach.Concurrence(["success", "fail"], "fail", child_termination_cb=lambda outcomes: True,
-                                outcome_map={"success": {"QUICK": "done"}})
+    machine = smach.Concurrence(
+        ["success", "fail"],
+        "fail",
+        child_termination_cb=lambda outcomes: True,
+        outcome_map={"success": {"QUICK": "done"}},
+    )
     with machine:
         smach.Concurrence.add("SLOW", Asks(service))
         smach.Concurrence.add("QUICK", smach.CBState(lambda userdata: "done", outcomes=["done"]))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Generated modules: they run, say what the task said, and nothing in a value becomes code."""
+
 from __future__ import annotations
 
 import math
@@ -44,8 +45,10 @@ def test_a_failing_state_takes_the_other_way(world: World) -> None:
 
 
 def test_every_template_can_be_the_root(world: World) -> None:
-    text = "name: both\nsource: concurrent_state_machine\noutcomes: [good, bad]\ndefault_outcome: bad\n" \
-           "outcome_map: {good: {A: success, B: success}}\nstates:\n  - A: {source: move}\n  - B: {source: move}\n"
+    text = (
+        "name: both\nsource: concurrent_state_machine\noutcomes: [good, bad]\ndefault_outcome: bad\n"
+        "outcome_map: {good: {A: success, B: success}}\nstates:\n  - A: {source: move}\n  - B: {source: move}\n"
+    )
     made = machine(world, text)
     assert isinstance(made, smach.Concurrence)
     assert made.execute() == "good"
@@ -59,14 +62,18 @@ def test_a_framework_machine_fills_its_userdata_after_its_states(world: World) -
 
 
 def test_the_default_outcome_of_a_concurrent_machine_is_its_negative_one(world: World) -> None:
-    text = "name: both\nsource: concurrent_state_machine\noutcomes: [good, bad]\noutcome_map: {good: {A: fail}}\n" \
-           "states:\n  - A: {source: move}\n"
+    text = (
+        "name: both\nsource: concurrent_state_machine\noutcomes: [good, bad]\noutcome_map: {good: {A: fail}}\n"
+        "states:\n  - A: {source: move}\n"
+    )
     assert machine(world, text).execute() == "bad"
 
 
 def test_nested_machines_of_one_template_get_classes_of_their_own(world: World) -> None:
-    inner = "      source: state_machine\n      outcomes: [success, fail]\n" \
-            "      states: [{S: {source: plan, target: %s}}]\n"
+    inner = (
+        "      source: state_machine\n      outcomes: [success, fail]\n"
+        "      states: [{S: {source: plan, target: %s}}]\n"
+    )
     states = "  - One:\n" + inner % "home" + "      transitions: {success: Plan}\n  - Plan:\n" + inner % "nowhere"
     made = machine(world, HEADER + states)
     first, second = made.get_children().values()
@@ -76,16 +83,21 @@ def test_nested_machines_of_one_template_get_classes_of_their_own(world: World) 
 
 
 def test_equal_names_of_nested_machines_do_not_overwrite_each_other(world: World) -> None:
-    inner = "      source: state_machine\n      name: same\n      outcomes: [success, fail]\n" \
-            "      states: [{S: {source: plan, target: %s}}]\n"
+    inner = (
+        "      source: state_machine\n      name: same\n      outcomes: [success, fail]\n"
+        "      states: [{S: {source: plan, target: %s}}]\n"
+    )
     text = HEADER + "  - One:\n" + inner % "home" + "      transitions: {success: Two}\n  - Two:\n" + inner % "nowhere"
     assert machine(world, text).execute() == "fail"
 
 
 @pytest.mark.parametrize("template", ["state_machine", "concurrent_state_machine", "framework_state_machine"])
 def test_the_keys_of_a_nested_machine_are_handed_to_its_container(world: World, template: str) -> None:
-    inner = "A: {source: move}" if template.startswith("concurrent") else \
-        "A: {source: move, transitions: {success: success, fail: fail}}"
+    inner = (
+        "A: {source: move}"
+        if template.startswith("concurrent")
+        else "A: {source: move, transitions: {success: success, fail: fail}}"
+    )
     produced = "      outcome_map: {success: {A: success}}\n" if template.startswith("concurrent") else ""
     before = "  - Writes: {source: go, output_keys: [a, b], transitions: {success: M, fail: fail}}\n"
     task = f"{HEADER}{before}  - M:\n      source: {template}\n{produced}      states:\n        - {inner}\n"
@@ -110,11 +122,13 @@ class AddOne(smach.State):
 """)
     world.states = StateCatalogue([world.folder / "own_states"])
     add = "source: add_one, transitions: {success: %s, fail: fail}, remapping: {number: %s, sum: %s}"
-    text = (f"{HEADER.replace('states:', 'initial_state: Begin')}states:\n"
-            f"  - One: {{{add % ('M', 'start', 'middle')}}}\n  - M:\n      source: state_machine\n"
-            "      input_keys: [before]\n      output_keys: [after]\n      remapping: {before: middle, after: end}\n"
-            f"      states:\n        - Two: {{{add % ('success', 'before', 'after')}}}\n"
-            "  - Begin: {source: go, output_keys: [start], transitions: {success: One, fail: fail}}\n")
+    text = (
+        f"{HEADER.replace('states:', 'initial_state: Begin')}states:\n"
+        f"  - One: {{{add % ('M', 'start', 'middle')}}}\n  - M:\n      source: state_machine\n"
+        "      input_keys: [before]\n      output_keys: [after]\n      remapping: {before: middle, after: end}\n"
+        f"      states:\n        - Two: {{{add % ('success', 'before', 'after')}}}\n"
+        "  - Begin: {source: go, output_keys: [start], transitions: {success: One, fail: fail}}\n"
+    )
     made = machine(world, text)
     made.get_children()["Begin"].execute = lambda userdata: setattr(userdata, "start", 40) or "success"
     assert made.execute() == "success"
@@ -122,29 +136,39 @@ class AddOne(smach.State):
 
 
 def test_values_below_anchors_are_written_once_and_merged_where_they_are_referred_to(world: World) -> None:
-    task = world.build("anchors:\n  move: &fast {speed: 0.9, plan_name: p}\n" + HEADER +
-                       "  - A: {<<: *fast, source: plan, target: x, plan_name: q}\n")
+    task = world.build(
+        "anchors:\n  move: &fast {speed: 0.9, plan_name: p}\n"
+        + HEADER
+        + "  - A: {<<: *fast, source: plan, target: x, plan_name: q}\n"
+    )
     assert task.root.states[0].options == {"speed": 0.9, "plan_name": "q", "target": "x"}
 
 
 def test_a_state_that_cannot_be_made_is_told_with_its_place_in_the_task(world: World, tmp_path: Path) -> None:
     (tmp_path / "own_states" / "picky.py").write_text(
         "import smach\n\n\nclass Picky(smach.State):\n    def __init__(self, size):\n"
-        "        raise ValueError(f'size is {size}, allowed is 0 or more')\n")
-    text = f"{HEADER}  - M:\n      source: state_machine\n      states:\n        - A: {{source: move}}\n" \
-           "        - B: {source: picky, size: -1, transitions: {success: success, fail: fail}}\n"
+        "        raise ValueError(f'size is {size}, allowed is 0 or more')\n"
+    )
+    text = (
+        f"{HEADER}  - M:\n      source: state_machine\n      states:\n        - A: {{source: move}}\n"
+        "        - B: {source: picky, size: -1, transitions: {success: success, fail: fail}}\n"
+    )
     world.states = StateCatalogue([tmp_path / "own_states"])
     module = loading.load_module(world.write(text.replace("move}", "move, transitions: {success: B}}")))
     running = TaskRun("t", loading.machine_factory(module), TaskRecorder())
     running.start()
     assert running.wait(30.0)
-    assert running.result().error == \
-        "the state machine could not be made: 't.yaml:9:11': ValueError: size is -1, allowed is 0 or more"
+    assert (
+        running.result().error
+        == "the state machine could not be made: 't.yaml:9:11': ValueError: size is -1, allowed is 0 or more"
+    )
 
 
 def test_a_nested_machine_shares_the_userdata_object_when_asked(world: World) -> None:
-    text = HEADER + "  - In: {source: state_machine, outcomes: [success, fail], userdata: self.userdata, " \
-           "states: [{S: {source: remember, v: 1}}]}\n"
+    text = (
+        HEADER + "  - In: {source: state_machine, outcomes: [success, fail], userdata: self.userdata, "
+        "states: [{S: {source: remember, v: 1}}]}\n"
+    )
     made = machine(world, text)
     assert made.get_children()["In"].userdata is made.userdata
     made.execute()
@@ -258,10 +282,12 @@ def test_own_templates_take_header_keys_of_their_own(tmp_path: Path) -> None:
 
 def test_userdata_keys_are_refused_where_the_template_has_no_use_for_them(tmp_path: Path) -> None:
     (tmp_path / "own.template").write_text(
-        'class {{ state_machine.type }}(smach.StateMachine):\n    def __init__(self):\n'
-        "        super().__init__(outcomes={{ state_machine.outcomes | literal }})\n")
+        "class {{ state_machine.type }}(smach.StateMachine):\n    def __init__(self):\n"
+        "        super().__init__(outcomes={{ state_machine.outcomes | literal }})\n"
+    )
     faults = World(tmp_path, tmp_path).faults(
-        f"{HEADER}  - M:\n      source: own\n      input_keys: [a]\n      states:\n        - A: {{source: move}}\n")
+        f"{HEADER}  - M:\n      source: own\n      input_keys: [a]\n      states:\n        - A: {{source: move}}\n"
+    )
     assert len(faults) == 1 and "'M' (template own): key 'input_keys' is unknown" in faults[0]
 
 

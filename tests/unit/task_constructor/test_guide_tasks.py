@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The examples of the original's guide: those that were right work as printed, the others get the correction."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -22,10 +23,18 @@ STATES = SOURCE / "modular_framework_states" / "src" / "modular_framework_states
 SCRIPTS = SOURCE / "modular_framework_api" / "task_constructor_scripts"
 
 GUIDE_TASKS = Path(__file__).parents[2] / "guide_tasks"
-JUST_PLANNING, WITH_PARAMS, MOCK_TRAJECTORY = ((GUIDE_TASKS / f"{name}.yaml").read_text() for name in (
-    "just_planning", "just_planning_params", "mock_trajectory"))
-IN_ORDER = sorted([*(GUIDE_TASKS / f"{name}.yaml" for name in (
-    "just_planning", "just_planning_params", "mock_trajectory", "nested_initial_pose")), *SCRIPTS.glob("*.yaml")])
+JUST_PLANNING, WITH_PARAMS, MOCK_TRAJECTORY = (
+    (GUIDE_TASKS / f"{name}.yaml").read_text() for name in ("just_planning", "just_planning_params", "mock_trajectory")
+)
+IN_ORDER = sorted(
+    [
+        *(
+            GUIDE_TASKS / f"{name}.yaml"
+            for name in ("just_planning", "just_planning_params", "mock_trajectory", "nested_initial_pose")
+        ),
+        *SCRIPTS.glob("*.yaml"),
+    ]
+)
 
 
 def build(text: str) -> TaskSpec:
@@ -56,23 +65,36 @@ def test_both_ways_to_write_the_first_example_mean_the_same() -> None:
         assert first[key] == second[key]
 
 
-@pytest.mark.parametrize(("script", "told"), [
-    ("just_planning_all_options", (
-        "19:21: state 'PlanMotion': outcome 'success' is unknown; allowed: success_to_plan, fail_to_plan; "
-        "did you mean 'success_to_plan'?",
-        "19:45: state 'PlanMotion': outcome 'fail' is unknown; allowed: success_to_plan, fail_to_plan; "
-        "did you mean 'fail_to_plan'?",
-        "8:5: state 'PlanMotion': no transition for 'success_to_plan', 'fail_to_plan'")),
-    ("mock_trajectory_as_printed", (
-        "14:24: default_outcome 'fail' is unknown; allowed: sucess_plans, fail_plans; did you mean 'fail_plans'?",
-        "16:21: state 'ConcurrentPlan': outcome 'success_plans' is unknown; allowed: sucess_plans, fail_plans; "
-        "did you mean 'sucess_plans'?",
-        "15:37: outcome_map: state 'PlanInitPose' is unknown; allowed: PlanStabPose",
-        "25:11: the label 'PlanStabPose' is given twice; first in line 18")),
-    ("layout", ("15:56: the key '<state_outcome3>' is given twice; first in line 15",)),
-])
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        (
+            "just_planning_all_options",
+            (
+                "19:21: state 'PlanMotion': outcome 'success' is unknown; allowed: success_to_plan, fail_to_plan; "
+                "did you mean 'success_to_plan'?",
+                "19:45: state 'PlanMotion': outcome 'fail' is unknown; allowed: success_to_plan, fail_to_plan; "
+                "did you mean 'fail_to_plan'?",
+                "8:5: state 'PlanMotion': no transition for 'success_to_plan', 'fail_to_plan'",
+            ),
+        ),
+        (
+            "mock_trajectory_as_printed",
+            (
+                "14:24: default_outcome 'fail' is unknown; allowed: sucess_plans, fail_plans; "
+                "did you mean 'fail_plans'?",
+                "16:21: state 'ConcurrentPlan': outcome 'success_plans' is unknown; allowed: sucess_plans, fail_plans; "
+                "did you mean 'sucess_plans'?",
+                "15:37: outcome_map: state 'PlanInitPose' is unknown; allowed: PlanStabPose",
+                "25:11: the label 'PlanStabPose' is given twice; first in line 18",
+            ),
+        ),
+        ("layout", ("15:56: the key '<state_outcome3>' is given twice; first in line 15",)),
+    ],
+)
 def test_what_the_guide_prints_with_slips_is_refused_with_all_corrections_at_once(
-        script: str, told: tuple[str, ...]) -> None:
+    script: str, told: tuple[str, ...]
+) -> None:
     with pytest.raises(TaskFault) as caught:
         check_task(GUIDE_TASKS / f"{script}.yaml", [STATES], [TEMPLATES])
     assert all(f"{script}.yaml:{line}" in str(caught.value) for line in told), str(caught.value)
@@ -143,7 +165,9 @@ def test_the_shipped_tasks_are_in_order(script: Path) -> None:
 
 
 def test_the_shipped_tasks_differ_only_by_what_simulation_needs() -> None:
-    simulated, real = ({state.label for state in check_task(SCRIPTS / f"{name}.yaml", [STATES], [TEMPLATES])
-                        .root.leaf_states()} for name in ("simulation_pick", "pick_and_hold"))
+    simulated, real = (
+        {state.label for state in check_task(SCRIPTS / f"{name}.yaml", [STATES], [TEMPLATES]).root.leaf_states()}
+        for name in ("simulation_pick", "pick_and_hold")
+    )
     assert simulated - real == {"AllowCollisions", "ForbidCollisions", "ForbidCollisionsAgain"}
     assert real <= simulated

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Modules are loaded by path, and the machine in them is found."""
+
 from __future__ import annotations
 
 from pathlib import Path

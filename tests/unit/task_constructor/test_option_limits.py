@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Limits of options are declared once, in a constructor; check, schema and the state itself hold to them."""
+
 from __future__ import annotations
 
 import ast
@@ -60,14 +61,19 @@ class Reach(FrameworkState):
     def execute(self, userdata):
         return self.succeed()
 '''
-TASK = "name: t\nsource: state_machine\noutcomes: [success, fail]\nparams: {{far: 7.0}}\nstates:\n" \
-       "  - A: {{source: reach, {option}: {value}, transitions: {{success: success, fail: fail}}}}\n"
+TASK = (
+    "name: t\nsource: state_machine\noutcomes: [success, fail]\nparams: {{far: 7.0}}\nstates:\n"
+    "  - A: {{source: reach, {option}: {value}, transitions: {{success: success, fail: fail}}}}\n"
+)
 REFUSED = [
     ("speed", "3.0", "a number above 0 and at most 1, found the number 3.0; lower it to 1 or less"),
     ("speed", "0", "a number above 0 and at most 1, found the number 0; raise it above 0"),
     ("speed", ".nan", "a number above 0 and at most 1, found the number nan; write a finite number"),
-    ("speed", "'0.5'",
-     "a number above 0 and at most 1, found the text '0.5'; leave the quotes out to make it a number"),
+    (
+        "speed",
+        "'0.5'",
+        "a number above 0 and at most 1, found the text '0.5'; leave the quotes out to make it a number",
+    ),
     ("speed", "params.far", "a number above 0 and at most 1, found the number 7.0; lower it to 1 or less"),
     ("tries", "0", "a whole number of at least 1 and at most 5, found the number 0; raise it to 1 or more"),
     ("tries", "6", "a whole number of at least 1 and at most 5, found the number 6; lower it to 5 or less"),
@@ -77,8 +83,7 @@ REFUSED = [
     ("rest", "-.inf", "a number of at least 0, found the number -inf; raise it to 0 or more"),
     ("speed", ".inf", "a number above 0 and at most 1, found the number inf; lower it to 1 or less"),
     ("below", ".inf", "a number below -2.5, found the number inf; lower it below -2.5"),
-    ("tries", ".inf",
-     "a whole number of at least 1 and at most 5, found the number inf; lower it to 5 or less"),
+    ("tries", ".inf", "a whole number of at least 1 and at most 5, found the number inf; lower it to 5 or less"),
     ("rest", "1" + 400 * "0", f"a number of at least 0, found the number 1{400 * '0'}; write a finite number"),
     ("below", "-2.5", "a number below -2.5, found the number -2.5; lower it below -2.5"),
     ("timeout", "0", "a number above 0 or nothing (null), found the number 0; raise it above 0"),
@@ -86,10 +91,21 @@ REFUSED = [
     ("spot", "[1, .inf, 2]", "a finite number, found the number inf; write a finite number"),
     ("pair", "[a]", "a list of 2 items, each item a text, found a list of 1"),
 ]
-ALLOWED = [("speed", "1"), ("speed", "1e-9"), ("tries", "5"), ("rest", "0"), ("below", "-2.6"), ("timeout", "null"),
-           ("timeout", "0.1"), ("timeout", ".inf"), ("rest", ".inf"),
-           ("spot", "[1, 2.0, -3]"), ("spot", "[1, params.far, 3]"), ("spot", "null"),
-           ("pair", "[a, b]")]
+ALLOWED = [
+    ("speed", "1"),
+    ("speed", "1e-9"),
+    ("tries", "5"),
+    ("rest", "0"),
+    ("below", "-2.6"),
+    ("timeout", "null"),
+    ("timeout", "0.1"),
+    ("timeout", ".inf"),
+    ("rest", ".inf"),
+    ("spot", "[1, 2.0, -3]"),
+    ("spot", "[1, params.far, 3]"),
+    ("spot", "null"),
+    ("pair", "[a, b]"),
+]
 
 
 @pytest.fixture()
@@ -112,8 +128,9 @@ def check(states: Path, option: str, value: str) -> list[str]:
 
 @pytest.mark.parametrize(("option", "value", "expected"), REFUSED)
 def test_a_value_beyond_the_limits_is_told_before_the_run_with_its_place(
-        states: Path, option: str, value: str, expected: str) -> None:
-    found, = check(states, option, value)
+    states: Path, option: str, value: str, expected: str
+) -> None:
+    (found,) = check(states, option, value)
     assert found.startswith((":6:", ":4:"))
     assert found.endswith(f": state 'A' (reach): option '{option}' must be {expected}")
 
@@ -123,12 +140,17 @@ def test_a_value_within_the_limits_is_in_order(states: Path, option: str, value:
     assert check(states, option, value) == []
 
 
-@pytest.mark.parametrize(("option", "value", "expected"), [
-    ("speed", 3.0, "must be a number above 0 and at most 1, found the number 3.0; lower it to 1 or less"),
-    ("tries", 0, "must be a whole number of at least 1 and at most 5, found the number 0; raise it to 1 or more"),
-    ("spot", np.array([1.0, 2.0]), "found a list of 2"), ("spot", (1.0, 2.0, math.inf), "found the number inf"),
-    ("timeout", -1, "found the number -1"), ("speed", np.float32(1.5), "lower it to 1 or less"),
-])
+@pytest.mark.parametrize(
+    ("option", "value", "expected"),
+    [
+        ("speed", 3.0, "must be a number above 0 and at most 1, found the number 3.0; lower it to 1 or less"),
+        ("tries", 0, "must be a whole number of at least 1 and at most 5, found the number 0; raise it to 1 or more"),
+        ("spot", np.array([1.0, 2.0]), "found a list of 2"),
+        ("spot", (1.0, 2.0, math.inf), "found the number inf"),
+        ("timeout", -1, "found the number -1"),
+        ("speed", np.float32(1.5), "lower it to 1 or less"),
+    ],
+)
 def test_the_same_limits_hold_where_a_state_is_made(states: Path, option: str, value: Any, expected: str) -> None:
     reach = load_state_class(str(states / "reach.py"), "Reach")
     with pytest.raises(ValueError, match=f"^Reach: option '{option}' must be .*") as caught:
@@ -160,26 +182,57 @@ def test_explain_and_schema_tell_the_limits(states: Path, capsys: pytest.Capture
 bounds = st.one_of(st.none(), st.floats(-5.0, 5.0))
 
 
-@given(st.builds(Limits, above=bounds, at_least=bounds, below=bounds, at_most=bounds),
-       st.one_of(st.floats(-6.0, 6.0), st.sampled_from([math.inf, -math.inf])))
+@given(
+    st.builds(Limits, above=bounds, at_least=bounds, below=bounds, at_most=bounds),
+    st.one_of(st.floats(-6.0, 6.0), st.sampled_from([math.inf, -math.inf])),
+)
 def test_schema_and_check_agree_about_every_number(limits: Limits, number: float) -> None:
     assume(limits.bounds() or math.isfinite(number))  # JSON itself knows no infinity
     valid = jsonschema.Draft7Validator(Plain("float", limits).schema()).is_valid(number)
     assert (limits.remedy(number) == "") == valid
 
 
-@pytest.mark.parametrize("text", [
-    "float", "None", "Positive", "Finite | None", "Vector", "Share | Literal['all', 5]", "Sequence[Annotated[int, "
-    "Limits(above=2)] | None]", "dict[str, Positive]", "Annotated[Annotated[float, Limits(above=1)], Limits(below=2)]",
-    "Annotated[float, 'metres']", "Annotated[tuple[str, ...], Length(2)]", "Any", "Path", "list", "str | int | None",
-])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "float",
+        "None",
+        "Positive",
+        "Finite | None",
+        "Vector",
+        "Share | Literal['all', 5]",
+        "Sequence[Annotated[int, Limits(above=2)] | None]",
+        "dict[str, Positive]",
+        "Annotated[Annotated[float, Limits(above=1)], Limits(below=2)]",
+        "Annotated[float, 'metres']",
+        "Annotated[tuple[str, ...], Length(2)]",
+        "Any",
+        "Path",
+        "list",
+        "str | int | None",
+    ],
+)
 def test_an_annotation_means_the_same_as_source_and_evaluated(text: str) -> None:
-    names = {"Positive": "Annotated[float, Limits(above=0.0)]", "Finite": "Annotated[float, Limits()]",
-             "Share": "Annotated[float, Limits(above=0.0, at_most=1.0)]",
-             "Vector": "Annotated[Sequence[Annotated[float, Limits()]], Length(3)]"}
+    names = {
+        "Positive": "Annotated[float, Limits(above=0.0)]",
+        "Finite": "Annotated[float, Limits()]",
+        "Share": "Annotated[float, Limits(above=0.0, at_most=1.0)]",
+        "Vector": "Annotated[Sequence[Annotated[float, Limits()]], Length(3)]",
+    }
     aliases = {name: ast.parse(value, mode="eval").body for name, value in names.items()}
-    known = {"Annotated": Annotated, "Limits": Limits, "Length": Length, "Literal": Literal, "Sequence": Sequence,
-             "Positive": Positive, "Finite": Finite, "Share": Share, "Vector": Vector, "Any": Any, "Path": Path}
+    known = {
+        "Annotated": Annotated,
+        "Limits": Limits,
+        "Length": Length,
+        "Literal": Literal,
+        "Sequence": Sequence,
+        "Positive": Positive,
+        "Finite": Finite,
+        "Share": Share,
+        "Vector": Vector,
+        "Any": Any,
+        "Path": Path,
+    }
     assert from_annotation(ast.parse(text, mode="eval").body, aliases) == from_hint(eval(text, known))
 
 

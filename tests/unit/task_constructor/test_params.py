@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """params: who sees them, what hides what, and where a reference may stand."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -28,9 +29,12 @@ def nested(params: str, body: str) -> str:
 
 
 def test_a_machines_params_are_seen_by_all_its_descendants(world: World) -> None:
-    body = nested("{}", "        - Deep:\n            source: concurrent_state_machine\n            "
-                  "outcomes: [success, fail]\n            outcome_map: {success: {A: success}}\n            states:\n"
-                  "              - A: {source: plan, target: params.place}\n")
+    body = nested(
+        "{}",
+        "        - Deep:\n            source: concurrent_state_machine\n            "
+        "outcomes: [success, fail]\n            outcome_map: {success: {A: success}}\n            states:\n"
+        "              - A: {source: plan, target: params.place}\n",
+    )
     assert states(world, root("{place: home}", body))["A"].options == {"target": "home"}
 
 
@@ -93,7 +97,9 @@ def test_params_may_refer_to_outer_params(world: World) -> None:
 
 
 def test_anchors_and_merge_keys_of_yaml_work(world: World) -> None:
-    body = "  - A: &a {source: plan, target: home, speed: 0.1, transitions: {success: B}}\n" \
-           "  - B: {<<: *a, speed: 0.2, transitions: {success: success}}\n"
+    body = (
+        "  - A: &a {source: plan, target: home, speed: 0.1, transitions: {success: B}}\n"
+        "  - B: {<<: *a, speed: 0.2, transitions: {success: success}}\n"
+    )
     found: dict[str, Any] = states(world, root("{}", body))
     assert found["B"].options == {"target": "home", "speed": 0.2}

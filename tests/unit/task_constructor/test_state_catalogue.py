@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """States are found in folders and read without being run."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -44,8 +45,11 @@ def test_a_state_without_constructor_has_that_of_its_base(tmp_path: Path) -> Non
 
 
 CALLS = {
-    "smach.State.__init__(self, outcomes=['a', 'b'], input_keys=['x'], output_keys=('y',))":
-        (("a", "b"), ("x",), ("y",)),
+    "smach.State.__init__(self, outcomes=['a', 'b'], input_keys=['x'], output_keys=('y',))": (
+        ("a", "b"),
+        ("x",),
+        ("y",),
+    ),
     "smach.State.__init__(self, ['a', 'b'], ['x'])": (("a", "b"), ("x",), ()),
     "super().__init__(outcomes, input_keys=NAMES)": (("success", "fail"), ("named",), ()),
     "super().__init__(list(outcomes), input_keys + ['more'])": (("success", "fail"), None, ()),
@@ -56,8 +60,10 @@ CALLS = {
 
 @pytest.mark.parametrize("call", CALLS)
 def test_what_a_constructor_declares_itself_is_known(tmp_path: Path, call: str) -> None:
-    text = (f"NAMES = ['named']\nclass Plan(smach.State):\n    def __init__(self, outcomes=('success', 'fail')):\n"
-            f"        {call}\n")
+    text = (
+        f"NAMES = ['named']\nclass Plan(smach.State):\n    def __init__(self, outcomes=('success', 'fail')):\n"
+        f"        {call}\n"
+    )
     source = catalogue(tmp_path, plan=text).get("plan")
     assert tuple(source.default_names(key) for key in ("outcomes", "input_keys", "output_keys")) == CALLS[call]
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Running a task: its result, what is recorded of its states, and stopping."""
+
 from __future__ import annotations
 
 import threading

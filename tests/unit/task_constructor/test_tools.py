@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the task constructor offers beside generating: drawings, pages about states, a schema for editors, a cache."""
+
 from __future__ import annotations
 
 import json
@@ -26,8 +27,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def graph_of(task: Any) -> dict[str, Any]:
     """Return what Graphviz itself reads in a drawing."""
-    done = subprocess.run(["dot", "-Tjson"], input=task_graph.draw(task).source, capture_output=True, text=True,
-                          check=True, timeout=60)
+    done = subprocess.run(
+        ["dot", "-Tjson"], input=task_graph.draw(task).source, capture_output=True, text=True, check=True, timeout=60
+    )
     return dict(json.loads(done.stdout))
 
 
@@ -55,15 +57,22 @@ def test_a_drawing_that_cannot_be_written_is_told_with_its_path(world: World, tm
 
 def test_arrows_are_the_transitions_of_the_task(world: World) -> None:
     assert arrows(graph_of(world.build(GOOD_TASK))) == {
-        ("tiny|start", "", "tiny/A"), ("tiny/A", "success", "tiny/B"), ("tiny/A", "fail", "tiny|gave_up"),
-        ("tiny/B", "success", "tiny|done"), ("tiny/B", "fail", "tiny|gave_up"),
+        ("tiny|start", "", "tiny/A"),
+        ("tiny/A", "success", "tiny/B"),
+        ("tiny/A", "fail", "tiny|gave_up"),
+        ("tiny/B", "success", "tiny|done"),
+        ("tiny/B", "fail", "tiny|gave_up"),
     }
 
 
 def test_the_drawing_begins_with_the_initial_state_and_the_schema_takes_all_keys(
-        world: World, validator: jsonschema.Draft7Validator) -> None:
-    text = GOOD_TASK.replace("states:", "initial_state: B\nstates:").replace("success: done", "success: A").replace(
-        "success: B", "success: done")
+    world: World, validator: jsonschema.Draft7Validator
+) -> None:
+    text = (
+        GOOD_TASK.replace("states:", "initial_state: B\nstates:")
+        .replace("success: done", "success: A")
+        .replace("success: B", "success: done")
+    )
     assert ("tiny|start", "", "tiny/B") in arrows(graph_of(world.build(text)))
     task = """name: t
 source: framework_state_machine
@@ -119,7 +128,8 @@ def explanation(capsys: pytest.CaptureFixture[str], name: str, templates: str = 
 
 @pytest.mark.parametrize(("name", "meant"), [("plann", "plan"), ("state_machin", "state_machine")])
 def test_an_unknown_name_is_answered_by_all_names_and_the_nearest(
-        capsys: pytest.CaptureFixture[str], name: str, meant: str) -> None:
+    capsys: pytest.CaptureFixture[str], name: str, meant: str
+) -> None:
     assert main(["--explain", name, "", str(STATES), str(TEMPLATES)]) == 1
     message = capsys.readouterr().err
     assert f"'{name}' is no state and no template; states: allow_manipulator_collisions, " in message
@@ -141,9 +151,12 @@ def test_a_template_is_explained_by_its_keys_and_userdata(capsys: pytest.Capture
 
 
 def test_a_template_of_ones_own_is_explained_with_the_keys_it_reads(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "timed.template").write_text("class {{ state_machine.type }}(smach.StateMachine):\n"
-                                             '    """Ends\n    in time."""\n    limit = {{ options.time_limit }}\n')
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "timed.template").write_text(
+        "class {{ state_machine.type }}(smach.StateMachine):\n"
+        '    """Ends\n    in time."""\n    limit = {{ options.time_limit }}\n'
+    )
     (tmp_path / "bare.template").write_text("class {{ state_machine.type }}(smach.StateMachine): pass\n")
     page = explanation(capsys, "timed", f"{tmp_path}:{TEMPLATES}")
     assert f"timed: template, {tmp_path}/timed.template\n\nEnds\nin time.\n\n" in page
@@ -157,8 +170,11 @@ def test_what_the_schema_allows_in_a_header_is_what_is_explained(capsys: pytest.
     schema = task_schema(StateCatalogue([STATES]), templates)
     for root, name in zip(schema["oneOf"], templates.names(), strict=True):
         nested = schema["definitions"][f"machine_{name}"]
-        explained = [line.split(":")[0].strip() for line in explanation(capsys, name).splitlines()
-                     if line.startswith("  ") and line[2] != " " and ": " in line]
+        explained = [
+            line.split(":")[0].strip()
+            for line in explanation(capsys, name).splitlines()
+            if line.startswith("  ") and line[2] != " " and ": " in line
+        ]
         assert set(explained) == set(root["properties"]) | set(nested["properties"])
 
 
@@ -174,15 +190,18 @@ def test_tasks_that_are_in_order_fit_the_schema(validator: jsonschema.Draft7Vali
     assert list(validator.iter_errors(yaml.safe_load(text))) == []
 
 
-@pytest.mark.parametrize(("old", "new"), [
-    ("source: state_plan", "source: state_pln"),
-    ("target_state_type: joint_state", "target_state_type: joint_sate"),
-    ("plan_name: current_to_stability", "plan_nmae: current_to_stability"),
-    ("plan_name: current_to_stability", "plan_name: 5"),
-    ("outcomes: [sm_successful, sm_failed]", "outcomes: sm_successful"),
-    ("source: framework_state_machine", "source: framework_machine"),
-    ("node_name:", "nodename:"),
-])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("source: state_plan", "source: state_pln"),
+        ("target_state_type: joint_state", "target_state_type: joint_sate"),
+        ("plan_name: current_to_stability", "plan_nmae: current_to_stability"),
+        ("plan_name: current_to_stability", "plan_name: 5"),
+        ("outcomes: [sm_successful, sm_failed]", "outcomes: sm_successful"),
+        ("source: framework_state_machine", "source: framework_machine"),
+        ("node_name:", "nodename:"),
+    ],
+)
 def test_slips_do_not_fit_the_schema(validator: jsonschema.Draft7Validator, old: str, new: str) -> None:
     assert old in JUST_PLANNING
     assert not validator.is_valid(yaml.safe_load(JUST_PLANNING.replace(old, new)))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters of a framework state machine: all that is wrong with them is told at once, with the file."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -57,9 +58,16 @@ def test_a_task_without_manipulator_needs_neither() -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("planner_name", ""), ("planner_name", 3), ("robot_speed_factor", 0.0), ("robot_speed_factor", 1.5),
-        ("robot_speed_factor", "fast"), ("number_plan_attempt", 0), ("number_plan_attempt", True),
-        ("planning_max_time", -1), ("max_torque", -1.0), ("arm_group_name", ["arm"]),
+        ("planner_name", ""),
+        ("planner_name", 3),
+        ("robot_speed_factor", 0.0),
+        ("robot_speed_factor", 1.5),
+        ("robot_speed_factor", "fast"),
+        ("number_plan_attempt", 0),
+        ("number_plan_attempt", True),
+        ("planning_max_time", -1),
+        ("max_torque", -1.0),
+        ("arm_group_name", ["arm"]),
     ],
 )
 def test_a_wrong_value_is_told_with_what_is_allowed(name: str, value: Any) -> None:

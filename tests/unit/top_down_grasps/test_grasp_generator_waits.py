@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The grasp generator waits for what comes late by the clock of ROS, and says what it waited for when it gives up."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -65,9 +66,16 @@ def watched(monkeypatch):
             clock.now += period_s
 
         monkeypatch.setattr(node, "read_settings", lambda: SimpleNamespace(scene_timeout_s=LIMIT_S, name_prefix=""))
-        monkeypatch.setattr(node, "rospy", SimpleNamespace(
-            get_time=lambda: clock.now, is_shutdown=lambda: not generator.looks, loginfo_throttle=lambda *_: None,
-            rostime=SimpleNamespace(wallsleep=sleep)))
+        monkeypatch.setattr(
+            node,
+            "rospy",
+            SimpleNamespace(
+                get_time=lambda: clock.now,
+                is_shutdown=lambda: not generator.looks,
+                loginfo_throttle=lambda *_: None,
+                rostime=SimpleNamespace(wallsleep=sleep),
+            ),
+        )
         generator.watch()
         return generator.signals
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """No part of the hand but the pads touches what is grasped; distances are those of Coal, a library of its own."""
+
 from __future__ import annotations
 
 import math
@@ -42,8 +43,9 @@ PARALLEL_JAWS = """<robot name="jaws">
   <link name="tool"/>
   <joint name="tool_mount" type="fixed"><parent link="housing"/><child link="tool"/><origin xyz="0 0 0.115"/></joint>
 </robot>"""
-EZGRIPPER_XACRO = (Path(__file__).parents[3] / "src" / "robots" / "ur5_ezgripper_robot" / "urdf" /
-                   "ur5_with_ezgripper.urdf.xacro")
+EZGRIPPER_XACRO = (
+    Path(__file__).parents[3] / "src" / "robots" / "ur5_ezgripper_robot" / "urdf" / "ur5_with_ezgripper.urdf.xacro"
+)
 
 
 def ezgripper() -> str:
@@ -67,14 +69,20 @@ class Thing:
 
 def cylinder(diameter: float, height: float) -> Thing:
     place = np.array([0.1, 0.5, height / 2])
-    return Thing(surface_points.cylinder(height, diameter / 2).moved(np.eye(3), place),
-                 coal.Cylinder(diameter / 2, height), pinocchio.SE3(np.eye(3), place))
+    return Thing(
+        surface_points.cylinder(height, diameter / 2).moved(np.eye(3), place),
+        coal.Cylinder(diameter / 2, height),
+        pinocchio.SE3(np.eye(3), place),
+    )
 
 
 def block(width: float, depth: float, height: float) -> Thing:
     turn, place = rotation_about(UP, 0.4), np.array([0.1, 0.5, height / 2])
-    return Thing(surface_points.box((width, depth, height)).moved(turn, place), coal.Box(width, depth, height),
-                 pinocchio.SE3(turn, place))
+    return Thing(
+        surface_points.box((width, depth, height)).moved(turn, place),
+        coal.Box(width, depth, height),
+        pinocchio.SE3(turn, place),
+    )
 
 
 class Hand:
@@ -111,9 +119,16 @@ class Hand:
     @staticmethod
     def _distance(shape: Any, pose: Any, thing: Thing) -> float:
         result = coal.DistanceResult()
-        return float(coal.distance(shape, coal.Transform3s(pose.rotation, pose.translation), thing.shape,
-                                   coal.Transform3s(thing.pose.rotation, thing.pose.translation),
-                                   coal.DistanceRequest(), result))
+        return float(
+            coal.distance(
+                shape,
+                coal.Transform3s(pose.rotation, pose.translation),
+                thing.shape,
+                coal.Transform3s(thing.pose.rotation, thing.pose.translation),
+                coal.DistanceRequest(),
+                result,
+            )
+        )
 
 
 def _straight(angle: float) -> float:
@@ -121,18 +136,26 @@ def _straight(angle: float) -> float:
 
 
 FOLLOWERS: dict[str, dict[str, Callable[[float], float]]] = {
-    "ezgripper_knuckle_palm_L1_1": {"ezgripper_knuckle_palm_L1_2": float, "ezgripper_knuckle_L1_L2_1": _straight,
-                                    "ezgripper_knuckle_L1_L2_2": _straight},
-    "slide": {"slide_2": float}}
+    "ezgripper_knuckle_palm_L1_1": {
+        "ezgripper_knuckle_palm_L1_2": float,
+        "ezgripper_knuckle_L1_L2_1": _straight,
+        "ezgripper_knuckle_L1_L2_2": _straight,
+    },
+    "slide": {"slide_2": float},
+}
 GRIPPERS = [(ezgripper, "ezgripper_knuckle_palm_L1_1", "eg_manipulator"), (jaws, "slide", "tool")]
-THINGS = {"can": cylinder(0.066, 0.115), "tube": cylinder(0.04, 0.14), "thick": cylinder(0.07, 0.16),
-          "block": block(0.05, 0.06, 0.13), "cube": block(0.05, 0.05, 0.05)}
+THINGS = {
+    "can": cylinder(0.066, 0.115),
+    "tube": cylinder(0.04, 0.14),
+    "thick": cylinder(0.07, 0.16),
+    "block": block(0.05, 0.06, 0.13),
+    "cube": block(0.05, 0.05, 0.05),
+}
 
 
 @pytest.mark.parametrize("name", THINGS)
 @pytest.mark.parametrize(("urdf", "joint", "frame"), GRIPPERS, ids=["ezgripper", "jaws"])
-def test_nothing_but_the_pads_comes_near_the_object(urdf: Callable[[], str], joint: str, frame: str,
-                                                    name: str) -> None:
+def test_nothing_but_the_pads_comes_near_the_object(urdf: Callable[[], str], joint: str, frame: str, name: str) -> None:
     thing, settings, text = THINGS[name], TopDownSettings(), urdf()
     gripper, hand = measure_gripper(text, frame, joint), Hand(text, joint, frame)
     grasps = top_down_grasps(thing.surface, 0.0, gripper, settings)
@@ -150,17 +173,28 @@ def test_nothing_but_the_pads_comes_near_the_object(urdf: Callable[[], str], joi
 def test_a_mesh_counts_like_the_shape_it_draws(tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     trimesh.creation.cylinder(0.05, 0.06, sections=24).export(tmp_path / "housing.stl")
-    drawn = measure_gripper(PARALLEL_JAWS.format(housing=f'mesh filename="file://{tmp_path}/housing.stl"'), "tool",
-                            "slide")
+    drawn = measure_gripper(
+        PARALLEL_JAWS.format(housing=f'mesh filename="file://{tmp_path}/housing.stl"'), "tool", "slide"
+    )
     named = measure_gripper(jaws(), "tool", "slide")
     thing = cylinder(0.04, 0.2)
-    for mesh_grasp, grasp in zip(top_down_grasps(thing.surface, 0.0, drawn, TopDownSettings()),
-                                 top_down_grasps(thing.surface, 0.0, named, TopDownSettings()), strict=True):
+    for mesh_grasp, grasp in zip(
+        top_down_grasps(thing.surface, 0.0, drawn, TopDownSettings()),
+        top_down_grasps(thing.surface, 0.0, named, TopDownSettings()),
+        strict=True,
+    ):
         assert mesh_grasp.position == pytest.approx(grasp.position, abs=1e-4)
 
 
-@pytest.mark.parametrize("housing", ["plane", 'mesh filename="package://moon/housing.stl"', 'box size="0.1 0 0.1"',
-                                     'cylinder radius="nan" length="0.1"'])
+@pytest.mark.parametrize(
+    "housing",
+    [
+        "plane",
+        'mesh filename="package://moon/housing.stl"',
+        'box size="0.1 0 0.1"',
+        'cylinder radius="nan" length="0.1"',
+    ],
+)
 def test_a_shape_that_cannot_be_used_is_refused_with_its_link(housing: str) -> None:
     with pytest.raises(GripperGeometryError, match="collision shape of link 'housing'"):
         measure_gripper(PARALLEL_JAWS.format(housing=housing), "tool", "slide")

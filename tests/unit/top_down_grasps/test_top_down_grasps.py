@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Grasps from above: they fit the hand, keep off the support, and the best ones are where one would grasp."""
+
 from __future__ import annotations
 
 import math
@@ -70,8 +71,9 @@ def test_a_robot_without_such_a_gripper_is_refused(urdf: str, link: str, joint: 
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.02, 0.09), st.floats(0.02, 0.09), st.floats(0.03, 0.15), st.floats(0, math.pi), st.booleans())
-def test_every_grasp_fits_the_hand_and_keeps_off_the_table(gripper: GripperGeometry, width: float, depth: float,
-                                                           height: float, yaw: float, round_: bool) -> None:
+def test_every_grasp_fits_the_hand_and_keeps_off_the_table(
+    gripper: GripperGeometry, width: float, depth: float, height: float, yaw: float, round_: bool
+) -> None:
     shape = surface_points.cylinder(height, width / 2) if round_ else surface_points.box((width, depth, height))
     surface = on_table(shape, 0.05, 0.5, yaw)
     for grasp in top_down_grasps(surface, TABLE, gripper, SETTINGS):
@@ -82,8 +84,9 @@ def test_every_grasp_fits_the_hand_and_keeps_off_the_table(gripper: GripperGeome
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, 1.2, -0.7])
-def test_the_best_grasp_of_a_box_closes_across_its_narrow_side_over_its_centre(gripper: GripperGeometry,
-                                                                                yaw: float) -> None:
+def test_the_best_grasp_of_a_box_closes_across_its_narrow_side_over_its_centre(
+    gripper: GripperGeometry, yaw: float
+) -> None:
     grasps = top_down_grasps(on_table(surface_points.box((0.04, 0.07, 0.12)), 0.05, 0.5, yaw), TABLE, gripper, SETTINGS)
     best = grasps[0]
     assert best.width == pytest.approx(0.04, abs=1e-6)
@@ -156,8 +159,14 @@ def pose(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> SimpleNamespace:
 
 
 def collision_object(primitives: list[SimpleNamespace]) -> SimpleNamespace:
-    return SimpleNamespace(id="box__link", pose=pose(1.0, 2.0, 3.0), primitives=primitives,
-                           primitive_poses=[pose(0.0, 0.0, 0.1)] * len(primitives), meshes=[], mesh_poses=[])
+    return SimpleNamespace(
+        id="box__link",
+        pose=pose(1.0, 2.0, 3.0),
+        primitives=primitives,
+        primitive_poses=[pose(0.0, 0.0, 0.1)] * len(primitives),
+        meshes=[],
+        mesh_poses=[],
+    )
 
 
 def test_a_collision_object_is_placed_by_its_own_pose_and_that_of_its_parts() -> None:

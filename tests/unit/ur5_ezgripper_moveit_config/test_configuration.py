@@ -25,8 +25,18 @@ def config(package: Path, name: str):
 
 @pytest.fixture(scope="module")
 def parameters() -> dict:
-    result = subprocess.run(["roslaunch", "--dump-params", "ur5_ezgripper_moveit_config", "move_group.launch",
-                             "load_robot_description:=true"], capture_output=True, text=True, timeout=60)
+    result = subprocess.run(
+        [
+            "roslaunch",
+            "--dump-params",
+            "ur5_ezgripper_moveit_config",
+            "move_group.launch",
+            "load_robot_description:=true",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert result.returncode == 0, result.stderr
     return yaml.safe_load(result.stdout)
 
@@ -74,8 +84,10 @@ def test_controllers_are_those_of_the_robot_package_with_the_same_joints(package
     assert listed["arm_trajectory_controller"]["joints"] == loaded["arm_trajectory_controller"]["joints"] == ARM
     assert listed["ezgripper_controller"]["joints"] == [loaded["ezgripper_controller"]["joint"]] == [KNUCKLE]
     kinds = {name: (entry["type"], entry["action_ns"]) for name, entry in listed.items()}
-    assert kinds == {"arm_trajectory_controller": ("FollowJointTrajectory", "follow_joint_trajectory"),
-                     "ezgripper_controller": ("GripperCommand", "gripper_cmd")}
+    assert kinds == {
+        "arm_trajectory_controller": ("FollowJointTrajectory", "follow_joint_trajectory"),
+        "ezgripper_controller": ("GripperCommand", "gripper_cmd"),
+    }
 
 
 @pytest.mark.parametrize("group", ["arm", "arm_and_manipulator"])
@@ -83,7 +95,7 @@ def test_a_group_plans_with_rrtconnect_unless_told_otherwise(package: Path, grou
     planning = config(package, "ompl_planning.yaml")
     assert planning[group]["default_planner_config"] == "RRTConnect"
     assert set(planning[group]["planner_configs"]) == set(planning["planner_configs"])
-    extent = math.sqrt(5 * (4 * math.pi)**2 + (2 * math.pi)**2)  # the elbow turns once, the other joints twice
+    extent = math.sqrt(5 * (4 * math.pi) ** 2 + (2 * math.pi) ** 2)  # the elbow turns once, the other joints twice
     assert 0 < planning[group]["longest_valid_segment_fraction"] * extent <= 0.05
 
 
@@ -109,7 +121,9 @@ def test_move_group_finds_its_parameters_in_the_noetic_layout(parameters: dict) 
     assert parameters[execution + "allowed_start_tolerance"] == 0.01
     assert parameters[execution + "allowed_execution_duration_scaling"] == 1.2
     assert [entry["name"] for entry in parameters["/move_group/controller_list"]] == [
-        "arm_trajectory_controller", "ezgripper_controller"]
+        "arm_trajectory_controller",
+        "ezgripper_controller",
+    ]
     assert parameters["/move_group/sensors"] == []
 
 
@@ -144,7 +158,9 @@ def test_rviz_shows_robot_frames_scene_and_motion_with_its_own_displays(package:
     available = {element.get("name") for element in plugins.iter("class")}
     assert {display["Class"] for display in view["Displays"]} <= available
     assert {display.get("Marker Topic") for display in view["Displays"]} >= {
-        "/move_group/planning_scene_markers", "/move_group/display_planned_path_markers"}
+        "/move_group/planning_scene_markers",
+        "/move_group/display_planned_path_markers",
+    }
     assert view["Global Options"]["Fixed Frame"] == "world"
 
 

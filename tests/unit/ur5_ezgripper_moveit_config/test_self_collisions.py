@@ -50,8 +50,10 @@ class Checker:
 
 
 def disabled_pairs(srdf: ElementTree.Element) -> dict[frozenset[str], str]:
-    return {frozenset((str(e.get("link1")), str(e.get("link2")))): str(e.get("reason"))
-            for e in srdf.iter("disable_collisions")}
+    return {
+        frozenset((str(e.get("link1")), str(e.get("link2")))): str(e.get("reason"))
+        for e in srdf.iter("disable_collisions")
+    }
 
 
 def random_states(model: pinocchio.Model, count: int) -> np.ndarray:
@@ -88,14 +90,18 @@ def test_no_pair_that_can_collide_is_left_out(urdf, model, srdf) -> None:
 def scene_checker(urdf, model, srdf) -> Checker:
     folder = Path(rospkg.RosPack().get_path("modular_framework_description"))
     checker = Checker(urdf, model)
-    makers = {"box": lambda size: coal.Box(*size), "cylinder": lambda size: coal.Cylinder(*size),
-              "plane": lambda size: coal.Halfspace(np.array(size), 0.0)}
+    makers = {
+        "box": lambda size: coal.Box(*size),
+        "cylinder": lambda size: coal.Cylinder(*size),
+        "plane": lambda size: coal.Halfspace(np.array(size), 0.0),
+    }
     for link in read_world(folder / "worlds" / "ur5_setup.world", folder / "models"):
         for index, shape in enumerate(link.shapes):
             pose = pinocchio.SE3(shape.pose)
             name = f"{link.object_id}_{index}"
             checker.geometry.addGeometryObject(
-                pinocchio.GeometryObject(name, 0, 0, pose, makers[shape.kind](shape.size)))
+                pinocchio.GeometryObject(name, 0, 0, pose, makers[shape.kind](shape.size))
+            )
             checker.names.append(link.object_id)
     checker.add_pairs(set(disabled_pairs(srdf)))
     return checker

@@ -18,8 +18,14 @@ from xacro_rospkg import expand
 ARM = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 KNUCKLE = "ezgripper_knuckle_palm_L1_1"
 # The manufacturer's Denavit-Hartenberg table of the UR5: a [m], alpha [rad], d [m].
-DH = [(0, math.pi / 2, 0.089159), (-0.425, 0, 0), (-0.39225, 0, 0),
-      (0, math.pi / 2, 0.10915), (0, -math.pi / 2, 0.09465), (0, 0, 0.0823)]
+DH = [
+    (0, math.pi / 2, 0.089159),
+    (-0.425, 0, 0),
+    (-0.39225, 0, 0),
+    (0, math.pi / 2, 0.10915),
+    (0, -math.pi / 2, 0.09465),
+    (0, 0, 0.0823),
+]
 
 
 def placement(model: pinocchio.Model, state: np.ndarray, frame: str) -> pinocchio.SE3:
@@ -34,8 +40,9 @@ def flange_by_table(angles: np.ndarray) -> np.ndarray:
     pose = np.eye(4)
     for angle, (a, alpha, d) in zip(angles, DH, strict=True):
         ca, sa, ct, st = math.cos(alpha), math.sin(alpha), math.cos(angle), math.sin(angle)
-        pose = pose @ np.array([[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st],
-                                [0, sa, ca, d], [0, 0, 0, 1]])
+        pose = pose @ np.array(
+            [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
+        )
     return pose
 
 
@@ -54,8 +61,20 @@ def test_joints_and_links_have_the_documented_names(urdf: str) -> None:
     robot = URDF.from_xml_string(urdf)
     assert robot.name == "ur5_with_ezgripper"
     assert [joint.name for joint in robot.joints if joint.type == "revolute" and joint.mimic is None] == [*ARM, KNUCKLE]
-    expected = {"world", "base_link", "base", "shoulder_link", "upper_arm_link", "forearm_link", "wrist_1_link",
-                "wrist_2_link", "wrist_3_link", "ee_link", "tool0", "eg_manipulator"}
+    expected = {
+        "world",
+        "base_link",
+        "base",
+        "shoulder_link",
+        "upper_arm_link",
+        "forearm_link",
+        "wrist_1_link",
+        "wrist_2_link",
+        "wrist_3_link",
+        "ee_link",
+        "tool0",
+        "eg_manipulator",
+    }
     links = {link.name for link in robot.links}
     assert expected <= links
     assert all("ezgripper" in name for name in links - expected)
@@ -63,8 +82,10 @@ def test_joints_and_links_have_the_documented_names(urdf: str) -> None:
 
 def test_arguments_place_the_base_in_the_world() -> None:
     folder = rospkg.RosPack().get_path("ur5_ezgripper_robot")
-    text = expand(f"{folder}/urdf/ur5_with_ezgripper.urdf.xacro",
-                  {"initial_x": "1", "initial_y": "2", "initial_z": "3", "initial_yaw": str(math.pi / 2)})
+    text = expand(
+        f"{folder}/urdf/ur5_with_ezgripper.urdf.xacro",
+        {"initial_x": "1", "initial_y": "2", "initial_z": "3", "initial_yaw": str(math.pi / 2)},
+    )
     base = placement(pinocchio.buildModelFromXML(text, mimic=True), np.zeros(7), "base_link")
     assert np.allclose(base.translation, [1, 2, 3])
     assert np.allclose(base.rotation @ [1, 0, 0], [0, 1, 0])
@@ -145,8 +166,10 @@ def test_pybullet_loads_the_stated_masses(urdf_with_paths: str, tmp_path: os.Pat
         file.write(urdf_with_paths)
     client = pybullet.connect(pybullet.DIRECT)
     body = pybullet.loadURDF(path, useFixedBase=True, flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
-    total = sum(pybullet.getDynamicsInfo(body, joint, physicsClientId=client)[0]
-                for joint in range(pybullet.getNumJoints(body, physicsClientId=client)))
+    total = sum(
+        pybullet.getDynamicsInfo(body, joint, physicsClientId=client)[0]
+        for joint in range(pybullet.getNumJoints(body, physicsClientId=client))
+    )
     pybullet.disconnect(client)
     links = URDF.from_xml_string(urdf_with_paths).links
     assert total == pytest.approx(sum(link.inertial.mass for link in links if link.inertial), rel=1e-6)
@@ -167,9 +190,11 @@ def test_the_arm_has_the_same_controllers_when_the_gripper_has_none() -> None:
 def test_the_controller_file_drives_the_joints_that_have_transmissions() -> None:
     controllers = controllers_of("ur5_ezgripper_controller_simulation.yaml")
     types = {name: values["type"] for name, values in controllers.items()}
-    assert types == {"joint_state_controller": "joint_state_controller/JointStateController",
-                     "arm_trajectory_controller": "position_controllers/JointTrajectoryController",
-                     "ezgripper_controller": "position_controllers/GripperActionController"}
+    assert types == {
+        "joint_state_controller": "joint_state_controller/JointStateController",
+        "arm_trajectory_controller": "position_controllers/JointTrajectoryController",
+        "ezgripper_controller": "position_controllers/GripperActionController",
+    }
     arm = controllers["arm_trajectory_controller"]
     assert arm["joints"] == ARM
     assert set(arm["constraints"]) == {"goal_time", "stopped_velocity_tolerance", *ARM}

@@ -39,7 +39,8 @@ def test_the_gripper_opens_wider_than_twelve_centimetres_and_closes_without_over
 def test_pads_stay_parallel_in_free_motion(model: pinocchio.Model, angle: float) -> None:
     for finger in (1, 2):
         along = in_grasp_frame(model, angle, finger, TIP_IN_PHALANX) - in_grasp_frame(
-            model, angle, finger, np.array([0.0, 0.0, -0.011]))
+            model, angle, finger, np.array([0.0, 0.0, -0.011])
+        )
         assert np.allclose(along, [0, 0, 0.0574], atol=1e-6)
 
 

@@ -71,8 +71,12 @@ def test_the_command_fails_clearly_on_an_unknown_package(tmp_path: Path) -> None
 
 
 def test_launch_files_find_the_command_under_the_package() -> None:
-    result = subprocess.run(["roslaunch", "--dump-params", "ur5_ezgripper_robot", "ur5_upload.launch"],
-                            capture_output=True, text=True, timeout=60)
+    result = subprocess.run(
+        ["roslaunch", "--dump-params", "ur5_ezgripper_robot", "ur5_upload.launch"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert result.returncode == 0
     assert "ur5_with_ezgripper" in result.stdout
 

@@ -24,31 +24,90 @@ _MUG = (
 )
 
 GRASPABLE = (
-    Body("cube", "A wooden cube with edges of 50 mm.", 0.10,
-         (Part("box", (0.05, 0.05, 0.05)),), colour=(0.85, 0.55, 0.20)),
-    Body("wood_block", "An upright wooden block, 50 mm square and 100 mm high.", 0.18,
-         (Part("box", (0.05, 0.05, 0.10)),), colour=(0.70, 0.45, 0.22)),
-    Body("tea_box", "A carton of 40 x 70 x 120 mm.", 0.15,
-         (Part("box", (0.04, 0.07, 0.12)),), friction=0.7, colour=(0.20, 0.55, 0.30)),
-    Body("can", "A full can, 66 mm in diameter and 115 mm high.", 0.35,
-         (Part("cylinder", (0.033, 0.115)),), friction=0.7, colour=(0.75, 0.12, 0.12)),
-    Body("tube", "An upright tube, 40 mm in diameter and 140 mm high.", 0.12,
-         (Part("cylinder", (0.02, 0.14)),), colour=(0.15, 0.35, 0.75)),
-    Body("ball", "A rubber ball of 64 mm.", 0.08,
-         (Part("sphere", (0.032,)),), friction=1.0, rolling_friction=0.001, colour=(0.90, 0.85, 0.15)),
-    Body("l_bracket", "An L-shaped bracket, 30 mm wide: not convex.", 0.14, _BRACKET,
-         colour=(0.55, 0.57, 0.60), mesh_name="l_bracket.stl"),
-    Body("mug", "A hollow mug of 72 mm with a handle: not convex.", 0.25, _MUG,
-         colour=(0.90, 0.90, 0.88), mesh_name="mug.stl"),
+    Body(
+        "cube",
+        "A wooden cube with edges of 50 mm.",
+        0.10,
+        (Part("box", (0.05, 0.05, 0.05)),),
+        colour=(0.85, 0.55, 0.20),
+    ),
+    Body(
+        "wood_block",
+        "An upright wooden block, 50 mm square and 100 mm high.",
+        0.18,
+        (Part("box", (0.05, 0.05, 0.10)),),
+        colour=(0.70, 0.45, 0.22),
+    ),
+    Body(
+        "tea_box",
+        "A carton of 40 x 70 x 120 mm.",
+        0.15,
+        (Part("box", (0.04, 0.07, 0.12)),),
+        friction=0.7,
+        colour=(0.20, 0.55, 0.30),
+    ),
+    Body(
+        "can",
+        "A full can, 66 mm in diameter and 115 mm high.",
+        0.35,
+        (Part("cylinder", (0.033, 0.115)),),
+        friction=0.7,
+        colour=(0.75, 0.12, 0.12),
+    ),
+    Body(
+        "tube",
+        "An upright tube, 40 mm in diameter and 140 mm high.",
+        0.12,
+        (Part("cylinder", (0.02, 0.14)),),
+        colour=(0.15, 0.35, 0.75),
+    ),
+    Body(
+        "ball",
+        "A rubber ball of 64 mm.",
+        0.08,
+        (Part("sphere", (0.032,)),),
+        friction=1.0,
+        rolling_friction=0.001,
+        colour=(0.90, 0.85, 0.15),
+    ),
+    Body(
+        "l_bracket",
+        "An L-shaped bracket, 30 mm wide: not convex.",
+        0.14,
+        _BRACKET,
+        colour=(0.55, 0.57, 0.60),
+        mesh_name="l_bracket.stl",
+    ),
+    Body(
+        "mug",
+        "A hollow mug of 72 mm with a handle: not convex.",
+        0.25,
+        _MUG,
+        colour=(0.90, 0.90, 0.88),
+        mesh_name="mug.stl",
+    ),
 )
 
 FURNITURE = (
-    Body("table", "A table of 1.2 x 0.8 m; its surface is 0.84 m above the floor.", 0.0, (
-        Part("box", (1.2, 0.8, _TABLE_TOP), (0.0, 0.0, _TABLE_HEIGHT - _TABLE_TOP / 2.0)),
-        *(Part("box", (0.05, 0.05, _TABLE_HEIGHT - _TABLE_TOP), (x, y, (_TABLE_HEIGHT - _TABLE_TOP) / 2.0))
-          for x in (-0.56, 0.56) for y in (-0.36, 0.36)),
-    ), colour=(0.80, 0.74, 0.64)),
-    Body("robot_pedestal", "The stand of the arm, 0.85 m high: its top stays 7 mm clear of the arm's base.", 0.0, (
-        Part("box", (0.24, 0.24, 0.85), (0.0, 0.0, 0.425)),
-    ), colour=(0.30, 0.31, 0.33)),
+    Body(
+        "table",
+        "A table of 1.2 x 0.8 m; its surface is 0.84 m above the floor.",
+        0.0,
+        (
+            Part("box", (1.2, 0.8, _TABLE_TOP), (0.0, 0.0, _TABLE_HEIGHT - _TABLE_TOP / 2.0)),
+            *(
+                Part("box", (0.05, 0.05, _TABLE_HEIGHT - _TABLE_TOP), (x, y, (_TABLE_HEIGHT - _TABLE_TOP) / 2.0))
+                for x in (-0.56, 0.56)
+                for y in (-0.36, 0.36)
+            ),
+        ),
+        colour=(0.80, 0.74, 0.64),
+    ),
+    Body(
+        "robot_pedestal",
+        "The stand of the arm, 0.85 m high: its top stays 7 mm clear of the arm's base.",
+        0.0,
+        (Part("box", (0.24, 0.24, 0.85), (0.0, 0.0, 0.425)),),
+        colour=(0.30, 0.31, 0.33),
+    ),
 )

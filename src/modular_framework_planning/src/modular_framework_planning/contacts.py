@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Bodies that touch: what collision checks return, errors carry and messages report."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gives every failure of the planner one type that carries a result code and a reason a person can act on."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence

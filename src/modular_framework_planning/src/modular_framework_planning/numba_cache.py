@@ -4,6 +4,7 @@
 The folder is below the user's cache folder, never in the source tree, and is named after the contents of every module
 with compiled loops: numba does not notice that a function which it inlined from another module has changed.
 """
+
 from __future__ import annotations
 
 import hashlib

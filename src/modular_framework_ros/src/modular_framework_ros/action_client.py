@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A simple action client that does not lose the answer of a quick server."""
+
 from __future__ import annotations
 
 import threading

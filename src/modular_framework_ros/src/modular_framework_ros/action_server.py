@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An action server whose clients learn of the end of every goal, also of one that ends at once."""
+
 from __future__ import annotations
 
 import threading

@@ -3,6 +3,7 @@
 
 All limits are wall time: a simulation that is paused or has died stops the clock of ROS, and every wait on it.
 """
+
 from __future__ import annotations
 
 import threading
@@ -57,11 +58,14 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
             return
         except rospy.ROSException as error:
             if rospy.is_shutdown():
-                raise CallError(f"service '{proxy.resolved_name}' was not advertised before this node was shut down"
-                                ) from error
+                raise CallError(
+                    f"service '{proxy.resolved_name}' was not advertised before this node was shut down"
+                ) from error
             if time.monotonic() >= end:
-                raise CallError(f"service '{proxy.resolved_name}' was not advertised within {timeout_s:.1f} s; "
-                                "start the node that offers it") from error
+                raise CallError(
+                    f"service '{proxy.resolved_name}' was not advertised within {timeout_s:.1f} s; "
+                    "start the node that offers it"
+                ) from error
 
 
 def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> Any:
@@ -121,8 +125,9 @@ def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: 
         raise CallError(f"{what} was not there within {timeout_s:.1f} s; start the node that offers it")
 
 
-def wait_for_result(client: actionlib.SimpleActionClient, timeout_s: float,
-                    stop_requested: Callable[[], bool] = stop_requested) -> int:
+def wait_for_result(
+    client: actionlib.SimpleActionClient, timeout_s: float, stop_requested: Callable[[], bool] = stop_requested
+) -> int:
     """Waits for the end of a goal; cancels it when asked to stop or out of time.
 
     Args:

@@ -4,6 +4,7 @@
 `NodeHandle` is the small part of a ROS node handle they need. `MappingNodeHandle` serves it from a plain mapping
 (tests, programs without a master); the ROS edge has one that asks the parameter server.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Begins a node so that a launch that ends meanwhile does not print where its import was interrupted."""
+
 from __future__ import annotations
 
 import importlib

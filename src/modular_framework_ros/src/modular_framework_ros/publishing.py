@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes from threads that are still at work while the node goes down, without an error nobody can use."""
+
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets settings be adjusted while a node runs, by dynamic_reconfigure, without the code its generator makes."""
+
 from __future__ import annotations
 
 import math
@@ -40,8 +41,15 @@ class _Server(Server):
         for name, present in self.type.defaults.items():
             present = self.config.get(name, present)
             if not math.isfinite(config[name]):
-                rospy.logerr("%s%s: got %s; allowed is %s to %s; %s stays", rospy.resolve_name(self.ns) + "/", name,
-                             config[name], self.type.min[name], self.type.max[name], present)
+                rospy.logerr(
+                    "%s%s: got %s; allowed is %s to %s; %s stays",
+                    rospy.resolve_name(self.ns) + "/",
+                    name,
+                    config[name],
+                    self.type.min[name],
+                    self.type.max[name],
+                    present,
+                )
                 config[name] = present
         super()._clamp(config)
 
@@ -80,12 +88,14 @@ class Reconfiguration:
 
     def _adjust(self, config: Any, _level: int) -> Any:
         present = getattr(self._holder, self._attribute)
-        changed = {item.name: config[item.name] for item in self._table
-                   if getattr(present, item.name) != config[item.name]}
+        changed = {
+            item.name: config[item.name] for item in self._table if getattr(present, item.name) != config[item.name]
+        }
         if changed:
             setattr(self._holder, self._attribute, replace(present, **changed))
-            rospy.loginfo("%s: %s", self._namespace, ", ".join(f"{name} is now {value}"
-                                                               for name, value in changed.items()))
+            rospy.loginfo(
+                "%s: %s", self._namespace, ", ".join(f"{name} is now {value}" for name, value in changed.items())
+            )
         return config
 
 
@@ -96,12 +106,39 @@ def described(parameters: Sequence[Adjustable], defaults: dict[str, Any]) -> Sim
     """
     lowest = {item.name: min(item.lowest, defaults[item.name]) for item in parameters}
     highest = {item.name: max(item.highest, defaults[item.name]) for item in parameters}
-    entries = [{"name": item.name, "type": item.kind, "level": 1, "description": item.description,
-                "default": defaults[item.name], "min": lowest[item.name], "max": highest[item.name],
-                "edit_method": ""}
-               for item in parameters]
-    group = {"name": "Default", "type": "", "state": True, "cstate": "true", "id": 0, "parent": 0, "parentname": "",
-             "class": "DEFAULT", "parentclass": "", "field": "default", "upper": "DEFAULT", "lower": "groups",
-             "parameters": entries, "groups": []}
-    return SimpleNamespace(config_description=group, defaults=dict(defaults),
-                           min=lowest, max=highest, level={item.name: 1 for item in parameters})
+    entries = [
+        {
+            "name": item.name,
+            "type": item.kind,
+            "level": 1,
+            "description": item.description,
+            "default": defaults[item.name],
+            "min": lowest[item.name],
+            "max": highest[item.name],
+            "edit_method": "",
+        }
+        for item in parameters
+    ]
+    group = {
+        "name": "Default",
+        "type": "",
+        "state": True,
+        "cstate": "true",
+        "id": 0,
+        "parent": 0,
+        "parentname": "",
+        "class": "DEFAULT",
+        "parentclass": "",
+        "field": "default",
+        "upper": "DEFAULT",
+        "lower": "groups",
+        "parameters": entries,
+        "groups": [],
+    }
+    return SimpleNamespace(
+        config_description=group,
+        defaults=dict(defaults),
+        min=lowest,
+        max=highest,
+        level={item.name: 1 for item in parameters},
+    )

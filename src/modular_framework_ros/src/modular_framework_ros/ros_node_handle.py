@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node handle that asks the ROS parameter server."""
+
 from __future__ import annotations
 
 from typing import Any

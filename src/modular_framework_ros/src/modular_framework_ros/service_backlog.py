@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets many clients call a node's services at the same moment."""
+
 from __future__ import annotations
 
 import rospy

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a node that handles its signals itself finish its work before ROS goes down, also after `rosnode kill`."""
+
 from __future__ import annotations
 
 import threading

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Waits for what other nodes bring at the start: as long as a slow machine needs, and never without saying for what."""
+
 from __future__ import annotations
 
 import math
@@ -20,8 +21,11 @@ def start_timeout() -> float:
     """Returns the longest wait of a node for another one at the start [s]: the parameter ``/start_timeout``."""
     value = rospy.get_param(START_TIMEOUT_PARAMETER, DEFAULT_START_TIMEOUT_S)
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
-        rospy.logerr_throttle(REPORT_PERIOD_S, f"Parameter '{START_TIMEOUT_PARAMETER}' is {value!r}, allowed are "
-                                               f"seconds above 0; {DEFAULT_START_TIMEOUT_S:g} is used instead.")
+        rospy.logerr_throttle(
+            REPORT_PERIOD_S,
+            f"Parameter '{START_TIMEOUT_PARAMETER}' is {value!r}, allowed are "
+            f"seconds above 0; {DEFAULT_START_TIMEOUT_S:g} is used instead.",
+        )
         return DEFAULT_START_TIMEOUT_S
     return float(value)
 
@@ -44,12 +48,14 @@ class WaitReport:
         if now_s - self._said_s >= REPORT_PERIOD_S:
             self._said_s = now_s
             what = self._what if isinstance(self._what, str) else self._what()
-            rospy.logwarn("still waiting for %s after %.0f s (of %.0f s at most)", what, now_s - self._begun_s,
-                          self._timeout_s)
+            rospy.logwarn(
+                "still waiting for %s after %.0f s (of %.0f s at most)", what, now_s - self._begun_s, self._timeout_s
+            )
 
 
-def wait_for_start(condition: Callable[[], bool], what: str | Callable[[], str],
-                   timeout_s: float | None = None) -> bool:
+def wait_for_start(
+    condition: Callable[[], bool], what: str | Callable[[], str], timeout_s: float | None = None
+) -> bool:
     """Waits for a condition that another node brings about [wall time].
 
     Args:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tells calls that wait whether the state that made them has been asked to stop, however deep below it they are."""
+
 from __future__ import annotations
 
 import threading

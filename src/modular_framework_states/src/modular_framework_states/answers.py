@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The outcome and the userdata that a task derives from the answer of a service or action."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -58,8 +59,9 @@ class AnswerRules:
             for name, wanted in self.outcome_values.items():
                 if value in (wanted if isinstance(wanted, list | tuple) else [wanted]):
                     return name
-            raise FillingError(f"{self.outcome_field} is {value!r}, which is none of outcome_values: "
-                               f"{dict(self.outcome_values)}")
+            raise FillingError(
+                f"{self.outcome_field} is {value!r}, which is none of outcome_values: {dict(self.outcome_values)}"
+            )
         match value:
             case bool():
                 return outcomes[0 if value else -1]
@@ -67,9 +69,11 @@ class AnswerRules:
                 return outcomes[value]
             case str() if value in outcomes:
                 return value
-        raise FillingError(f"{self.outcome_field} is {value!r}, which stands for no outcome; allowed are a truth "
-                           f"value, 0 to {len(outcomes) - 1}, or one of {', '.join(outcomes)}; say others in "
-                           "outcome_values")
+        raise FillingError(
+            f"{self.outcome_field} is {value!r}, which stands for no outcome; allowed are a truth "
+            f"value, 0 to {len(outcomes) - 1}, or one of {', '.join(outcomes)}; say others in "
+            "outcome_values"
+        )
 
     def kept(self, answer: Any) -> dict[str, Any]:
         """Returns the userdata that fields of the answer give.
@@ -80,8 +84,15 @@ class AnswerRules:
         return {key: field_at(answer, path) for key, path in self.keep.items()}
 
 
-def end_with(state: FrameworkState, rules: AnswerRules, answer: Any, userdata: Any, what: str, reason_given: str,
-             aborted: bool = False) -> str:
+def end_with(
+    state: FrameworkState,
+    rules: AnswerRules,
+    answer: Any,
+    userdata: Any,
+    what: str,
+    reason_given: str,
+    aborted: bool = False,
+) -> str:
     """Ends a state by an answer: keeps its fields and returns the outcome.
 
     Args:

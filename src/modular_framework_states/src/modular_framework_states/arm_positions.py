@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs a motion of the arm to its end, and compares where the joints are with where they should be."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -39,5 +40,7 @@ def run_to_end(state: FrameworkState, commander: Any, motion: Any, goal_toleranc
     if state.preempt_requested():
         return state.stopped()
     joint, distance = worst_joint(commander.positions_of(last), last)
-    return state.fail(f"{what} was executed, but joint '{joint}' is {distance:.4f} away from its last point, allowed "
-                      f"is {goal_tolerance}")
+    return state.fail(
+        f"{what} was executed, but joint '{joint}' is {distance:.4f} away from its last point, allowed "
+        f"is {goal_tolerance}"
+    )

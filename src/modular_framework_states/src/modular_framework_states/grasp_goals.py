@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sends stages of a grasp to the manipulator's action server and understands the answer, on behalf of the states."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -11,8 +12,11 @@ from modular_framework_ros.calls import CallError, wait_for_action, wait_for_res
 Stage = Literal["pregrasp", "grasp", "postgrasp"]
 SERVER_TIMEOUT_S = 10.0
 SUCCEEDED = 3
-_NUMBERS = {"pregrasp": GraspCommand.PRE_GRASP_STATE, "grasp": GraspCommand.GRASP_STATE,
-            "postgrasp": GraspCommand.POST_GRASP_STATE}
+_NUMBERS = {
+    "pregrasp": GraspCommand.PRE_GRASP_STATE,
+    "grasp": GraspCommand.GRASP_STATE,
+    "postgrasp": GraspCommand.POST_GRASP_STATE,
+}
 _RESULT_FLAGS = {"pregrasp": "pregrasped", "grasp": "grasped", "postgrasp": "postgrasped"}
 
 
@@ -20,8 +24,9 @@ class GraspGoalError(RuntimeError):
     """A stage was not reached; the text says why."""
 
 
-def send(client: Any, stage: Stage, grasp: Any, max_torque: float, timeout_s: float,
-         stop_requested: Callable[[], bool]) -> None:
+def send(
+    client: Any, stage: Stage, grasp: Any, max_torque: float, timeout_s: float, stop_requested: Callable[[], bool]
+) -> None:
     """Sends a stage of a grasp and waits for its end; returns when the server says that the stage was reached.
 
     Args:

@@ -8,6 +8,7 @@ solution of the stage before it, and that of the first stage is the one nearest 
 stage walks the whole chain, with the fingers as they are when the arm gets there, and therefore finds what the others
 found.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -64,7 +65,7 @@ def stage_joints(commander: IkCommander, grasp: Any, stage: str) -> dict[str, fl
     """
     seed = commander.current_joints() | arrival_fingers(grasp)
     joints: dict[str, float] = {}
-    for earlier in GRASP_STAGES[:GRASP_STAGES.index(stage) + 1]:
+    for earlier in GRASP_STAGES[: GRASP_STAGES.index(stage) + 1]:
         joints = near_joints(commander, grasp, earlier, seed)
         seed = seed | joints
     return joints
@@ -78,6 +79,7 @@ def near_joints(commander: IkCommander, grasp: Any, stage: str, seed: Mapping[st
     """
     result = commander.solve_ik(stage_pose(grasp, stage), seed)
     if not result:
-        raise StageError(f"the {stage} pose of grasp '{grasp.grasp_id or 'without id'}' has no joint solution: "
-                         f"{result.reason}")
+        raise StageError(
+            f"the {stage} pose of grasp '{grasp.grasp_id or 'without id'}' has no joint solution: {result.reason}"
+        )
     return dict(result.joints)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads from the planning scene what the manipulator holds, and detaches it."""
+
 from __future__ import annotations
 
 import rospy
@@ -35,8 +36,11 @@ def held_objects() -> dict[str, str]:
     wait_for_service(proxy, SERVICE_TIMEOUT_S)
     components = PlanningSceneComponents(components=PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
     scene = call_service(proxy, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S).scene
-    return {item.object.id: item.link_name for item in scene.robot_state.attached_collision_objects
-            if prefix in item.link_name}
+    return {
+        item.object.id: item.link_name
+        for item in scene.robot_state.attached_collision_objects
+        if prefix in item.link_name
+    }
 
 
 def detach(objects: dict[str, str]) -> None:
@@ -54,7 +58,9 @@ def detach(objects: dict[str, str]) -> None:
     scene.robot_state.is_diff = True
     scene.robot_state.attached_collision_objects = [
         AttachedCollisionObject(link_name=link, object=CollisionObject(id=name, operation=CollisionObject.REMOVE))
-        for name, link in objects.items()]
+        for name, link in objects.items()
+    ]
     if not call_service(proxy, ApplyPlanningSceneRequest(scene=scene), SERVICE_TIMEOUT_S).success:
-        raise CallError(f"service '{proxy.resolved_name}' did not detach {', '.join(objects)}; its node logged the "
-                        "reason")
+        raise CallError(
+            f"service '{proxy.resolved_name}' did not detach {', '.join(objects)}; its node logged the reason"
+        )

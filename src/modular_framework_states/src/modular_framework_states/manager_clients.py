@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fetches messages from the managers and stores plans there, on behalf of the states."""
+
 from __future__ import annotations
 
 from typing import Any, Literal, get_args
@@ -45,8 +46,11 @@ def fetch(kind: str, name: str) -> Any:
     service, service_type, name_field, message_field = _GET[kind]
     answer = _call(service, service_type, service_type._request_class(**{name_field: name}))
     if not answer.success:
-        what = f"no {kind.replace('_', ' ')} named '{name}' is stored" if name else (
-            f"no anonymous {kind.replace('_', ' ')} is left")
+        what = (
+            f"no {kind.replace('_', ' ')} named '{name}' is stored"
+            if name
+            else (f"no anonymous {kind.replace('_', ' ')} is left")
+        )
         raise ManagerError(f"{what} (service '{rospy.resolve_name(service)}')")
     return getattr(answer, message_field)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the named postures of the manipulator, and makes the grasp messages that command them."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -17,16 +18,21 @@ def posture_positions(posture: str) -> dict[str, float]:
     Raises:
         RobotModelError: The robot is not loaded, or the group has no such state.
     """
-    values = {name: str(rospy.get_param(name, "")) for name in
-              ("manipulator_group_name", "robot_description", "robot_description_semantic")}
+    values = {
+        name: str(rospy.get_param(name, ""))
+        for name in ("manipulator_group_name", "robot_description", "robot_description_semantic")
+    }
     missing = [rospy.resolve_name(name) for name, value in values.items() if not value]
     if missing:
         raise RobotModelError(f"the parameters {', '.join(missing)} are not set; load the robot first")
-    group = read_group(values["robot_description"], values["robot_description_semantic"],
-                       values["manipulator_group_name"])
+    group = read_group(
+        values["robot_description"], values["robot_description_semantic"], values["manipulator_group_name"]
+    )
     if posture not in group.states:
-        raise RobotModelError(f"group '{group.name}' has no state '{posture}'; it has "
-                              f"{', '.join(group.states) or 'none'}; name one of them, or add it to the SRDF")
+        raise RobotModelError(
+            f"group '{group.name}' has no state '{posture}'; it has "
+            f"{', '.join(group.states) or 'none'}; name one of them, or add it to the SRDF"
+        )
     return group.states[posture]
 
 

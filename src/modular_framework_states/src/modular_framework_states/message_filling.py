@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fills messages of any type with values from a task and its userdata, and compares their fields with such values."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -49,8 +50,10 @@ def with_userdata(value: Any, userdata: Any) -> Any:
         case str() if value.startswith(USERDATA_PREFIX):
             key, _, path = value.removeprefix(USERDATA_PREFIX).partition(".")
             if userdata is None or key not in userdata:
-                raise FillingError(f"'{value}' refers to userdata that is not there; let a state before write '{key}', "
-                                   "and name it in input_keys")
+                raise FillingError(
+                    f"'{value}' refers to userdata that is not there; let a state before write '{key}', "
+                    "and name it in input_keys"
+                )
             if userdata[key] is None:
                 raise FillingError(f"'{value}': userdata '{key}' is empty; let a state before write it")
             return plain(field_at(userdata[key], path))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a COLLADA file says besides its vertices: the length of its unit, and how many triangles its scene shows."""
+
 from __future__ import annotations
 
 from modular_framework_urdf import xml_text

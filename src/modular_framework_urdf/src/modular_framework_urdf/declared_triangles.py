@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Counts the triangles a mesh file declares, by the plain structure of its format and without the reader it checks."""
+
 from __future__ import annotations
 
 import re
@@ -9,9 +10,24 @@ FORMATS = ("stl", "obj", "ply")
 _STL_HEADER, _STL_TRIANGLE = 84, 50  # [bytes]
 _FACE = re.compile(rb"^[ \t]*f[ \t]+(.*)$", re.MULTILINE)
 _OBJ_LINE = re.compile(rb"^[ \t]*(v|f)[ \t]+(.*)$", re.MULTILINE)
-_PLY_SIZES = {"char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
-              "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f",
-              "double": "d", "float64": "d"}
+_PLY_SIZES = {
+    "char": "b",
+    "int8": "b",
+    "uchar": "B",
+    "uint8": "B",
+    "short": "h",
+    "int16": "h",
+    "ushort": "H",
+    "uint16": "H",
+    "int": "i",
+    "int32": "i",
+    "uint": "I",
+    "uint32": "I",
+    "float": "f",
+    "float32": "f",
+    "double": "d",
+    "float64": "d",
+}
 
 
 def declared_triangles(kind: str, content: bytes) -> int:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The largest length a description or a scene may give."""
+
 from __future__ import annotations
 
 LARGEST_LENGTH_M = 1.0e4

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the file that a description names as a mesh: package://, file:// or a path."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

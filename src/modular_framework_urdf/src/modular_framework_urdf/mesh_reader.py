@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads collision meshes: one reader for planning, simulation and clients, so that all of them see the same body."""
+
 from __future__ import annotations
 
 import io
@@ -61,16 +62,22 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
         raise MeshError(path, f"scale is {list(scale)}", "allowed: three finite numbers, none of them 0")
     declared, unit, vertices, triangles = _read(path)
     if len(triangles) != declared:
-        raise MeshError(path, f"{len(triangles)} of the {declared} triangles it declares could be read",
-                        "all are needed; export the mesh again as plain triangles")
+        raise MeshError(
+            path,
+            f"{len(triangles)} of the {declared} triangles it declares could be read",
+            "all are needed; export the mesh again as plain triangles",
+        )
     if declared == 0:
         raise MeshError(path, "holds no triangle", "at least one is needed; give a triangle mesh")
     if not np.isfinite(vertices).all():
         raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; mend the file")
     vertices, triangles = _merged(vertices * (unit * factors), triangles)
     if np.abs(vertices).max() > LARGEST_LENGTH_M:
-        raise MeshError(path, f"a vertex is {np.abs(vertices).max():.3g} m from the origin", "allowed: at most "
-                        f"{LARGEST_LENGTH_M:g} m; mend the file, its unit or the scale")
+        raise MeshError(
+            path,
+            f"a vertex is {np.abs(vertices).max():.3g} m from the origin",
+            f"allowed: at most {LARGEST_LENGTH_M:g} m; mend the file, its unit or the scale",
+        )
     return TriangleMesh(vertices, triangles if np.prod(factors) > 0.0 else np.ascontiguousarray(triangles[:, ::-1]))
 
 
@@ -89,8 +96,11 @@ def _read(path: Path) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64
     except OSError as error:
         raise MeshError(path, f"cannot be read ({error})", "give a mesh file that is there and readable") from error
     except Exception as error:  # noqa: BLE001 - the readers behind trimesh raise what they like on a broken file
-        raise MeshError(path, f"is no whole {kind.upper()} file ({type(error).__name__}: {error})",
-                        f"allowed: well-formed {', '.join(ALLOWED)}; export the mesh again") from error
+        raise MeshError(
+            path,
+            f"is no whole {kind.upper()} file ({type(error).__name__}: {error})",
+            f"allowed: well-formed {', '.join(ALLOWED)}; export the mesh again",
+        ) from error
 
 
 def _load(kind: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -100,14 +110,18 @@ def _load(kind: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.in
     options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, **options)
     parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
-    corners = [np.asarray(part.vertices, dtype=np.float64)[np.asarray(part.faces, dtype=np.int64)]
-               for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    corners = [
+        np.asarray(part.vertices, dtype=np.float64)[np.asarray(part.faces, dtype=np.int64)]
+        for part in parts
+        if isinstance(part, trimesh.Trimesh) and len(part.faces)
+    ]
     vertices = np.concatenate([np.zeros((0, 3, 3)), *corners]).reshape(-1, 3)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
-def _merged(vertices: NDArray[np.float64],
-            triangles: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _merged(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Makes vertices at the same position one vertex."""
     unique, numbers = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     return np.ascontiguousarray(unique), np.asarray(numbers.reshape(-1)[triangles], dtype=np.int64)

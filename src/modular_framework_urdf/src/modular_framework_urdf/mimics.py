@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joints that mimic others: what they follow in the end, and where their leaders have to be for them."""
+
 from __future__ import annotations
 
 import math
@@ -38,19 +39,26 @@ def resolved(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str,
         while found.leader in mimics:
             direct = mimics[found.leader]
             if direct.leader in way:
-                raise ValueError(f"URDF joint '{name}': it mimics itself through {' -> '.join([*way, direct.leader])}; "
-                                 f"a joint may mimic one of {', '.join(independent) or 'none'}; let one of the loop "
-                                 "mimic none")
+                raise ValueError(
+                    f"URDF joint '{name}': it mimics itself through {' -> '.join([*way, direct.leader])}; "
+                    f"a joint may mimic one of {', '.join(independent) or 'none'}; let one of the loop "
+                    "mimic none"
+                )
             way.append(direct.leader)
-            found = Mimic(direct.leader, found.multiplier * direct.multiplier,
-                          found.multiplier * direct.offset + found.offset)
+            found = Mimic(
+                direct.leader, found.multiplier * direct.multiplier, found.multiplier * direct.offset + found.offset
+            )
         if not (math.isfinite(found.multiplier) and math.isfinite(found.offset) and found.multiplier):
-            raise ValueError(f"URDF joint '{name}': it mimics '{found.leader}' by multiplier {found.multiplier} and "
-                             f"offset {found.offset}; both must be finite, the multiplier not 0; make a joint that "
-                             "never moves a fixed one")
+            raise ValueError(
+                f"URDF joint '{name}': it mimics '{found.leader}' by multiplier {found.multiplier} and "
+                f"offset {found.offset}; both must be finite, the multiplier not 0; make a joint that "
+                "never moves a fixed one"
+            )
         if found.leader not in movable:
-            raise ValueError(f"URDF joint '{way[-2]}': it mimics '{found.leader}', which is no joint that moves; "
-                             f"allowed are {', '.join(independent) or 'none'}; mend the name or remove <mimic>")
+            raise ValueError(
+                f"URDF joint '{way[-2]}': it mimics '{found.leader}', which is no joint that moves; "
+                f"allowed are {', '.join(independent) or 'none'}; mend the name or remove <mimic>"
+            )
         result[name] = found
     return result
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a URDF says of a robot, as plain records; `urdf_reader.read_urdf` makes them."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -4,6 +4,7 @@
 Conversions are SciPy's. Products are written out: SciPy takes ten times as long for a single one, and the simulation
 composes thousands a second.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence

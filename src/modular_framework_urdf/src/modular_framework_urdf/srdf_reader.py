@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one reader of the semantic description (SRDF) of a robot; it knows nothing of the robot's joints."""
+
 from __future__ import annotations
 
 import math
@@ -123,13 +124,16 @@ class _Reader:
             group_states=self._group_states(root),
             end_effectors=tuple(
                 EndEffector(need(e, "name"), need(e, "group"), need(e, "parent_link"), e.get("parent_group", ""))
-                for e in root.findall("end_effector")),
+                for e in root.findall("end_effector")
+            ),
             virtual_joints=tuple(
                 VirtualJoint(need(e, "name"), need(e, "type"), need(e, "parent_frame"), need(e, "child_link"))
-                for e in root.findall("virtual_joint")),
+                for e in root.findall("virtual_joint")
+            ),
             passive_joints=frozenset(need(e, "name") for e in root.findall("passive_joint")),
-            touching_links=tuple(dict.fromkeys(
-                need(e, "link").strip() for e in root.findall("disable_default_collisions"))),
+            touching_links=tuple(
+                dict.fromkeys(need(e, "link").strip() for e in root.findall("disable_default_collisions"))
+            ),
             enabled_pairs=frozenset(map(self._pair, root.findall("enable_collisions"))),
             disabled_pairs={self._pair(e): e.get("reason", "") for e in root.findall("disable_collisions")},
         )
@@ -137,15 +141,24 @@ class _Reader:
     def _need(self, element: Element, attribute: str) -> str:
         value = element.get(attribute)
         if value is None:
-            raise XmlError(f"{self._where}:{element.sourceline}",
-                           f"<{element.tag}> {dict(element.attrib)} has no attribute '{attribute}'", "add it")
+            raise XmlError(
+                f"{self._where}:{element.sourceline}",
+                f"<{element.tag}> {dict(element.attrib)} has no attribute '{attribute}'",
+                "add it",
+            )
         return str(value)
 
     def _group(self, element: Element) -> GroupSpec:
-        return GroupSpec(self._need(element, "name"), tuple(
-            GroupMember("chain", "", self._need(item, "base_link"), self._need(item, "tip_link"))
-            if item.tag == "chain" else GroupMember(item.tag, self._need(item, "name"))
-            for item in element if item.tag in ("joint", "link", "chain", "group")))
+        return GroupSpec(
+            self._need(element, "name"),
+            tuple(
+                GroupMember("chain", "", self._need(item, "base_link"), self._need(item, "tip_link"))
+                if item.tag == "chain"
+                else GroupMember(item.tag, self._need(item, "name"))
+                for item in element
+                if item.tag in ("joint", "link", "chain", "group")
+            ),
+        )
 
     def _group_states(self, root: Element) -> dict[str, dict[str, dict[str, float]]]:
         states: dict[str, dict[str, dict[str, float]]] = {}
@@ -159,8 +172,11 @@ class _Reader:
         try:
             return float(text.split()[0]) if text.strip() else math.nan
         except ValueError as error:
-            raise XmlError(f"{self._where}:{element.sourceline}", "a group_state holds a value that is not a number "
-                           f"('{text}' for joint '{element.get('name')}')", "give a position in rad or m") from error
+            raise XmlError(
+                f"{self._where}:{element.sourceline}",
+                f"a group_state holds a value that is not a number ('{text}' for joint '{element.get('name')}')",
+                "give a position in rad or m",
+            ) from error
 
     def _pair(self, element: Element) -> frozenset[str]:
         return frozenset((self._need(element, "link1").strip(), self._need(element, "link2").strip()))

@@ -4,6 +4,7 @@
 It is written here because the readers that others maintain do not read what the framework needs: urdf_parser_py keeps
 no lines and knows no capsule; urdfdom and Pinocchio leave out the transmissions.
 """
+
 from __future__ import annotations
 
 import math
@@ -45,8 +46,9 @@ class AttributeFault(XmlError):
     """
 
     def __init__(self, where: str, tag: str, owner: str, key: str, text: str, expected: str) -> None:
-        super().__init__(where, f"<{tag}> of {owner}: {key} is '{text}'",
-                         f"expected {expected}; correct the description")
+        super().__init__(
+            where, f"<{tag}> of {owner}: {key} is '{text}'", f"expected {expected}; correct the description"
+        )
         self.tag, self.owner, self.key, self.text, self.expected = tag, owner, key, text, expected
 
 
@@ -62,9 +64,12 @@ def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
         XmlError: not well-formed XML, or a DOCTYPE.
     """
     root = xml_text.parse(text, where)
-    return Robot(root.get("name", ""), tuple(_link(item, where) for item in root.findall("link")),
-                 tuple(_joint(item, where) for item in root.findall("joint")),
-                 tuple(map(_transmission, root.findall("transmission"))))
+    return Robot(
+        root.get("name", ""),
+        tuple(_link(item, where) for item in root.findall("link")),
+        tuple(_joint(item, where) for item in root.findall("joint")),
+        tuple(map(_transmission, root.findall("transmission"))),
+    )
 
 
 class _Attributes:
@@ -116,8 +121,14 @@ def _link(element: Element, where: str) -> Link:
 
     def placed(role: str) -> tuple[PlacedShapes, ...]:
         owner = f"{role} shape of link '{name}'"
-        return tuple(PlacedShapes(tuple(_shape(shape, owner, where) for shape in item.findall("geometry/*")),
-                                  _origin(item, owner, where), item.sourceline) for item in element.findall(role))
+        return tuple(
+            PlacedShapes(
+                tuple(_shape(shape, owner, where) for shape in item.findall("geometry/*")),
+                _origin(item, owner, where),
+                item.sourceline,
+            )
+            for item in element.findall(role)
+        )
 
     return Link(name, placed("visual"), placed("collision"), element.sourceline)
 
@@ -152,29 +163,50 @@ def _joint(element: Element, where: str) -> Joint:
 
     limit, safety, mimic = inner("limit"), inner("safety_controller"), inner("mimic")
     return Joint(
-        name, element.get("type", ""), inner("parent").text("link") or "", inner("child").text("link") or "",
-        _origin(element, f"joint '{name}'", where), inner("axis").vector("xyz", (1.0, 0.0, 0.0)),
-        None if element.find("limit") is None else Limit(
-            limit.number("lower", 0.0), limit.number("upper", 0.0), limit.optional("effort"),
-            limit.optional("velocity")),
-        None if element.find("safety_controller") is None else SafetyController(
-            *(safety.optional(key) for key in ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"))),
-        None if element.find("mimic") is None else Mimic(
-            mimic.text("joint") or "", mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)),
-        element.sourceline)
+        name,
+        element.get("type", ""),
+        inner("parent").text("link") or "",
+        inner("child").text("link") or "",
+        _origin(element, f"joint '{name}'", where),
+        inner("axis").vector("xyz", (1.0, 0.0, 0.0)),
+        None
+        if element.find("limit") is None
+        else Limit(
+            limit.number("lower", 0.0), limit.number("upper", 0.0), limit.optional("effort"), limit.optional("velocity")
+        ),
+        None
+        if element.find("safety_controller") is None
+        else SafetyController(
+            *(safety.optional(key) for key in ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"))
+        ),
+        None
+        if element.find("mimic") is None
+        else Mimic(mimic.text("joint") or "", mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)),
+        element.sourceline,
+    )
 
 
 def _transmission(element: Element) -> Transmission:
     parts = {tag: tuple(_part(item) for item in element.findall(tag)) for tag in ("joint", "actuator")}
-    return Transmission(element.get("name", ""), (element.findtext("type") or "").strip(), parts["joint"],
-                        parts["actuator"], element.sourceline)
+    return Transmission(
+        element.get("name", ""),
+        (element.findtext("type") or "").strip(),
+        parts["joint"],
+        parts["actuator"],
+        element.sourceline,
+    )
 
 
 def _part(element: Element) -> TransmissionPart:
-    return TransmissionPart(element.tag, element.get("name", ""), (element.findtext("role") or "").strip(),
-                            _text(element.find("mechanicalReduction")), _text(element.find("offset")),
-                            tuple(LocatedText((item.text or "").strip(), item.sourceline)
-                                  for item in element.findall("hardwareInterface")), element.sourceline)
+    return TransmissionPart(
+        element.tag,
+        element.get("name", ""),
+        (element.findtext("role") or "").strip(),
+        _text(element.find("mechanicalReduction")),
+        _text(element.find("offset")),
+        tuple(LocatedText((item.text or "").strip(), item.sourceline) for item in element.findall("hardwareInterface")),
+        element.sourceline,
+    )
 
 
 def _text(element: Element | None) -> LocatedText | None:

@@ -4,6 +4,7 @@
 The entities of a document type may grow without bound. Elements of a default namespace (`<robot xmlns="...">`) are
 called as they are written.
 """
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -42,8 +43,11 @@ def refuse_doctype(text: str | bytes, where: str) -> None:
     parser = expat.ParserCreate()
 
     def refuse(*_: object) -> None:
-        raise XmlError(f"{where}:{parser.CurrentLineNumber}", "got a DOCTYPE",
-                       "allowed: XML without one, whose entities could fill the memory; remove it")
+        raise XmlError(
+            f"{where}:{parser.CurrentLineNumber}",
+            "got a DOCTYPE",
+            "allowed: XML without one, whose entities could fill the memory; remove it",
+        )
 
     def end(*_: object) -> None:
         raise _HeadIsReadError
@@ -70,14 +74,20 @@ def parse(text: str | bytes, where: str) -> Element:
     is_text = isinstance(text, str)
     parser = etree.XMLParser(
         encoding="utf-8" if is_text else None,  # a declared one does not hold for decoded text
-        remove_comments=True, remove_pis=True, resolve_entities=False,
-        huge_tree=not is_text)  # mesh files are larger than libxml2 allows by default
+        remove_comments=True,
+        remove_pis=True,
+        resolve_entities=False,
+        huge_tree=not is_text,
+    )  # mesh files are larger than libxml2 allows by default
     try:
         root = etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
     except (etree.XMLSyntaxError, UnicodeEncodeError) as error:
         line, fault = getattr(error, "lineno", None) or 1, getattr(error, "msg", error)
-        raise XmlError(f"{where}:{line}", f"not an XML document (not well-formed XML: {fault})",
-                       "well-formed XML is needed; mend it") from error
+        raise XmlError(
+            f"{where}:{line}",
+            f"not an XML document (not well-formed XML: {fault})",
+            "well-formed XML is needed; mend it",
+        ) from error
     if None in root.nsmap:
         for element in root.iter():
             if element.prefix is None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Hardware to begin with: copy the package, put the library of your arm where `Motors` is, and change what differs."""
+
 from __future__ import annotations
 
 import logging
@@ -27,8 +28,10 @@ class Motors:
     def turn(self, period_s: float) -> None:
         """What the motors do in `period_s` [s]."""
         step = 3.0 * period_s
-        self.positions = [position + min(max(target - position, -step), step)
-                          for position, target in zip(self.positions, self._targets, strict=True)]
+        self.positions = [
+            position + min(max(target - position, -step), step)
+            for position, target in zip(self.positions, self._targets, strict=True)
+        ]
 
     def move_to(self, targets: list[float]) -> None:
         """Send targets [rad]."""
@@ -43,8 +46,9 @@ class MyArm(RobotHW):
         try:
             names = read_names(robot_hw_nh, "joints")
             states, commands = JointStateInterface(), PositionJointInterface()
-            self._handles = [commands.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
-                             for name in names]
+            self._handles = [
+                commands.register_handle(JointHandle(states.register_handle(JointStateHandle(name)))) for name in names
+            ]
             self.register_interface(states)
             self.register_interface(commands)
             self._guard = JointLimitGuard(self, root_nh)

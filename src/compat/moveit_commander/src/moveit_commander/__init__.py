@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Commands a move_group node: groups, planning scene and robot, over topics, services and actions only."""
+
 from moveit_commander.constraints_storage import ConstraintsStorage
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_commands import MoveGroupInfoLevel
@@ -9,6 +10,16 @@ from moveit_commander.planning_scene_interface import PlanningSceneInterface, ac
 from moveit_commander.robot import RobotCommander
 from moveit_commander.roscpp_initializer import roscpp_initialize, roscpp_shutdown
 
-__all__ = ["ConstraintsStorage", "MoveGroupCommandInterpreter", "MoveGroupCommander", "MoveGroupInfoLevel",
-           "MoveItCommanderException", "PlanningSceneInterface", "RobotCommander", "acm_set_allowed", "acm_set_default",
-           "roscpp_initialize", "roscpp_shutdown"]
+__all__ = [
+    "ConstraintsStorage",
+    "MoveGroupCommandInterpreter",
+    "MoveGroupCommander",
+    "MoveGroupInfoLevel",
+    "MoveItCommanderException",
+    "PlanningSceneInterface",
+    "RobotCommander",
+    "acm_set_allowed",
+    "acm_set_default",
+    "roscpp_initialize",
+    "roscpp_shutdown",
+]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gives moveit_msgs/AllowedCollisionMatrix its methods set_default and set_allowed, as the public library does."""
+
 from __future__ import annotations
 
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
@@ -26,8 +27,9 @@ def set_allowed(acm: AllowedCollisionMatrix, obj: str, other: str | None = None,
         set_default(acm, obj, allow)
         return
     if other not in acm.entry_names:
-        raise MoveItCommanderException(f"collision matrix: '{other}' has no entry; those there are: "
-                                       f"{', '.join(acm.entry_names)}")
+        raise MoveItCommanderException(
+            f"collision matrix: '{other}' has no entry; those there are: {', '.join(acm.entry_names)}"
+        )
     if obj not in acm.entry_names:
         _add_entry(acm, obj)
     first, second = acm.entry_names.index(obj), acm.entry_names.index(other)

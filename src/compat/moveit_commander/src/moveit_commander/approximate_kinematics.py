@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint values that bring a link as near to a pose as it gets, where inverse kinematics has no solution."""
+
 from __future__ import annotations
 
 import math
@@ -18,9 +19,14 @@ WIDEST_STEP = 0.3  # [rad or m]
 STANDSTILL = 1e-6
 
 
-def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping[str, float],
-                   complete: Callable[[Mapping[str, float]], Mapping[str, float]], rotation: Rotation,
-                   position: Any) -> dict[str, float]:
+def nearest_values(
+    chain: Sequence[Joint],
+    free: Sequence[Joint],
+    start: Mapping[str, float],
+    complete: Callable[[Mapping[str, float]], Mapping[str, float]],
+    rotation: Rotation,
+    position: Any,
+) -> dict[str, float]:
     """Moves joints within their bounds, by damped least squares, to the smallest pose error found on the way.
 
     Args:
@@ -46,11 +52,14 @@ def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping
             best, least = dict(values), float(np.linalg.norm(error))
         full = jacobian(chain, full_positions, (0.0, 0.0, 0.0))
         columns = np.column_stack([_column(full, movable, chain, joint) for joint in free])
-        step = columns.T @ np.linalg.solve(columns @ columns.T + DAMPING ** 2 * np.eye(6), error)
+        step = columns.T @ np.linalg.solve(columns @ columns.T + DAMPING**2 * np.eye(6), error)
         step *= min(1.0, WIDEST_STEP / max(float(np.abs(step).max()), STANDSTILL))
-        moved = {joint.name: min(max(values[joint.name] + float(change), joint.lower), joint.upper)
-                 if joint.kind != "continuous" else values[joint.name] + float(change)
-                 for joint, change in zip(free, step, strict=True)}
+        moved = {
+            joint.name: min(max(values[joint.name] + float(change), joint.lower), joint.upper)
+            if joint.kind != "continuous"
+            else values[joint.name] + float(change)
+            for joint, change in zip(free, step, strict=True)
+        }
         if max(abs(moved[name] - values[name]) for name in moved) < STANDSTILL:
             break
         values = moved
@@ -59,8 +68,11 @@ def nearest_values(chain: Sequence[Joint], free: Sequence[Joint], start: Mapping
 
 def _column(full: Any, movable: Sequence[str], chain: Sequence[Joint], joint: Joint) -> Any:
     """Returns how a joint, and those of the chain that mimic it, move the link."""
-    gains = {item.name: item.multiplier if item.leader == joint.name else 1.0 for item in chain
-             if joint.name in (item.name, item.leader)}
+    gains = {
+        item.name: item.multiplier if item.leader == joint.name else 1.0
+        for item in chain
+        if joint.name in (item.name, item.leader)
+    }
     return sum((gain * full[:, movable.index(name)] for name, gain in gains.items() if name in movable), np.zeros(6))
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Jacobian and end of a chain of joints, from the robot's description alone."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -24,8 +25,12 @@ def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_p
     """
     axes, rotation, position = _walk(chain, positions)
     point = position + rotation.apply(reference_point)
-    columns = [np.concatenate([axis, np.zeros(3)]) if joint.kind == "prismatic"
-               else np.concatenate([np.cross(axis, point - origin), axis]) for joint, axis, origin in axes]
+    columns = [
+        np.concatenate([axis, np.zeros(3)])
+        if joint.kind == "prismatic"
+        else np.concatenate([np.cross(axis, point - origin), axis])
+        for joint, axis, origin in axes
+    ]
     return np.column_stack(columns)
 
 
@@ -35,9 +40,7 @@ def link_pose(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[R
     return rotation, position
 
 
-def _walk(
-    chain: Sequence[Joint], positions: Mapping[str, float]
-) -> tuple[list[tuple[Joint, Any, Any]], Rotation, Any]:
+def _walk(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[list[tuple[Joint, Any, Any]], Rotation, Any]:
     """Returns each movable joint with its axis and origin, and the pose of the last link, in the base frame."""
     rotation, position = Rotation.identity(), np.zeros(3)
     axes: list[tuple[Joint, Any, Any]] = []

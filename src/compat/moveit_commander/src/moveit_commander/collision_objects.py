@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Builds collision objects: primitives, planes and meshes from files."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -45,8 +46,10 @@ def mesh(name: str, pose: PoseStamped, filename: str, scale: Sequence[float]) ->
         loaded = read_mesh(str(filename).removeprefix("file://"), tuple(float(factor) for factor in scale))
     except MeshError as error:
         raise MoveItCommanderException(str(error)) from error
-    shape = Mesh(triangles=[MeshTriangle(corners) for corners in loaded.triangles.tolist()],
-                 vertices=[Point(*vertex) for vertex in loaded.vertices.tolist()])
+    shape = Mesh(
+        triangles=[MeshTriangle(corners) for corners in loaded.triangles.tolist()],
+        vertices=[Point(*vertex) for vertex in loaded.vertices.tolist()],
+    )
     item = _empty(name, pose)
     item.meshes = [shape]
     return item

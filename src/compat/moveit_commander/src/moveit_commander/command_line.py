@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The terminal: reads commands, completes them, shows the answers in colours."""
+
 from __future__ import annotations
 
 import argparse
@@ -14,15 +15,20 @@ from moveit_commander.group_commands import MoveGroupInfoLevel
 from moveit_commander.interpreter import MoveGroupCommandInterpreter
 from moveit_commander.roscpp_initializer import roscpp_initialize, roscpp_shutdown
 
-COLOURS = {MoveGroupInfoLevel.FAIL: "\033[91m", MoveGroupInfoLevel.WARN: "\033[93m",
-           MoveGroupInfoLevel.SUCCESS: "\033[92m", MoveGroupInfoLevel.DEBUG: "\033[94m", MoveGroupInfoLevel.INFO: ""}
+COLOURS = {
+    MoveGroupInfoLevel.FAIL: "\033[91m",
+    MoveGroupInfoLevel.WARN: "\033[93m",
+    MoveGroupInfoLevel.SUCCESS: "\033[92m",
+    MoveGroupInfoLevel.DEBUG: "\033[94m",
+    MoveGroupInfoLevel.INFO: "",
+}
 PLAIN = "\033[0m"
 LEAVE = ("q", "quit", "exit")
 
 
 def completions(keywords: Mapping[str, Sequence[str]], line: str, text: str) -> list[str]:
     """Returns the words that may stand where `text`, the last word of `line`, stands."""
-    before = line[:len(line) - len(text)].split()
+    before = line[: len(line) - len(text)].split()
     words = keywords if not before else keywords.get(before[0].lower(), ())
     return sorted(word + " " for word in words if word.startswith(text))
 

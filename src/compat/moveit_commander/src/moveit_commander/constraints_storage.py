@@ -3,6 +3,7 @@
 
 So a real MoveIt with that plugin reads what is saved here, and the other way round. MongoDB is not spoken.
 """
+
 from __future__ import annotations
 
 import sqlite3
@@ -39,14 +40,17 @@ class ConstraintsStorage:
         """
         self.path = Path(path).expanduser()
         if not self.path.parent.is_dir() or (self.path.parent == Path() and not self.path.is_file()):
-            raise MoveItCommanderException(f"constraints database '{path}': neither a file nor a path in a folder that "
-                                           "is there; give the path of an SQLite file (MongoDB is not spoken here)")
+            raise MoveItCommanderException(
+                f"constraints database '{path}': neither a file nor a path in a folder that "
+                "is there; give the path of an SQLite file (MongoDB is not spoken here)"
+            )
         if self.path.exists():
             with self._connected() as database:
                 version = int(database.execute("PRAGMA user_version").fetchone()[0])
             if version not in (0, LAYOUT_VERSION):
-                raise MoveItCommanderException(f"constraints database {self.path}: layout {version}, "
-                                               f"{LAYOUT_VERSION} is needed; make it anew")
+                raise MoveItCommanderException(
+                    f"constraints database {self.path}: layout {version}, {LAYOUT_VERSION} is needed; make it anew"
+                )
 
     def add_constraints(self, msg: Constraints, robot: str = "", group: str = "") -> None:
         """Saves constraints under their own name, replacing those of that name."""
@@ -57,10 +61,11 @@ class ConstraintsStorage:
         where, values = _matching(msg.name, robot, group)
         with self._connected(create=True) as database:
             database.execute(f'DELETE FROM "{TABLE}"{where}', values)
-            database.execute(f'INSERT INTO "{TABLE}" (Data, M_creation_time, M_constraints_id, M_robot_id, M_group_id) '
-                             "VALUES (?, ?, ?, ?, ?)", (
-                                 data.getvalue(), int(time.time()), *(item.encode() for item in (
-                                     msg.name, robot, group))))
+            database.execute(
+                f'INSERT INTO "{TABLE}" (Data, M_creation_time, M_constraints_id, M_robot_id, M_group_id) '
+                "VALUES (?, ?, ?, ?, ?)",
+                (data.getvalue(), int(time.time()), *(item.encode() for item in (msg.name, robot, group))),
+            )
 
     def has_constraints(self, name: str, robot: str = "", group: str = "") -> bool:
         """Returns whether there are constraints of that name."""
@@ -74,9 +79,11 @@ class ConstraintsStorage:
         """Returns constraints by name; raises MoveItCommanderException with the names there are."""
         rows = self._rows(name, robot, group)
         if not rows:
-            raise MoveItCommanderException(f"constraints database {self.path}: no constraints '{name}' for robot "
-                                           f"'{robot}' and group '{group}'; there are: "
-                                           f"{', '.join(self.get_known_constraints(robot, group)) or 'none'}")
+            raise MoveItCommanderException(
+                f"constraints database {self.path}: no constraints '{name}' for robot "
+                f"'{robot}' and group '{group}'; there are: "
+                f"{', '.join(self.get_known_constraints(robot, group)) or 'none'}"
+            )
         found = Constraints()
         found.deserialize(rows[-1][1])
         found.name = name
@@ -117,8 +124,9 @@ class ConstraintsStorage:
                     _lay_out(database)
                 yield database
         except sqlite3.Error as error:
-            raise MoveItCommanderException(f"constraints database {self.path}: {error}; an SQLite file that can be "
-                                           "read and written is needed") from error
+            raise MoveItCommanderException(
+                f"constraints database {self.path}: {error}; an SQLite file that can be read and written is needed"
+            ) from error
 
 
 def _has_table(database: sqlite3.Connection) -> bool:
@@ -128,8 +136,10 @@ def _has_table(database: sqlite3.Connection) -> bool:
 def _lay_out(database: sqlite3.Connection) -> None:
     database.executescript(LAYOUT)
     database.execute(f"PRAGMA user_version = {LAYOUT_VERSION}")
-    database.execute("INSERT OR IGNORE INTO WarehouseIndex VALUES (?, ?, ?, ?, ?)", (
-        TABLE, bytes.fromhex(Constraints._md5sum), COLLECTION, DATABASE, Constraints._type))
+    database.execute(
+        "INSERT OR IGNORE INTO WarehouseIndex VALUES (?, ?, ?, ?, ?)",
+        (TABLE, bytes.fromhex(Constraints._md5sum), COLLECTION, DATABASE, Constraints._type),
+    )
 
 
 def _matching(name: str, robot: str, group: str) -> tuple[str, tuple[bytes, ...]]:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns messages into lists of numbers and bytes, and back."""
+
 from __future__ import annotations
 
 import math
@@ -46,8 +47,10 @@ def list_to_pose(pose_list: Sequence[float]) -> Pose:
     if len(values) == 6:
         values = [*values[:3], *quaternion_from_rpy(*values[3:])]
     elif len(values) != 7:
-        raise MoveItCommanderException(f"a pose list has {len(values)} numbers; 6 (x, y, z, roll, pitch, yaw) or "
-                                       "7 (x, y, z, qx, qy, qz, qw) are needed")
+        raise MoveItCommanderException(
+            f"a pose list has {len(values)} numbers; 6 (x, y, z, roll, pitch, yaw) or "
+            "7 (x, y, z, qx, qy, qz, qw) are needed"
+        )
     return Pose(Point(*values[:3]), Quaternion(*values[3:]))
 
 
@@ -68,7 +71,8 @@ def transform_to_list(trf_msg: Transform) -> list[float]:
 def list_to_transform(trf_list: Sequence[float]) -> Transform:
     """Builds a transform from [x, y, z, qx, qy, qz, qw] [m]."""
     if len(trf_list) != 7:
-        raise MoveItCommanderException(f"a transform list has {len(trf_list)} numbers; 7 (x, y, z, qx, qy, qz, qw) "
-                                       "are needed")
+        raise MoveItCommanderException(
+            f"a transform list has {len(trf_list)} numbers; 7 (x, y, z, qx, qy, qz, qw) are needed"
+        )
     values = [float(value) for value in trf_list]
     return Transform(Vector3(*values[:3]), Quaternion(*values[3:]))

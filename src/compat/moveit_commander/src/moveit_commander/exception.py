@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Exceptions of the commander: what goes wrong while a robot is commanded."""
+
 from __future__ import annotations
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes a goal of joints or of a pose as the constraints a planning request carries."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -11,9 +12,14 @@ from shape_msgs.msg import SolidPrimitive
 
 def joint_goal(positions: Mapping[str, float], tolerance: float) -> Constraints:
     """Constrains every joint at its position within a tolerance [rad or m]."""
-    return Constraints(joint_constraints=[
-        JointConstraint(joint_name=name, position=position, tolerance_above=tolerance, tolerance_below=tolerance,
-                        weight=1.0) for name, position in positions.items()])
+    return Constraints(
+        joint_constraints=[
+            JointConstraint(
+                joint_name=name, position=position, tolerance_above=tolerance, tolerance_below=tolerance, weight=1.0
+            )
+            for name, position in positions.items()
+        ]
+    )
 
 
 def position_goal(link: str, pose: PoseStamped, tolerance_m: float) -> PositionConstraint:
@@ -27,6 +33,11 @@ def position_goal(link: str, pose: PoseStamped, tolerance_m: float) -> PositionC
 def orientation_goal(link: str, pose: PoseStamped, tolerance_rad: float) -> OrientationConstraint:
     """Constrains the orientation of the link to that of the pose within a tolerance about each axis."""
     return OrientationConstraint(
-        header=pose.header, orientation=pose.pose.orientation, link_name=link, weight=1.0,
-        absolute_x_axis_tolerance=tolerance_rad, absolute_y_axis_tolerance=tolerance_rad,
-        absolute_z_axis_tolerance=tolerance_rad)
+        header=pose.header,
+        orientation=pose.pose.orientation,
+        link_name=link,
+        weight=1.0,
+        absolute_x_axis_tolerance=tolerance_rad,
+        absolute_y_axis_tolerance=tolerance_rad,
+        absolute_z_axis_tolerance=tolerance_rad,
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The words of the command line that concern one planning group: each is one method, all are in one table."""
+
 from __future__ import annotations
 
 import re
@@ -32,8 +33,18 @@ class MoveGroupInfoLevel:
 Answer = tuple[int, str]
 Words = Sequence[str]
 OK: Answer = (MoveGroupInfoLevel.DEBUG, "OK")
-DIRECTIONS = {"up": (2, 1), "down": (2, -1), "z": (2, 1), "left": (1, 1), "right": (1, -1), "y": (1, 1),
-              "forward": (0, 1), "backward": (0, -1), "back": (0, -1), "x": (0, 1)}
+DIRECTIONS = {
+    "up": (2, 1),
+    "down": (2, -1),
+    "z": (2, 1),
+    "left": (1, 1),
+    "right": (1, -1),
+    "y": (1, 1),
+    "forward": (0, 1),
+    "backward": (0, -1),
+    "back": (0, -1),
+    "x": (0, 1),
+}
 RANDOM = ("rand", "random")
 TRUE = ("1", "t", "true")
 GROUND_SIZE = (3.0, 3.0, 0.1)
@@ -126,8 +137,12 @@ class GroupCommands:
 
     def allow(self, words: Words) -> Answer:
         """Switches replanning or looking around."""
-        switches = {"look": self.group.allow_looking, "looking": self.group.allow_looking,
-                    "replan": self.group.allow_replanning, "replanning": self.group.allow_replanning}
+        switches = {
+            "look": self.group.allow_looking,
+            "looking": self.group.allow_looking,
+            "replan": self.group.allow_replanning,
+            "replanning": self.group.allow_replanning,
+        }
         what, value = words[0].lower(), words[1].lower()
         if what not in switches or value not in (*TRUE, "0", "f", "false"):
             raise MoveItCommanderException(f"allow {' '.join(words)}: looking or replanning, true or false are allowed")
@@ -152,8 +167,11 @@ class GroupCommands:
         """Shows the state as the SRDF writes it."""
         values = zip(self.group._group_names(), self.group.get_current_joint_values(), strict=True)
         lines = [f'        <joint name="{name}" value="{value}"/>' for name, value in values]
-        return info("\n".join([f'    <group_state name="custom_state" group="{self.group.get_name()}">', *lines,
-                               "    </group_state>"]))
+        return info(
+            "\n".join(
+                [f'    <group_state name="custom_state" group="{self.group.get_name()}">', *lines, "    </group_state>"]
+            )
+        )
 
     def database(self, words: Words) -> Answer:
         """Chooses the file of constraints, or returns which it is."""
@@ -206,8 +224,9 @@ class GroupCommands:
         approximate = words[-1].lower() in ("approx", "approximate")
         values = [number(word) for word in (words[:-1] if approximate else words)]
         if len(values) not in (3, 6):
-            raise MoveItCommanderException(f"go {' '.join(words)}: 3 numbers (x y z) or 6 (x y z roll pitch yaw) "
-                                           "are allowed")
+            raise MoveItCommanderException(
+                f"go {' '.join(words)}: 3 numbers (x y z) or 6 (x y z roll pitch yaw) are allowed"
+            )
         if approximate:
             quaternion = quaternion_from_rpy(*values[3:]) if len(values) == 6 else (0.0, 0.0, 0.0, 1.0)
             self.group.set_joint_value_target(Pose(Point(*values[:3]), Quaternion(*quaternion)), True)
@@ -248,8 +267,11 @@ class GroupCommands:
         self._set_named(words)
         worked, trajectory, _, _ = self.group.plan()
         self._plan = trajectory if worked else None
-        return report(worked, f"Planned to {words[0]}: {len(trajectory.joint_trajectory.points)} points",
-                    f"Failed while planning to {words[0]}")
+        return report(
+            worked,
+            f"Planned to {words[0]}: {len(trajectory.joint_trajectory.points)} points",
+            f"Failed while planning to {words[0]}",
+        )
 
     def planner(self, words: Words) -> Answer:
         """Chooses a planner."""
@@ -312,35 +334,47 @@ def _command(usage: str, text: str, counts: tuple[int, ...], run: Any) -> tuple[
 
 
 G = GroupCommands
-COMMANDS = dict((
-    _command("allow <looking|replanning> <true|false>", "switch looking around or replanning", (2,), G.allow),
-    _command("constrain [<name>]", "use named path constraints, or none", (0, 1), G.constrain),
-    _command("current", "joint values and pose of the end effector", (0,), G.current),
-    _command("group_state", "joint values as the SRDF writes them", (0,), G.group_state),
-    _command("database [<host> [<port>]]", "database of constraints", (0, 1, 2), G.database),
-    _command("delete <name>", "forget joint values", (1,), G.delete),
-    _command("eef", "name of the end effector link", (0,), G.eef),
-    _command("execute", "execute the last plan", (0,), G.run_plan),
-    _command("go <name>|rand|<direction> <dx>|<x> <y> <z> [<r> <p> <y>] [approx]",
-             "plan and move; directions: " + " ".join(DIRECTIONS), (1, 2, 3, 4, 6, 7), G.go),
-    _command("ground", "put a plate below the robot", (0,), G.ground),
-    _command("id", "name of the group that is commanded", (0,), G.identify),
-    _command("joints", "names of the joints", (0,), G.joints),
-    _command("pick <name>", "pick an object", (1,), G.pick),
-    _command("place <name>", "place an object", (1,), G.place),
-    _command("plan [<name>|rand]", "plan to a state, or show the last plan", (0, 1), G.plan),
-    _command("planner <name>", "choose a planner", (1,), G.planner),
-    _command("random <name>", "remember random joint values", (1,), G.remember_random),
-    _command("record <name>", "remember the current joint values", (1,), G.record),
-    _command("rotate <r> <p> <y>", "turn the end effector [rad]", (3,), G.rotate),
-    _command("show [<name>]", "remembered joint values", (0, 1), G.show),
-    _command("stop", "stop the motion", (0,), G.stop),
-    _command("time [<s>]", "show or set the planning time", (0, 1), G.time),
-    _command("tolerance [<x>]", "show or set the tolerance of goals", (0, 1), G.tolerance),
-    _command("vars", "names of remembered joint values", (0,), G.variables),
-    _command("wait <s>", "sleep", (1,), G.wait),
-))
-COMMANDS |= {short: COMMANDS[name] for short, name in (("del", "delete"), ("rand", "random"), ("rec", "record"),
-                                                       ("tol", "tolerance"))}
-ASSIGNMENTS = (("<name>", "show joint values"), ("<name> = <other>", "copy joint values"),
-               ("<name> = [<v1> <v2> ...]", "remember joint values"), ("<name>[<i>] = <v>", "change one joint value"))
+COMMANDS = dict(
+    (
+        _command("allow <looking|replanning> <true|false>", "switch looking around or replanning", (2,), G.allow),
+        _command("constrain [<name>]", "use named path constraints, or none", (0, 1), G.constrain),
+        _command("current", "joint values and pose of the end effector", (0,), G.current),
+        _command("group_state", "joint values as the SRDF writes them", (0,), G.group_state),
+        _command("database [<host> [<port>]]", "database of constraints", (0, 1, 2), G.database),
+        _command("delete <name>", "forget joint values", (1,), G.delete),
+        _command("eef", "name of the end effector link", (0,), G.eef),
+        _command("execute", "execute the last plan", (0,), G.run_plan),
+        _command(
+            "go <name>|rand|<direction> <dx>|<x> <y> <z> [<r> <p> <y>] [approx]",
+            "plan and move; directions: " + " ".join(DIRECTIONS),
+            (1, 2, 3, 4, 6, 7),
+            G.go,
+        ),
+        _command("ground", "put a plate below the robot", (0,), G.ground),
+        _command("id", "name of the group that is commanded", (0,), G.identify),
+        _command("joints", "names of the joints", (0,), G.joints),
+        _command("pick <name>", "pick an object", (1,), G.pick),
+        _command("place <name>", "place an object", (1,), G.place),
+        _command("plan [<name>|rand]", "plan to a state, or show the last plan", (0, 1), G.plan),
+        _command("planner <name>", "choose a planner", (1,), G.planner),
+        _command("random <name>", "remember random joint values", (1,), G.remember_random),
+        _command("record <name>", "remember the current joint values", (1,), G.record),
+        _command("rotate <r> <p> <y>", "turn the end effector [rad]", (3,), G.rotate),
+        _command("show [<name>]", "remembered joint values", (0, 1), G.show),
+        _command("stop", "stop the motion", (0,), G.stop),
+        _command("time [<s>]", "show or set the planning time", (0, 1), G.time),
+        _command("tolerance [<x>]", "show or set the tolerance of goals", (0, 1), G.tolerance),
+        _command("vars", "names of remembered joint values", (0,), G.variables),
+        _command("wait <s>", "sleep", (1,), G.wait),
+    )
+)
+COMMANDS |= {
+    short: COMMANDS[name]
+    for short, name in (("del", "delete"), ("rand", "random"), ("rec", "record"), ("tol", "tolerance"))
+}
+ASSIGNMENTS = (
+    ("<name>", "show joint values"),
+    ("<name> = <other>", "copy joint values"),
+    ("<name> = [<v1> <v2> ...]", "remember joint values"),
+    ("<name>[<i>] = <v>", "change one joint value"),
+)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Base of a group's commander: the group's description, the robot's state and the servers."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -23,8 +24,9 @@ from moveit_commander.servers import Servers
 
 MOVE_ACTION = "move_group"
 EXECUTE_ACTION = "execute_trajectory"
-CODE_NAMES = {value: name for name, value in vars(MoveItErrorCodes).items()
-              if name.isupper() and isinstance(value, int)}
+CODE_NAMES = {
+    value: name for name, value in vars(MoveItErrorCodes).items() if name.isupper() and isinstance(value, int)
+}
 
 
 def code_text(code: MoveItErrorCodes) -> str:
@@ -43,8 +45,10 @@ def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotStat
     request.header.frame_id = frame
     answer = servers.call("compute_fk", GetPositionFK, request)
     if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.pose_stamped:
-        raise MoveItCommanderException(f"service {servers.resolve('compute_fk')}: no pose of link '{link}' in frame "
-                                       f"'{frame}': {code_text(answer.error_code)}")
+        raise MoveItCommanderException(
+            f"service {servers.resolve('compute_fk')}: no pose of link '{link}' in frame "
+            f"'{frame}': {code_text(answer.error_code)}"
+        )
     return answer.pose_stamped[0]
 
 
@@ -89,8 +93,9 @@ class GroupConnection:
     def set_end_effector_link(self, link_name: str) -> None:
         """Sets the end effector link; raises MoveItCommanderException if the robot has no such link."""
         if link_name not in self._model.links:
-            raise MoveItCommanderException(f"Unable to set end effector link: robot '{self._model.name}' has no link "
-                                           f"'{link_name}'")
+            raise MoveItCommanderException(
+                f"Unable to set end effector link: robot '{self._model.name}' has no link '{link_name}'"
+            )
         self._end_effector_link = link_name
 
     def get_pose_reference_frame(self) -> str:
@@ -132,13 +137,17 @@ class GroupConnection:
             genpy.DeserializationError: the state names no joint; as in MoveIt, whose message is then empty.
         """
         if not robot_state_msg.joint_state.name and not robot_state_msg.is_diff:
-            raise genpy.DeserializationError("enforce_bounds: the state names no joint; give joint_state.name and "
-                                             "position, as get_current_state() does")
+            raise genpy.DeserializationError(
+                "enforce_bounds: the state names no joint; give joint_state.name and "
+                "position, as get_current_state() does"
+            )
         state = RobotState()
         state.deserialize(conversions.msg_to_string(robot_state_msg))
         joints = self._model.joints
-        state.joint_state.position = [joints[name].bounded(value) if name in joints else value for name, value in
-                                      zip(state.joint_state.name, state.joint_state.position, strict=True)]
+        state.joint_state.position = [
+            joints[name].bounded(value) if name in joints else value
+            for name, value in zip(state.joint_state.name, state.joint_state.position, strict=True)
+        ]
         return state
 
     def get_current_pose(self, end_effector_link: str = "") -> PoseStamped:
@@ -159,11 +168,15 @@ class GroupConnection:
         """Returns the link a command is for; raises MoveItCommanderException if there is none."""
         chosen = link or self._end_effector_link
         if not chosen:
-            raise MoveItCommanderException(f"There is no end effector to {purpose}: group '{self._group.name}' is not "
-                                           "a chain; name the link, or call set_end_effector_link")
+            raise MoveItCommanderException(
+                f"There is no end effector to {purpose}: group '{self._group.name}' is not "
+                "a chain; name the link, or call set_end_effector_link"
+            )
         if chosen not in self._model.links:
-            raise MoveItCommanderException(f"robot '{self._model.name}' has no link '{chosen}'; get_link_names of "
-                                           "RobotCommander lists those it has")
+            raise MoveItCommanderException(
+                f"robot '{self._model.name}' has no link '{chosen}'; get_link_names of "
+                "RobotCommander lists those it has"
+            )
         return chosen
 
     def _group_names(self) -> list[str]:
@@ -172,6 +185,7 @@ class GroupConnection:
     def _parameter(self, name: str, default: float) -> float:
         value: Any = rospy.get_param(f"{self._robot_description}{name}", default)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise MoveItCommanderException(f"parameter {rospy.resolve_name(self._robot_description)}{name}: got "
-                                           f"{value!r}, a number is needed")
+            raise MoveItCommanderException(
+                f"parameter {rospy.resolve_name(self._robot_description)}{name}: got {value!r}, a number is needed"
+            )
         return float(value)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where a group shall go, in joint space: values, names, random states, and joint values found from a pose."""
+
 from __future__ import annotations
 
 import random
@@ -36,8 +37,9 @@ class GroupJointTargets(GroupSettings):
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
         defaults = self._model.defaults()
-        self._joint_target = {joint.name: defaults[joint.name] for joint in self._group.variables
-                              if joint.name in defaults}
+        self._joint_target = {
+            joint.name: defaults[joint.name] for joint in self._group.variables if joint.name in defaults
+        }
         self._active_target = Target.JOINT
         self._remembered: dict[str, list[float]] = {}
         self._random = random.Random()
@@ -63,12 +65,14 @@ class GroupJointTargets(GroupSettings):
             self._set_from_pose(arg1, *_link_and_approximate(arg2, arg3))
             return
         if arg3 is not None or (arg2 is not None and not isinstance(arg1, str)):
-            raise MoveItCommanderException("Too many arguments specified: list, dict and JointState stand alone, a "
-                                           "joint's name takes one value")
+            raise MoveItCommanderException(
+                "Too many arguments specified: list, dict and JointState stand alone, a joint's name takes one value"
+            )
         if isinstance(arg1, JointState):
             if len(arg1.name) != len(arg1.position):
-                raise MoveItCommanderException(f"JointState has {len(arg1.name)} names and {len(arg1.position)} "
-                                               "positions; each joint needs both")
+                raise MoveItCommanderException(
+                    f"JointState has {len(arg1.name)} names and {len(arg1.position)} positions; each joint needs both"
+                )
             self._set_values(dict(zip(arg1.name, arg1.position, strict=True)))
         elif isinstance(arg1, str):
             self._set_values({arg1: _single_value(arg1, arg2)})
@@ -77,8 +81,10 @@ class GroupJointTargets(GroupSettings):
         elif isinstance(arg1, Iterable):
             self._set_values(group_values(self._group, list(arg1)))
         else:
-            raise MoveItCommanderException(f"Unsupported argument of type {type(arg1)}; allowed: list, dict, "
-                                           "JointState, Pose, PoseStamped, or a joint's name and value")
+            raise MoveItCommanderException(
+                f"Unsupported argument of type {type(arg1)}; allowed: list, dict, "
+                "JointState, Pose, PoseStamped, or a joint's name and value"
+            )
 
     def set_random_target(self) -> None:
         """Sets a joint target drawn evenly within the bounds."""
@@ -107,8 +113,10 @@ class GroupJointTargets(GroupSettings):
         if target in self._remembered:
             return group_values(self._group, self._remembered[target])
         if target not in self._group.states:
-            raise MoveItCommanderException(f"Unable to set target {target}: group '{self._group.name}' has no such "
-                                           f"named target; it has: {', '.join(self.get_named_targets()) or 'none'}")
+            raise MoveItCommanderException(
+                f"Unable to set target {target}: group '{self._group.name}' has no such "
+                f"named target; it has: {', '.join(self.get_named_targets()) or 'none'}"
+            )
         return dict(self._group.states[target])
 
     def remember_joint_values(self, name: str, values: Iterable[float] | None = None) -> None:
@@ -129,16 +137,21 @@ class GroupJointTargets(GroupSettings):
         joints = {joint.name: joint for joint in self._group.variables}
         for name, value in values.items():
             if name not in joints:
-                raise MoveItCommanderException(f"Error setting joint target: group '{self._group.name}' has no joint "
-                                               f"'{name}'; it has: {', '.join(joints)}")
+                raise MoveItCommanderException(
+                    f"Error setting joint target: group '{self._group.name}' has no joint "
+                    f"'{name}'; it has: {', '.join(joints)}"
+                )
             if not joints[name].admits(float(value), self._joint_tolerance):
                 raise MoveItCommanderException(
                     f"Error setting joint target. Is the target within bounds? Joint '{name}': got {value}, allowed "
-                    f"is [{joints[name].lower:.6g}, {joints[name].upper:.6g}]")
+                    f"is [{joints[name].lower:.6g}, {joints[name].upper:.6g}]"
+                )
         mimics = {name: mimic for name, mimic in self._model.mimics.items() if mimic.leader in joints}
         target = self._joint_target | with_leaders({name: float(value) for name, value in values.items()}, mimics)
-        self._joint_target = {**target, **{name: value for name, value in self._model.complete(target).items()
-                                           if name in joints}}
+        self._joint_target = {
+            **target,
+            **{name: value for name, value in self._model.complete(target).items() if name in joints},
+        }
         self._active_target = Target.JOINT
 
     def _set_from_pose(self, pose: Pose | PoseStamped, link: str, approximate: bool) -> None:
@@ -156,13 +169,16 @@ class GroupJointTargets(GroupSettings):
             self._set_values(self._nearest_to(asked.ik_link_name, asked.pose_stamped))
             return
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-            raise MoveItCommanderException(f"Error setting joint target: service {self._servers.resolve('compute_ik')}"
-                                           f" answers {code_text(answer.error_code)}. Is the pose within reach, and "
-                                           "the IK solver functional?")
+            raise MoveItCommanderException(
+                f"Error setting joint target: service {self._servers.resolve('compute_ik')}"
+                f" answers {code_text(answer.error_code)}. Is the pose within reach, and "
+                "the IK solver functional?"
+            )
         found = answer.solution.joint_state
         wanted = set(self._group_names())
-        self._set_values({name: value for name, value in zip(found.name, found.position, strict=True)
-                          if name in wanted})
+        self._set_values(
+            {name: value for name, value in zip(found.name, found.position, strict=True) if name in wanted}
+        )
 
     def _nearest_to(self, link: str, pose: PoseStamped) -> dict[str, float]:
         """Returns joint values near the current target that bring a link as near to a pose as they can."""
@@ -172,8 +188,14 @@ class GroupJointTargets(GroupSettings):
         base_rotation, base_position = rotation_and_position(conversions.pose_to_list(base_pose))
         rotation, position = rotation_and_position(conversions.pose_to_list(pose.pose))
         frame_to_base = base_rotation.inv()
-        return nearest_values(self._model.chain(base, link), self._group.active_joints, start, self._model.complete,
-                              frame_to_base * rotation, frame_to_base.apply(position - base_position))
+        return nearest_values(
+            self._model.chain(base, link),
+            self._group.active_joints,
+            start,
+            self._model.complete,
+            frame_to_base * rotation,
+            frame_to_base.apply(position - base_position),
+        )
 
 
 def _single_value(name: str, value: Any) -> float:
@@ -198,6 +220,8 @@ def _link_and_approximate(*arguments: Any) -> tuple[str, bool]:
             case bool():
                 approximate = argument
             case _:
-                raise MoveItCommanderException(f"Unexpected type {type(argument)}: a link's name (str) or whether the "
-                                               "pose is approximate (bool) may follow a pose")
+                raise MoveItCommanderException(
+                    f"Unexpected type {type(argument)}: a link's name (str) or whether the "
+                    "pose is approximate (bool) may follow a pose"
+                )
     return link, approximate

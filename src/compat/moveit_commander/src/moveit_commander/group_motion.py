@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plans and moves a group: plan, go, execute, straight lines, stop."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -93,8 +94,10 @@ class GroupMotion(GroupPoseTargets):
         if isinstance(trajectory, JointTrajectory):
             trajectory = RobotTrajectory(joint_trajectory=trajectory)
         if not isinstance(trajectory, RobotTrajectory):
-            raise MoveItCommanderException(f"execute: got {type(trajectory)}, a RobotTrajectory is needed; plan() "
-                                           "answers a tuple whose second item is one")
+            raise MoveItCommanderException(
+                f"execute: got {type(trajectory)}, a RobotTrajectory is needed; plan() "
+                "answers a tuple whose second item is one"
+            )
         caller = self._servers.action(EXECUTE_ACTION, ExecuteTrajectoryAction)
         if not wait:
             caller.send(ExecuteTrajectoryGoal(trajectory))
@@ -108,8 +111,9 @@ class GroupMotion(GroupPoseTargets):
         """Stops the motion that runs, if any."""
         self._events.publish(String("stop"))
 
-    def compute_cartesian_path(self, waypoints: Sequence[Any], eef_step: float, *options: Any,
-                               **named_options: Any) -> tuple[RobotTrajectory, float]:
+    def compute_cartesian_path(
+        self, waypoints: Sequence[Any], eef_step: float, *options: Any, **named_options: Any
+    ) -> tuple[RobotTrajectory, float]:
         """Follows straight lines with the end effector link.
 
         Args:
@@ -126,10 +130,16 @@ class GroupMotion(GroupPoseTargets):
         """
         jump_threshold, avoid_collisions, constraints = _cartesian_options(options, named_options)
         request = GetCartesianPathRequest(
-            start_state=self._start_state, group_name=self._group.name, max_step=eef_step,
-            link_name=self._link("", "compute a path for"), jump_threshold=jump_threshold,
-            avoid_collisions=avoid_collisions, path_constraints=constraints, max_cartesian_speed=self._speed_limit,
-            cartesian_speed_limited_link=self._limited_link())
+            start_state=self._start_state,
+            group_name=self._group.name,
+            max_step=eef_step,
+            link_name=self._link("", "compute a path for"),
+            jump_threshold=jump_threshold,
+            avoid_collisions=avoid_collisions,
+            path_constraints=constraints,
+            max_cartesian_speed=self._speed_limit,
+            cartesian_speed_limited_link=self._limited_link(),
+        )
         request.waypoints = [pose if isinstance(pose, Pose) else conversions.list_to_pose(pose) for pose in waypoints]
         request.header.frame_id = self.get_pose_reference_frame()
         request.header.stamp = rospy.Time.now()
@@ -160,8 +170,9 @@ class GroupMotion(GroupPoseTargets):
     def _judge(self, code: MoveItErrorCodes, what: str) -> bool:
         if code.val == MoveItErrorCodes.SUCCESS:
             return True
-        rospy.logwarn("%s of group '%s' failed: %s; the log of move_group says why", what, self._group.name,
-                      code_text(code))
+        rospy.logwarn(
+            "%s of group '%s' failed: %s; the log of move_group says why", what, self._group.name, code_text(code)
+        )
         return False
 
 
@@ -171,12 +182,16 @@ def _cartesian_options(options: Sequence[Any], named: dict[str, Any]) -> tuple[f
     if options and isinstance(options[0], int | float) and not isinstance(options[0], bool):
         names.insert(0, "jump_threshold")
     unknown = set(named) - {"jump_threshold", "avoid_collisions", "path_constraints"}
-    if len(options) > len(names) or unknown or set(names[:len(options)]) & set(named):
-        raise TypeError(f"compute_cartesian_path: options {options} and {named}; allowed: jump_threshold (a number), "
-                        "avoid_collisions (a bool), path_constraints (moveit_msgs/Constraints), each once")
+    if len(options) > len(names) or unknown or set(names[: len(options)]) & set(named):
+        raise TypeError(
+            f"compute_cartesian_path: options {options} and {named}; allowed: jump_threshold (a number), "
+            "avoid_collisions (a bool), path_constraints (moveit_msgs/Constraints), each once"
+        )
     chosen = {**dict(zip(names, options, strict=False)), **named}
     constraints = chosen.get("path_constraints") or Constraints()
     if not isinstance(constraints, Constraints):
-        raise MoveItCommanderException("Unable to set path constraints, unknown constraint type "
-                                       f"{type(constraints)}; moveit_msgs/Constraints is needed")
+        raise MoveItCommanderException(
+            "Unable to set path constraints, unknown constraint type "
+            f"{type(constraints)}; moveit_msgs/Constraints is needed"
+        )
     return float(chosen.get("jump_threshold", 0.0)), bool(chosen.get("avoid_collisions", True)), constraints

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a group holds: attach and detach objects, pick and place them."""
+
 from __future__ import annotations
 
 import time
@@ -37,8 +38,9 @@ class GroupObjects(GroupMotion):
 
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
-        self._attachments = rospy.Publisher(ns_join(ns, "attached_collision_object"), AttachedCollisionObject,
-                                            queue_size=20)
+        self._attachments = rospy.Publisher(
+            ns_join(ns, "attached_collision_object"), AttachedCollisionObject, queue_size=20
+        )
 
     def attach_object(self, object_name: str, link_name: str = "", touch_links: Sequence[str] = ()) -> bool:
         """Attaches an object of the scene to a link.
@@ -81,11 +83,17 @@ class GroupObjects(GroupMotion):
         if not grasps:
             grasps = self._planned_grasps(object_name)
         goal = PickupGoal(
-            target_name=object_name, group_name=self._group.name, end_effector=self._group.end_effector,
-            possible_grasps=grasps, support_surface_name=self._support_surface,
-            allow_gripper_support_collision=bool(self._support_surface), path_constraints=self._path_constraints,
-            planner_id=self._planner_id, allowed_planning_time=self._planning_time_s,
-            planning_options=self._options(plan_only))
+            target_name=object_name,
+            group_name=self._group.name,
+            end_effector=self._group.end_effector,
+            possible_grasps=grasps,
+            support_surface_name=self._support_surface,
+            allow_gripper_support_collision=bool(self._support_surface),
+            path_constraints=self._path_constraints,
+            planner_id=self._planner_id,
+            allowed_planning_time=self._planning_time_s,
+            planning_options=self._options(plan_only),
+        )
         code = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S).error_code
         self._judge(code, "pick")
         return int(code.val)
@@ -98,11 +106,16 @@ class GroupObjects(GroupMotion):
             MoveItCommanderException: the location is of another type.
         """
         goal = PlaceGoal(
-            group_name=self._group.name, attached_object_name=object_name,
-            place_locations=self._place_locations(location), support_surface_name=self._support_surface,
+            group_name=self._group.name,
+            attached_object_name=object_name,
+            place_locations=self._place_locations(location),
+            support_surface_name=self._support_surface,
             path_constraints=self._path_constraints,
-            allow_gripper_support_collision=bool(self._support_surface), planner_id=self._planner_id,
-            allowed_planning_time=self._planning_time_s, planning_options=self._options(plan_only))
+            allow_gripper_support_collision=bool(self._support_surface),
+            planner_id=self._planner_id,
+            allowed_planning_time=self._planning_time_s,
+            planning_options=self._options(plan_only),
+        )
         caller = self._servers.action("place", PlaceAction)
         result = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S)
         return self._judge(result.error_code, "place")
@@ -131,20 +144,28 @@ class GroupObjects(GroupMotion):
         try:
             answer = self._servers.call("plan_grasps", GraspPlanning, request)
         except ServerError as error:
-            rospy.logwarn("pick of '%s': no grasp is given and nobody plans one (%s); give grasps to pick()",
-                          object_name, error)
+            rospy.logwarn(
+                "pick of '%s': no grasp is given and nobody plans one (%s); give grasps to pick()", object_name, error
+            )
             return []
         if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.grasps:
-            rospy.logwarn("pick of '%s': no grasp is given, and service plan_grasps has %d (code %d); give grasps to "
-                          "pick()", object_name, len(answer.grasps), answer.error_code.val)
+            rospy.logwarn(
+                "pick of '%s': no grasp is given, and service plan_grasps has %d (code %d); give grasps to pick()",
+                object_name,
+                len(answer.grasps),
+                answer.error_code.val,
+            )
         return list(answer.grasps)
 
     def _publish(self, messages: Sequence[AttachedCollisionObject]) -> bool:
         deadline = time.monotonic() + LISTENER_TIMEOUT_S
         while self._attachments.get_num_connections() == 0 and not rospy.is_shutdown():
             if time.monotonic() > deadline:
-                rospy.logerr("topic %s: nobody has listened for %g s; does move_group run?",
-                             self._attachments.resolved_name, LISTENER_TIMEOUT_S)
+                rospy.logerr(
+                    "topic %s: nobody has listened for %g s; does move_group run?",
+                    self._attachments.resolved_name,
+                    LISTENER_TIMEOUT_S,
+                )
                 return False
             time.sleep(0.01)
         for message in messages:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pose targets of a group: poses, positions and orientations of its end effector link."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -93,13 +94,21 @@ class GroupPoseTargets(GroupJointTargets):
     def construct_motion_plan_request(self) -> MotionPlanRequest:
         """Returns the planning request of the current settings and the target set last."""
         return MotionPlanRequest(
-            group_name=self._group.name, num_planning_attempts=self._attempts,
-            allowed_planning_time=self._planning_time_s, pipeline_id=self._pipeline_id, planner_id=self._planner_id,
+            group_name=self._group.name,
+            num_planning_attempts=self._attempts,
+            allowed_planning_time=self._planning_time_s,
+            pipeline_id=self._pipeline_id,
+            planner_id=self._planner_id,
             max_velocity_scaling_factor=self._velocity_scaling,
-            max_acceleration_scaling_factor=self._acceleration_scaling, max_cartesian_speed=self._speed_limit,
-            cartesian_speed_limited_link=self._limited_link(), workspace_parameters=self._workspace,
-            start_state=self._start_state, goal_constraints=self._goals(), path_constraints=self._path_constraints,
-            trajectory_constraints=self._trajectory_constraints)
+            max_acceleration_scaling_factor=self._acceleration_scaling,
+            max_cartesian_speed=self._speed_limit,
+            cartesian_speed_limited_link=self._limited_link(),
+            workspace_parameters=self._workspace,
+            start_state=self._start_state,
+            goal_constraints=self._goals(),
+            path_constraints=self._path_constraints,
+            trajectory_constraints=self._trajectory_constraints,
+        )
 
     def _limited_link(self) -> str:
         return (self._speed_limited_link or self._end_effector_link) if self._speed_limit > 0.0 else ""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How a group plans: planner, times, tolerances, scaling factors, workspace, start state and constraints."""
+
 from __future__ import annotations
 
 import math
@@ -11,8 +12,10 @@ from moveit_commander.constraints_storage import ConstraintsStorage
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_connection import GroupConnection
 
-NO_DATABASE = ("no database of constraints is chosen: call set_constraints_database with the path of an SQLite file, "
-               "or give the moveit_msgs/Constraints message itself")
+NO_DATABASE = (
+    "no database of constraints is chosen: call set_constraints_database with the path of an SQLite file, "
+    "or give the moveit_msgs/Constraints message itself"
+)
 
 
 class GroupSettings(GroupConnection):
@@ -137,8 +140,9 @@ class GroupSettings(GroupConnection):
         elif isinstance(value, TrajectoryConstraints):
             self._trajectory_constraints = value
         else:
-            raise MoveItCommanderException(f"Unable to set trajectory constraints {value!r}: a "
-                                           "moveit_msgs/TrajectoryConstraints is needed")
+            raise MoveItCommanderException(
+                f"Unable to set trajectory constraints {value!r}: a moveit_msgs/TrajectoryConstraints is needed"
+            )
 
     def clear_trajectory_constraints(self) -> None:
         """Clears the trajectory constraints."""
@@ -213,6 +217,7 @@ class GroupSettings(GroupConnection):
 
 def _share(value: float, what: str) -> float:
     if not 0.0 < value <= 1.0:
-        raise MoveItCommanderException(f"Expected value in the range from 0 to 1 for scaling factor; got {value} for "
-                                       f"{what}, allowed is (0, 1]")
+        raise MoveItCommanderException(
+            f"Expected value in the range from 0 to 1 for scaling factor; got {value} for {what}, allowed is (0, 1]"
+        )
     return float(value)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Commands as text, for people at a terminal and files of commands: MoveGroupCommandInterpreter."""
+
 from __future__ import annotations
 
 import os.path
@@ -23,11 +24,13 @@ from moveit_commander.move_group import MoveGroupCommander
 from moveit_commander.planning_scene_interface import PlanningSceneInterface
 from moveit_commander.robot import RobotCommander
 
-GENERAL = {"use": ("use [<group>|previous]", "command another group, or list those in use"),
-           "trace": ("trace [on|off]", "show the lines of a file as they are executed"),
-           "load": ("load [<file>]", "execute the commands of a file"),
-           "save": ("save [<file>]", "write groups and remembered joint values as commands"),
-           "help": ("help", "this list")}
+GENERAL = {
+    "use": ("use [<group>|previous]", "command another group, or list those in use"),
+    "trace": ("trace [on|off]", "show the lines of a file as they are executed"),
+    "load": ("load [<file>]", "execute the commands of a file"),
+    "save": ("save [<file>]", "write groups and remembered joint values as commands"),
+    "help": ("help", "this list"),
+}
 ALIASES = {"which": "id", "groups": "use"}
 FOLDER = Path("cmd")  # files here are commands by their names
 
@@ -64,8 +67,10 @@ class MoveGroupCommandInterpreter:
             return answer
         group = self.get_active_group()
         if group is None:
-            return MoveGroupInfoLevel.WARN, ("No group is commanded yet; say: use <group>, with one of "
-                                             f"{', '.join(self._robot.get_group_names())}\n\n{self.get_help()}")
+            return MoveGroupInfoLevel.WARN, (
+                "No group is commanded yet; say: use <group>, with one of "
+                f"{', '.join(self._robot.get_group_names())}\n\n{self.get_help()}"
+            )
         return self.execute_group_command(group, line)
 
     def resolve_command_alias(self, cmdorig: str) -> str:
@@ -92,8 +97,12 @@ class MoveGroupCommandInterpreter:
         words = line.split()
         first = words[0].lower()
         general: dict[str, Callable[[Words], Answer]] = {
-            "use": self._use, "trace": self._trace, "load": self._load, "save": self._save,
-            "help": lambda _: info(self.get_help())}
+            "use": self._use,
+            "trace": self._trace,
+            "load": self._load,
+            "save": self._save,
+            "help": lambda _: info(self.get_help()),
+        }
         if first in general and len(words) <= (1 if first == "help" else 2):
             return general[first](words[1:])
         if first in general and "=" not in line:
@@ -160,8 +169,11 @@ class MoveGroupCommandInterpreter:
 
     def get_help(self) -> str:
         """Returns all commands, a line each."""
-        rows = [*GENERAL.values(), *((item.usage, item.text) for item in dict.fromkeys(COMMANDS.values())),
-                *ASSIGNMENTS]
+        rows = [
+            *GENERAL.values(),
+            *((item.usage, item.text) for item in dict.fromkeys(COMMANDS.values())),
+            *ASSIGNMENTS,
+        ]
         return "\n".join(["Known commands:", *(f"  {usage:<32} {text}" for usage, text in rows)])
 
     def get_keywords(self) -> dict[str, list[str]]:
@@ -169,8 +181,15 @@ class MoveGroupCommandInterpreter:
         group = self.get_active_group()
         known = list(group.get_remembered_joint_values()) if group else []
         states = list(group.get_named_targets()) if group else []
-        more = {"go": [*DIRECTIONS, "random", *states], "plan": ["random", *states],
-                "use": self._robot.get_group_names(), "record": known, "show": known, "delete": known,
-                "constrain": group.get_known_constraints() if group else [],
-                "allow": ["replanning", "looking"], "trace": ["on", "off"]}
+        more = {
+            "go": [*DIRECTIONS, "random", *states],
+            "plan": ["random", *states],
+            "use": self._robot.get_group_names(),
+            "record": known,
+            "show": known,
+            "delete": known,
+            "constrain": group.get_known_constraints() if group else [],
+            "allow": ["replanning", "looking"],
+            "trace": ["on", "off"],
+        }
         return {name: more.get(name, []) for name in (*GENERAL, *COMMANDS)}

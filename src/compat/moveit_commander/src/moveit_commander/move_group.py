@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commander of one planning group: MoveGroupCommander."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -19,8 +20,9 @@ from moveit_commander.trajectory_timing import ALGORITHMS, distinct, retime
 class MoveGroupCommander(GroupObjects):
     """Plans and moves one planning group of a robot, through the move_group node."""
 
-    def __init__(self, name: str, robot_description: str = "robot_description", ns: str = "",
-                 wait_for_servers: float = 5.0) -> None:
+    def __init__(
+        self, name: str, robot_description: str = "robot_description", ns: str = "", wait_for_servers: float = 5.0
+    ) -> None:
         """Connects to move_group.
 
         Args:
@@ -35,8 +37,9 @@ class MoveGroupCommander(GroupObjects):
         """
         super().__init__(name, robot_description, ns, wait_for_servers)
 
-    def get_jacobian_matrix(self, joint_values: Sequence[float],
-                            reference_point: Sequence[float] | None = None) -> list[list[float]]:
+    def get_jacobian_matrix(
+        self, joint_values: Sequence[float], reference_point: Sequence[float] | None = None
+    ) -> list[list[float]]:
         """Returns the 6 x n Jacobian of the group's last link, in the frame of the group's base link.
 
         Args:
@@ -53,9 +56,14 @@ class MoveGroupCommander(GroupObjects):
         matrix = jacobian(chain, positions, reference_point or (0.0, 0.0, 0.0))
         return [[float(value) for value in row] for row in matrix]
 
-    def retime_trajectory(self, ref_state_in: RobotState, traj_in: RobotTrajectory,
-                          velocity_scaling_factor: float = 1.0, acceleration_scaling_factor: float = 1.0,
-                          algorithm: str = "iterative_time_parameterization") -> RobotTrajectory:
+    def retime_trajectory(
+        self,
+        ref_state_in: RobotState,
+        traj_in: RobotTrajectory,
+        velocity_scaling_factor: float = 1.0,
+        acceleration_scaling_factor: float = 1.0,
+        algorithm: str = "iterative_time_parameterization",
+    ) -> RobotTrajectory:
         """Returns the trajectory with new times, velocities and accelerations; its waypoints stay.
 
         Args:
@@ -67,28 +75,38 @@ class MoveGroupCommander(GroupObjects):
                 log, and the answer is empty, as in MoveIt.
         """
         if algorithm not in ALGORITHMS:
-            rospy.logerr("retime_trajectory: unknown time parameterization algorithm '%s'; allowed: %s; the answer is "
-                         "an empty trajectory", algorithm, ", ".join(ALGORITHMS))
+            rospy.logerr(
+                "retime_trajectory: unknown time parameterization algorithm '%s'; allowed: %s; the answer is "
+                "an empty trajectory",
+                algorithm,
+                ", ".join(ALGORITHMS),
+            )
             return RobotTrajectory()
         names = traj_in.joint_trajectory.joint_names
         unknown = [name for name in names if name not in self._model.joints]
         if unknown:
-            raise MoveItCommanderException(f"retime_trajectory: unknown joints {unknown}; only joints of the robot are "
-                                           f"allowed: {', '.join(self._model.joints)}")
+            raise MoveItCommanderException(
+                f"retime_trajectory: unknown joints {unknown}; only joints of the robot are "
+                f"allowed: {', '.join(self._model.joints)}"
+            )
         joints = [self._model.joints[name] for name in names]
         points = [point.positions for point in traj_in.joint_trajectory.points]
         timed = RobotTrajectory(multi_dof_joint_trajectory=traj_in.multi_dof_joint_trajectory)
         timed.joint_trajectory.header, timed.joint_trajectory.joint_names = traj_in.joint_trajectory.header, list(names)
         kept = [points[index] for index in distinct(points)] if len(points) > 1 else points
         if len(kept) < 2:
-            timed.joint_trajectory.points = [_point(point, 0.0, [0.0] * len(names), [0.0] * len(names))
-                                             for point in kept]
+            timed.joint_trajectory.points = [
+                _point(point, 0.0, [0.0] * len(names), [0.0] * len(names)) for point in kept
+            ]
             return timed
         times, velocities, accelerations = retime(
-            kept, _factor("velocity", velocity_scaling_factor) * np.array([joint.velocity for joint in joints]),
-            _factor("acceleration", acceleration_scaling_factor) * np.array([joint.acceleration for joint in joints]))
-        timed.joint_trajectory.points = [_point(*row) for row in zip(kept, times, velocities, accelerations,
-                                                                     strict=True)]
+            kept,
+            _factor("velocity", velocity_scaling_factor) * np.array([joint.velocity for joint in joints]),
+            _factor("acceleration", acceleration_scaling_factor) * np.array([joint.acceleration for joint in joints]),
+        )
+        timed.joint_trajectory.points = [
+            _point(*row) for row in zip(kept, times, velocities, accelerations, strict=True)
+        ]
         return timed
 
 
@@ -100,8 +118,12 @@ def _factor(kind: str, value: float) -> float:
     return 1.0
 
 
-def _point(positions: Sequence[float], time_s: float, velocities: Sequence[float],
-           accelerations: Sequence[float]) -> JointTrajectoryPoint:
-    return JointTrajectoryPoint(positions=list(positions), velocities=[float(value) for value in velocities],
-                                accelerations=[float(value) for value in accelerations],
-                                time_from_start=rospy.Duration.from_sec(float(time_s)))
+def _point(
+    positions: Sequence[float], time_s: float, velocities: Sequence[float], accelerations: Sequence[float]
+) -> JointTrajectoryPoint:
+    return JointTrajectoryPoint(
+        positions=list(positions),
+        velocities=[float(value) for value in velocities],
+        accelerations=[float(value) for value in accelerations],
+        time_from_start=rospy.Duration.from_sec(float(time_s)),
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks whether a collision object lies within a box."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Changes and reads the planning scene of move_group: PlanningSceneInterface."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -49,8 +50,9 @@ class PlanningSceneInterface:
         self._pub_aco: Any = None
         if not synchronous:
             self._pub_co = rospy.Publisher(ns_join(ns, "collision_object"), CollisionObject, queue_size=100)
-            self._pub_aco = rospy.Publisher(ns_join(ns, "attached_collision_object"), AttachedCollisionObject,
-                                                queue_size=100)
+            self._pub_aco = rospy.Publisher(
+                ns_join(ns, "attached_collision_object"), AttachedCollisionObject, queue_size=100
+            )
 
     def add_object(self, collision_object: CollisionObject) -> None:
         """Adds an object, or replaces the one with its id."""
@@ -80,8 +82,12 @@ class PlanningSceneInterface:
         """Adds the plane normal . p + offset = 0 in the pose's frame [m]."""
         self._submit(self.make_plane(name, pose, normal, offset))
 
-    def attach_object(self, object: AttachedCollisionObject | CollisionObject | str,  # noqa: A002 - public name
-                      link: str | None = None, touch_links: Sequence[str] | None = None) -> None:
+    def attach_object(
+        self,
+        object: AttachedCollisionObject | CollisionObject | str,  # noqa: A002 - public name
+        link: str | None = None,
+        touch_links: Sequence[str] | None = None,
+    ) -> None:
         """Attaches a new object, or (by its name) one of the scene, to a link.
 
         Args:
@@ -97,24 +103,50 @@ class PlanningSceneInterface:
         attached.touch_links = [attached.link_name] if touch_links is None else list(touch_links)
         self._submit(attached)
 
-    def attach_mesh(self, link: str, name: str, pose: PoseStamped | None = None, filename: str = "",
-                    size: Vector = (1, 1, 1), touch_links: Sequence[str] | None = None) -> None:
+    def attach_mesh(
+        self,
+        link: str,
+        name: str,
+        pose: PoseStamped | None = None,
+        filename: str = "",
+        size: Vector = (1, 1, 1),
+        touch_links: Sequence[str] | None = None,
+    ) -> None:
         """Attaches a mesh of a file; without pose and file: the object of that name."""
         new = self.make_mesh(name, pose, filename, size) if pose is not None and filename else name
         self.attach_object(new, link, touch_links)
 
-    def attach_box(self, link: str, name: str, pose: PoseStamped | None = None, size: Vector = (1, 1, 1),
-                   touch_links: Sequence[str] | None = None) -> None:
+    def attach_box(
+        self,
+        link: str,
+        name: str,
+        pose: PoseStamped | None = None,
+        size: Vector = (1, 1, 1),
+        touch_links: Sequence[str] | None = None,
+    ) -> None:
         """Attaches a box [m]; without pose: the object of that name."""
         self.attach_object(name if pose is None else self.make_box(name, pose, size), link, touch_links)
 
-    def attach_sphere(self, link: str, name: str, pose: PoseStamped | None = None, radius: float = 1,
-                      touch_links: Sequence[str] | None = None) -> None:
+    def attach_sphere(
+        self,
+        link: str,
+        name: str,
+        pose: PoseStamped | None = None,
+        radius: float = 1,
+        touch_links: Sequence[str] | None = None,
+    ) -> None:
         """Attaches a sphere [m]; without pose: the object of that name."""
         self.attach_object(name if pose is None else self.make_sphere(name, pose, radius), link, touch_links)
 
-    def attach_cylinder(self, link: str, name: str, pose: PoseStamped | None = None, height: float = 1,
-                        radius: float = 1, touch_links: Sequence[str] | None = None) -> None:
+    def attach_cylinder(
+        self,
+        link: str,
+        name: str,
+        pose: PoseStamped | None = None,
+        height: float = 1,
+        radius: float = 1,
+        touch_links: Sequence[str] | None = None,
+    ) -> None:
         """Attaches a cylinder [m]; without pose: the object of that name."""
         self.attach_object(name if pose is None else self.make_cylinder(name, pose, height, radius), link, touch_links)
 
@@ -135,15 +167,22 @@ class PlanningSceneInterface:
 
     def get_known_object_names(self, with_type: bool = False) -> list[str]:
         """Returns the names of the world's objects; with_type: only those with a type."""
-        return [item.id for item in self._world(PlanningSceneComponents.WORLD_OBJECT_NAMES)
-                if item.type.key or not with_type]
+        return [
+            item.id
+            for item in self._world(PlanningSceneComponents.WORLD_OBJECT_NAMES)
+            if item.type.key or not with_type
+        ]
 
-    def get_known_object_names_in_roi(self, minx: float, miny: float, minz: float, maxx: float, maxy: float,
-                                      maxz: float, with_type: bool = False) -> list[str]:
+    def get_known_object_names_in_roi(
+        self, minx: float, miny: float, minz: float, maxx: float, maxy: float, maxz: float, with_type: bool = False
+    ) -> list[str]:
         """As get_known_object_names, of objects whose shapes all have their origin in a box, planning frame [m]."""
         region = Region((minx, miny, minz), (maxx, maxy, maxz))
-        return [item.id for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
-                if (item.type.key or not with_type) and inside(item, region)]
+        return [
+            item.id
+            for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+            if (item.type.key or not with_type) and inside(item, region)
+        ]
 
     def get_object_poses(self, object_ids: Sequence[str]) -> dict[str, Pose]:
         """Returns the poses of objects in the planning frame, by name; unknown names are left out."""
@@ -151,14 +190,20 @@ class PlanningSceneInterface:
 
     def get_objects(self, object_ids: Sequence[str] = ()) -> dict[str, CollisionObject]:
         """Returns the objects of the world by name; none named: all of them."""
-        return {item.id: item for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
-                if item.id in object_ids or not object_ids}
+        return {
+            item.id: item
+            for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+            if item.id in object_ids or not object_ids
+        }
 
     def get_attached_objects(self, object_ids: Sequence[str] = ()) -> dict[str, AttachedCollisionObject]:
         """Returns the attached objects by name; none named: all of them."""
         scene = self.get_planning_scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
-        return {item.object.id: item for item in scene.robot_state.attached_collision_objects
-                if item.object.id in object_ids or not object_ids}
+        return {
+            item.object.id: item
+            for item in scene.robot_state.attached_collision_objects
+            if item.object.id in object_ids or not object_ids
+        }
 
     def get_planning_scene(self, components: int) -> PlanningScene:
         """Returns parts of move_group's scene: bits of moveit_msgs/PlanningSceneComponents."""
@@ -216,5 +261,7 @@ class PlanningSceneInterface:
             scene.world.collision_objects = [item]
         if not self.apply_planning_scene(scene):
             name = item.object.id if attached else item.id
-            raise ServerError(f"service {self._servers.resolve('apply_planning_scene')}: the change of object '{name}' "
-                              "was refused and the scene is as before; the log of move_group says why")
+            raise ServerError(
+                f"service {self._servers.resolve('apply_planning_scene')}: the change of object '{name}' "
+                "was refused and the scene is as before; the log of move_group says why"
+            )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RobotCommander: the joints, links, groups and current state of the robot."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -167,8 +168,9 @@ class RobotCommander:
 
     def get_default_owner_group(self, joint_name: str) -> str | None:
         """Returns the group with the fewest links of those that have a joint; None if no group has it."""
-        owners = [group for group in self._model.groups.values()
-                  if any(joint.name == joint_name for joint in group.joints)]
+        owners = [
+            group for group in self._model.groups.values() if any(joint.name == joint_name for joint in group.joints)
+        ]
         return min(owners, key=lambda group: (len(group.links), group.name)).name if owners else None
 
     def get_robot_markers(self, *args: Any) -> MarkerArray:
@@ -194,10 +196,13 @@ class RobotCommander:
             case (str() as group, dict() as values):
                 links = self._model.group(group).links
             case _:
-                raise MoveItCommanderException(f"Unexpected type: {[type(item) for item in args]}; allowed: nothing, "
-                                               "RobotState, dict, (dict, list of links), group, (group, dict)")
-        unknown = [name for name in (*values, *links) if name not in self._model.joints and name not in
-                   self._model.links]
+                raise MoveItCommanderException(
+                    f"Unexpected type: {[type(item) for item in args]}; allowed: nothing, "
+                    "RobotState, dict, (dict, list of links), group, (group, dict)"
+                )
+        unknown = [
+            name for name in (*values, *links) if name not in self._model.joints and name not in self._model.links
+        ]
         if unknown:
             raise MoveItCommanderException(f"get_robot_markers: robot '{self._model.name}' has no {unknown}")
         positions = self._model.complete({**self._state.positions(), **values})
@@ -215,5 +220,6 @@ class RobotCommander:
                 return self.get_joint(name)
             if name in self._model.links:
                 return self.get_link(name)
-        raise AttributeError(f"RobotCommander has no attribute '{name}', and the robot no group, joint or link of "
-                             "that name")
+        raise AttributeError(
+            f"RobotCommander has no attribute '{name}', and the robot no group, joint or link of that name"
+        )

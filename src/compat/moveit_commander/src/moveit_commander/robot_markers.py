@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shows a state of the robot as markers: the visual shapes of its links where compute_fk says they are."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -30,8 +31,9 @@ def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links:
     request.header.frame_id = model.planning_frame
     answer = servers.call("compute_fk", GetPositionFK, request)
     if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-        raise MoveItCommanderException(f"service {servers.resolve('compute_fk')}: no poses of {', '.join(shown)}: code "
-                                       f"{answer.error_code.val}")
+        raise MoveItCommanderException(
+            f"service {servers.resolve('compute_fk')}: no poses of {', '.join(shown)}: code {answer.error_code.val}"
+        )
     poses = dict(zip(answer.fk_link_names, answer.pose_stamped, strict=True))
     array = MarkerArray()
     for link in shown:
@@ -67,7 +69,9 @@ def _marker(visual: PlacedShapes) -> Marker | None:
 
 def _compose(outer: Pose, inner: Pose) -> Pose:
     """Returns the inner pose, given in the frame of the outer one, in the frame the outer one is given in."""
-    rotations = (Rotation.from_quat([item.orientation.x, item.orientation.y, item.orientation.z, item.orientation.w])
-                 for item in (outer, inner))
+    rotations = (
+        Rotation.from_quat([item.orientation.x, item.orientation.y, item.orientation.z, item.orientation.w])
+        for item in (outer, inner)
+    )
     quaternion = (next(rotations) * next(rotations)).as_quat()
     return Pose(Point(*transform_point(outer, inner.position)), Quaternion(*quaternion.tolist()))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot as its URDF, SRDF and joint limits describe it: joints, links, groups, bounds and named states."""
+
 from __future__ import annotations
 
 import math
@@ -122,8 +123,9 @@ class RobotModel:
         self.name = description.name
         self.visuals = {link.name: link.visuals for link in description.links}
         found = _with_leaders([_joint(joint, limits or {}) for joint in description.joints])
-        self.mimics = {joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in found
-                       if joint.leader}
+        self.mimics = {
+            joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in found if joint.leader
+        }
         tree = {joint.child: joint for joint in found}
         roots = description.root_links()
         if len(roots) != 1:
@@ -143,8 +145,10 @@ class RobotModel:
     def group(self, name: str) -> Group:
         """Returns a group; raises RobotModelError with the names there are."""
         if name not in self.groups:
-            raise RobotModelError(f"There is no group named '{name}' in robot '{self.name}'; it has: "
-                                  f"{', '.join(sorted(self.groups)) or 'none'}")
+            raise RobotModelError(
+                f"There is no group named '{name}' in robot '{self.name}'; it has: "
+                f"{', '.join(sorted(self.groups)) or 'none'}"
+            )
         return self.groups[name]
 
     def chain(self, base: str, tip: str) -> list[Joint]:
@@ -184,8 +188,11 @@ class RobotModel:
         wanted = self._members(spec, frozenset())
         joints = tuple(joint for joint in self.joints.values() if joint.name in wanted)
         links = tuple(joint.child for joint in joints)
-        is_chain = bool(joints) and any(joint.active for joint in joints) and all(
-            self._follows(sooner, later) for sooner, later in zip(joints[:-1], joints[1:], strict=True))
+        is_chain = (
+            bool(joints)
+            and any(joint.active for joint in joints)
+            and all(self._follows(sooner, later) for sooner, later in zip(joints[:-1], joints[1:], strict=True))
+        )
         known = self._semantics.end_effectors
         effectors = [item for item in known if name in (item.group, item.parent_group)]
         effectors += [item for item in known if item.parent_link in links]
@@ -231,12 +238,17 @@ def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
     """Lets every mimic joint follow the joint that drives its chain of mimic joints; a fixed joint follows none."""
     moving = [joint for joint in joints if joint.movable]
     try:
-        mimics = resolved({joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in moving
-                           if joint.leader}, [joint.name for joint in moving])
+        mimics = resolved(
+            {joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in moving if joint.leader},
+            [joint.name for joint in moving],
+        )
     except ValueError as error:
         raise RobotModelError(str(error)) from error
-    return [replace(joint, leader=mimic.leader, multiplier=mimic.multiplier, offset=mimic.offset)
-            for joint in joints for mimic in (mimics.get(joint.name, NO_MIMIC),)]
+    return [
+        replace(joint, leader=mimic.leader, multiplier=mimic.multiplier, offset=mimic.offset)
+        for joint in joints
+        for mimic in (mimics.get(joint.name, NO_MIMIC),)
+    ]
 
 
 def _root_joint(semantics: SemanticDescription, root_link: str) -> Joint:
@@ -263,14 +275,17 @@ def _joint(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
     try:
         return _limited(joint, limits.get(joint.name) or {})
     except (ValueError, TypeError, AttributeError) as error:
-        raise RobotModelError(f"URDF joint '{joint.name}' or its entry in joint_limits.yaml: {error}; numbers and the "
-                              "elements parent and child are needed") from error
+        raise RobotModelError(
+            f"URDF joint '{joint.name}' or its entry in joint_limits.yaml: {error}; numbers and the "
+            "elements parent and child are needed"
+        ) from error
 
 
 def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
     """The joint within the limits of the description, or those that its entry in joint_limits.yaml puts in place."""
-    lower, upper, velocity = (0.0, 0.0, 1.0) if joint.limit is None else (
-        joint.limit.lower, joint.limit.upper, joint.limit.velocity or 1.0)
+    lower, upper, velocity = (
+        (0.0, 0.0, 1.0) if joint.limit is None else (joint.limit.lower, joint.limit.upper, joint.limit.velocity or 1.0)
+    )
     if joint.safety is not None:
         lower = lower if joint.safety.soft_lower_limit is None else max(lower, joint.safety.soft_lower_limit)
         upper = upper if joint.safety.soft_upper_limit is None else min(upper, joint.safety.soft_upper_limit)
@@ -282,8 +297,22 @@ def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
         velocity = float(entry.get("max_velocity", velocity))
     acceleration = float(entry.get("max_acceleration", 1.0)) if entry.get("has_acceleration_limits", False) else 1.0
     mimic = joint.mimic or NO_MIMIC
-    return Joint(joint.name, joint.kind, joint.parent, joint.child, lower, upper, velocity, acceleration,
-                 joint.origin.xyz, joint.origin.rpy, joint.axis, mimic.leader, mimic.multiplier, mimic.offset)
+    return Joint(
+        joint.name,
+        joint.kind,
+        joint.parent,
+        joint.child,
+        lower,
+        upper,
+        velocity,
+        acceleration,
+        joint.origin.xyz,
+        joint.origin.rpy,
+        joint.axis,
+        mimic.leader,
+        mimic.multiplier,
+        mimic.offset,
+    )
 
 
 def group_values(group: Group, values: Sequence[float]) -> dict[str, float]:
@@ -296,5 +325,7 @@ def group_values(group: Group, values: Sequence[float]) -> dict[str, float]:
     for joints in (group.variables, group.active_joints):
         if len(numbers) == len(joints):
             return {joint.name: number for joint, number in zip(joints, numbers, strict=True)}
-    raise RobotModelError(f"group '{group.name}': got {len(numbers)} joint values; {len(group.variables)} are needed, "
-                          f"in this order: {', '.join(joint.name for joint in group.variables)}")
+    raise RobotModelError(
+        f"group '{group.name}': got {len(numbers)} joint values; {len(group.variables)} are needed, "
+        f"in this order: {', '.join(joint.name for joint in group.variables)}"
+    )

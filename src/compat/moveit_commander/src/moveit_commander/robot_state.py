@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot as it is now: its description from the parameter server, its joint positions from joint_states."""
+
 from __future__ import annotations
 
 import threading
@@ -30,9 +31,11 @@ def load_model(robot_description: str) -> RobotModel:
     for parameter in (robot_description, f"{robot_description}_semantic"):
         text = rospy.get_param(parameter, None)
         if not isinstance(text, str):
-            raise RobotModelError(f"parameter {rospy.resolve_name(parameter)}: got {type(text).__name__}, the text of "
-                                  "the robot's description is needed; load it (planning_context.launch) or name "
-                                  "another one by the argument robot_description")
+            raise RobotModelError(
+                f"parameter {rospy.resolve_name(parameter)}: got {type(text).__name__}, the text of "
+                "the robot's description is needed; load it (planning_context.launch) or name "
+                "another one by the argument robot_description"
+            )
         texts.append(text)
     limits = rospy.get_param(f"{robot_description}_planning/joint_limits", {})
     return RobotModel(texts[0], texts[1], limits if isinstance(limits, dict) else {})
@@ -91,8 +94,10 @@ class CurrentState:
         with self._changed:
             if not self._changed.wait_for(lambda: self._fresh(names, begun), timeout_s):
                 missing = sorted(name for name in names if self._arrivals.get(name, 0.0) < begun)
-                raise ServerError(f"topic {self._topic}: waited {timeout_s:g} s for joint states, nothing came for "
-                                  f"{', '.join(missing)}; does the joint state controller run?")
+                raise ServerError(
+                    f"topic {self._topic}: waited {timeout_s:g} s for joint states, nothing came for "
+                    f"{', '.join(missing)}; does the joint state controller run?"
+                )
             return self.model.complete(self._positions)
 
     def message(self, needed: Iterable[str] = ()) -> RobotState:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the process a ROS node if the script has not done so, under the names scripts of MoveIt call."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Clients of the services and actions of move_group; each wait is bounded, and its error says what it waited for."""
+
 from __future__ import annotations
 
 import threading
@@ -47,8 +48,10 @@ class Servers:
             rospy.wait_for_service(full_name, timeout_s)
             return rospy.ServiceProxy(full_name, kind)(request)
         except rospy.ROSException as error:
-            raise ServerError(f"service {full_name}: waited {timeout_s:g} s, nobody offers it ({error}); does "
-                              "move_group run, and does it have this capability?") from error
+            raise ServerError(
+                f"service {full_name}: waited {timeout_s:g} s, nobody offers it ({error}); does "
+                "move_group run, and does it have this capability?"
+            ) from error
         except rospy.ServiceException as error:
             raise ServerError(f"service {full_name} failed: {error}; move_group's log says why") from error
 
@@ -77,8 +80,10 @@ class ActionCaller:
         begun = time.monotonic()
         while not is_connected(self._client):
             if rospy.is_shutdown() or 0.0 < timeout_s <= time.monotonic() - begun:
-                raise ServerError(f"action {self.name}: Unable to connect to its server within allotted time "
-                                  f"({timeout_s:g}s); does move_group run, and does it have this capability?")
+                raise ServerError(
+                    f"action {self.name}: Unable to connect to its server within allotted time "
+                    f"({timeout_s:g}s); does move_group run, and does it have this capability?"
+                )
             time.sleep(POLL_PERIOD_S)
         if not self._settled:
             time.sleep(SETTLE_S)
@@ -106,12 +111,16 @@ class ActionCaller:
                 self._client.cancel_goal()
                 raise ServerError(f"action {self.name}: no result within {timeout_s:g} s; the goal is cancelled")
             if now - seen > SERVER_LOST_S:
-                raise ServerError(f"action {self.name}: its server has gone, or ended the goal without a result, for "
-                                  f"{SERVER_LOST_S:g} s; has it died?")
+                raise ServerError(
+                    f"action {self.name}: its server has gone, or ended the goal without a result, for "
+                    f"{SERVER_LOST_S:g} s; has it died?"
+                )
         result = self._client.get_result()
         if result is None:
-            raise ServerError(f"action {self.name}: ended without a result ({self._client.get_goal_status_text()}); "
-                              "move_group's log says why")
+            raise ServerError(
+                f"action {self.name}: ended without a result ({self._client.get_goal_status_text()}); "
+                "move_group's log says why"
+            )
         return result
 
     def _ended(self) -> bool:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Times a given path anew: its waypoints stay, their times, velocities and accelerations keep the joints' limits."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -8,8 +9,11 @@ import numpy as np
 
 from moveit_commander.exception import MoveItCommanderException
 
-ALGORITHMS = ("iterative_time_parameterization", "iterative_spline_parameterization",
-              "time_optimal_trajectory_generation")
+ALGORITHMS = (
+    "iterative_time_parameterization",
+    "iterative_spline_parameterization",
+    "time_optimal_trajectory_generation",
+)
 GRID_POINTS = 20  # between two waypoints
 SAME_POINT = 1e-6  # [rad or m] waypoints nearer to each other than this are one
 
@@ -43,14 +47,24 @@ def retime(points: Any, velocity: Any, acceleration: Any) -> tuple[Any, Any, Any
     points = np.asarray(points, dtype=float)
     knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     path = SplineInterpolator(knots, points)
-    grid = np.concatenate([*(np.linspace(low, high, GRID_POINTS, endpoint=False)
-                             for low, high in zip(knots[:-1], knots[1:], strict=True)), knots[-1:]])
-    limits = [JointVelocityConstraint(np.column_stack([-velocity, velocity])),
-              JointAccelerationConstraint(np.column_stack([-acceleration, acceleration]))]
+    grid = np.concatenate(
+        [
+            *(
+                np.linspace(low, high, GRID_POINTS, endpoint=False)
+                for low, high in zip(knots[:-1], knots[1:], strict=True)
+            ),
+            knots[-1:],
+        ]
+    )
+    limits = [
+        JointVelocityConstraint(np.column_stack([-velocity, velocity])),
+        JointAccelerationConstraint(np.column_stack([-acceleration, acceleration])),
+    ]
     _, speeds, _ = TOPPRA(limits, path, gridpoints=grid, solver_wrapper="seidel").compute_parameterization(0.0, 0.0)
     if speeds is None or not np.isfinite(speeds).all() or (speeds[1:-1] <= 0.0).any():
-        raise MoveItCommanderException("retime_trajectory: no timing of this path keeps the joint limits; are there "
-                                       "sharp turns or limits of 0?")
+        raise MoveItCommanderException(
+            "retime_trajectory: no timing of this path keeps the joint limits; are there sharp turns or limits of 0?"
+        )
     steps = 2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])
     times = np.concatenate([[0.0], np.cumsum(steps)])
     changes = np.diff(speeds) / steps  # constant between two grid points

@@ -4,6 +4,7 @@
 A method that the commander has with the same arguments is the commander's own (`SAME`). The others differ in form only:
 messages are bytes, poses are lists, and a refused target is a False with the reason on the log.
 """
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,19 +25,60 @@ from sensor_msgs.msg import JointState
 
 from moveit_ros_planning_interface.serialized import accepted, read, write
 
-SAME = frozenset((
-    "allow_looking", "allow_replanning", "attach_object", "clear_max_cartesian_link_speed", "clear_path_constraints",
-    "clear_pose_target", "clear_pose_targets", "clear_trajectory_constraints", "detach_object", "forget_joint_values",
-    "get_active_joints", "get_current_joint_values", "get_current_rpy", "get_end_effector_link",
-    "get_goal_joint_tolerance", "get_goal_orientation_tolerance", "get_goal_position_tolerance", "get_jacobian_matrix",
-    "get_joint_value_target", "get_joints", "get_known_constraints", "get_name", "get_named_target_values",
-    "get_named_targets", "get_planner_id", "get_planning_frame", "get_planning_pipeline_id", "get_planning_time",
-    "get_pose_reference_frame", "get_random_joint_values", "get_remembered_joint_values", "get_variable_count",
-    "limit_max_cartesian_link_speed", "remember_joint_values", "set_constraints_database", "set_goal_joint_tolerance",
-    "set_goal_orientation_tolerance", "set_goal_position_tolerance", "set_goal_tolerance",
-    "set_max_acceleration_scaling_factor", "set_max_velocity_scaling_factor", "set_num_planning_attempts",
-    "set_planner_id", "set_planning_pipeline_id", "set_planning_time", "set_pose_reference_frame", "set_random_target",
-    "set_start_state_to_current_state", "set_support_surface_name", "stop"))
+SAME = frozenset(
+    (
+        "allow_looking",
+        "allow_replanning",
+        "attach_object",
+        "clear_max_cartesian_link_speed",
+        "clear_path_constraints",
+        "clear_pose_target",
+        "clear_pose_targets",
+        "clear_trajectory_constraints",
+        "detach_object",
+        "forget_joint_values",
+        "get_active_joints",
+        "get_current_joint_values",
+        "get_current_rpy",
+        "get_end_effector_link",
+        "get_goal_joint_tolerance",
+        "get_goal_orientation_tolerance",
+        "get_goal_position_tolerance",
+        "get_jacobian_matrix",
+        "get_joint_value_target",
+        "get_joints",
+        "get_known_constraints",
+        "get_name",
+        "get_named_target_values",
+        "get_named_targets",
+        "get_planner_id",
+        "get_planning_frame",
+        "get_planning_pipeline_id",
+        "get_planning_time",
+        "get_pose_reference_frame",
+        "get_random_joint_values",
+        "get_remembered_joint_values",
+        "get_variable_count",
+        "limit_max_cartesian_link_speed",
+        "remember_joint_values",
+        "set_constraints_database",
+        "set_goal_joint_tolerance",
+        "set_goal_orientation_tolerance",
+        "set_goal_position_tolerance",
+        "set_goal_tolerance",
+        "set_max_acceleration_scaling_factor",
+        "set_max_velocity_scaling_factor",
+        "set_num_planning_attempts",
+        "set_planner_id",
+        "set_planning_pipeline_id",
+        "set_planning_time",
+        "set_pose_reference_frame",
+        "set_random_target",
+        "set_start_state_to_current_state",
+        "set_support_surface_name",
+        "stop",
+    )
+)
 
 
 class MoveGroupInterface:
@@ -101,8 +143,9 @@ class MoveGroupInterface:
         return pose_to_list(self._commander.get_random_pose(end_effector_link).pose)
 
     # ---------------------------------------------------------------- targets
-    def set_joint_value_target(self, target: Iterable[float] | Mapping[str, float] | str,
-                               value: float | Sequence[float] | None = None) -> bool:
+    def set_joint_value_target(
+        self, target: Iterable[float] | Mapping[str, float] | str, value: float | Sequence[float] | None = None
+    ) -> bool:
         """Sets a joint target: values of all variables, values by name, or a joint's name and its value."""
         return accepted(self._commander.set_joint_value_target, target, value)
 
@@ -197,19 +240,38 @@ class MoveGroupInterface:
         """Sends the goal to move along a moveit_msgs/RobotTrajectory."""
         return self._commander.execute(read(RobotTrajectory, trajectory), wait=False)
 
-    def compute_cartesian_path(self, waypoints: Sequence[Sequence[float]], eef_step: float, avoid_collisions: bool,
-                               path_constraints: bytes | None = None) -> tuple[bytes, float]:
+    def compute_cartesian_path(
+        self,
+        waypoints: Sequence[Sequence[float]],
+        eef_step: float,
+        avoid_collisions: bool,
+        path_constraints: bytes | None = None,
+    ) -> tuple[bytes, float]:
         """Follows straight lines; returns moveit_msgs/RobotTrajectory and the share that was found, in [0, 1]."""
         constraints = None if path_constraints is None else read(Constraints, path_constraints)
-        path, share = self._commander.compute_cartesian_path(waypoints, eef_step, avoid_collisions=avoid_collisions,
-                                                             path_constraints=constraints)
+        path, share = self._commander.compute_cartesian_path(
+            waypoints, eef_step, avoid_collisions=avoid_collisions, path_constraints=constraints
+        )
         return write(path), share
 
-    def retime_trajectory(self, state: bytes, trajectory: bytes, velocity_scaling_factor: float,
-                          acceleration_scaling_factor: float, algorithm: str) -> bytes:
+    def retime_trajectory(
+        self,
+        state: bytes,
+        trajectory: bytes,
+        velocity_scaling_factor: float,
+        acceleration_scaling_factor: float,
+        algorithm: str,
+    ) -> bytes:
         """Returns the moveit_msgs/RobotTrajectory with new times."""
-        return write(self._commander.retime_trajectory(read(RobotState, state), read(RobotTrajectory, trajectory),
-                                                       velocity_scaling_factor, acceleration_scaling_factor, algorithm))
+        return write(
+            self._commander.retime_trajectory(
+                read(RobotState, state),
+                read(RobotTrajectory, trajectory),
+                velocity_scaling_factor,
+                acceleration_scaling_factor,
+                algorithm,
+            )
+        )
 
     # ---------------------------------------------------------------- objects
     def pick(self, object_name: str, grasps: bytes | Sequence[bytes] | bool = (), plan_only: bool = False) -> int:
@@ -225,8 +287,9 @@ class MoveGroupInterface:
         given = [grasps] if isinstance(grasps, bytes) else grasps
         return self._commander.pick(object_name, [read(Grasp, grasp) for grasp in given], plan_only)
 
-    def place(self, object_name: str, location: bytes | Sequence[float] | bool = False,
-              plan_only: bool = False) -> bool:
+    def place(
+        self, object_name: str, location: bytes | Sequence[float] | bool = False, plan_only: bool = False
+    ) -> bool:
         """Places an object.
 
         Args:

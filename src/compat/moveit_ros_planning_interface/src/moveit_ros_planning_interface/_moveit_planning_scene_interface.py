@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The planning scene with messages as bytes, as MoveIt's binding offers it."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -22,8 +23,9 @@ class PlanningSceneInterface:
         """Returns the names of the world's objects; with_type: only those with a type."""
         return self._scene.get_known_object_names(with_type)
 
-    def get_known_object_names_in_roi(self, minx: float, miny: float, minz: float, maxx: float, maxy: float,
-                                      maxz: float, with_type: bool = False) -> list[str]:
+    def get_known_object_names_in_roi(
+        self, minx: float, miny: float, minz: float, maxx: float, maxy: float, maxz: float, with_type: bool = False
+    ) -> list[str]:
         """As get_known_object_names, of the objects in a box [m]."""
         return self._scene.get_known_object_names_in_roi(minx, miny, minz, maxx, maxy, maxz, with_type)
 

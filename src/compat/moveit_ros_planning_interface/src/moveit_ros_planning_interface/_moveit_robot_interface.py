@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's description and present state, with messages as bytes, as MoveIt's binding offers it."""
+
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the process a ROS node, under the names of MoveIt's binding of roscpp."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence

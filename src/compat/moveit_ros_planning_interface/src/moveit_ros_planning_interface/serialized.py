@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Messages as bytes, the form in which MoveIt's bindings take and return them."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -20,9 +21,11 @@ def read(kind: type[Message], data: bytes) -> Message:
         genpy.DeserializationError: `data` is no message of this type.
     """
     if not isinstance(data, bytes):
-        raise TypeError(f"Python argument types in a call of moveit_ros_planning_interface do not match: got "
-                        f"{type(data).__name__}, a serialized {getattr(kind, '_type', kind.__name__)} (bytes) is "
-                        "needed; moveit_commander.conversions.msg_to_string makes one")
+        raise TypeError(
+            f"Python argument types in a call of moveit_ros_planning_interface do not match: got "
+            f"{type(data).__name__}, a serialized {getattr(kind, '_type', kind.__name__)} (bytes) is "
+            "needed; moveit_commander.conversions.msg_to_string makes one"
+        )
     message = kind()
     conversions.msg_from_string(message, data)
     return message

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Hierarchical state machines: the public interface of smach 2.5.2, written anew."""
+
 from smach.concurrence import Concurrence
 from smach.container import Container
 from smach.exceptions import (

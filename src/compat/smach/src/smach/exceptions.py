@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The errors of this library: each kind of mistake in a state machine has its own class."""
+
 from __future__ import annotations
 
 __all__ = [

@@ -4,6 +4,7 @@
 ``smach.loginfo``, ``logwarn``, ``logdebug`` and ``logerr`` are attributes of the package. Its own modules log by
 ``log.info`` and its like, which find them at each call, so a replacement takes effect everywhere at once.
 """
+
 from __future__ import annotations
 
 import logging

@@ -3,6 +3,7 @@
 
 Importing the package makes smach log through rospy and stop when rospy shuts down.
 """
+
 import rospy
 
 import smach

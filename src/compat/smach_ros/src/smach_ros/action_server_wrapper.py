@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Offers a state machine as an action: a goal runs it, its outcome is the end of the goal."""
+
 from __future__ import annotations
 
 import time
@@ -84,9 +85,7 @@ class ActionServerWrapper:
         self._check_outcomes()
         wrapped_container.register_transition_cb(self.transition_cb)
         wrapped_container.register_termination_cb(self.termination_cb)
-        self._action_server = SimpleActionServer(
-            server_name, action_spec, execute_cb=self.execute_cb, auto_start=False
-        )
+        self._action_server = SimpleActionServer(server_name, action_spec, execute_cb=self.execute_cb, auto_start=False)
 
     def _new_goal_data(self, goal: Any) -> None:
         """Puts a goal in the userdata, with an empty feedback and result; None: an empty goal."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state that asks a function again and again until it says yes."""
+
 from __future__ import annotations
 
 import threading

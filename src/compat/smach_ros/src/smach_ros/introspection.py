@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shows a running state machine on topics, for viewers, and lets them choose the state it starts in."""
+
 from __future__ import annotations
 
 import threading
@@ -277,8 +278,13 @@ class IntrospectionClient:
         return _send_until_shown(publisher, server, command, values, timeout_s)
 
 
-def _send_until_shown(publisher: rospy.Publisher, server: str, command: SmachContainerInitialStatusCmd,
-                      values: dict[str, Any], timeout_s: float) -> bool:
+def _send_until_shown(
+    publisher: rospy.Publisher,
+    server: str,
+    command: SmachContainerInitialStatusCmd,
+    values: dict[str, Any],
+    timeout_s: float,
+) -> bool:
     """Sends a command again and again until a status shows its effect; returns whether one did in time."""
     shown_by_server = threading.Event()
 

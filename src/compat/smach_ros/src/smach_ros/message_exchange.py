@@ -3,6 +3,7 @@
 
 Goal and result of an action, request and response of a service follow the same rules, which are kept here.
 """
+
 from __future__ import annotations
 
 import copy
@@ -25,8 +26,14 @@ class ExchangeError(Exception):
 class UserCallback:
     """A function of the user with the extra arguments and the view of the userdata it gets."""
 
-    def __init__(self, what: str, function: Any, args: Iterable[Any] = (), kwargs: Mapping[str, Any] | None = None,
-                 keys: tuple[Iterable[str], Iterable[str]] = ((), ())) -> None:
+    def __init__(
+        self,
+        what: str,
+        function: Any,
+        args: Iterable[Any] = (),
+        kwargs: Mapping[str, Any] | None = None,
+        keys: tuple[Iterable[str], Iterable[str]] = ((), ()),
+    ) -> None:
         """Checks and keeps a function.
 
         Args:
@@ -94,8 +101,9 @@ def check_slots(what: str, message: Any, slots: Iterable[str]) -> tuple[str, ...
 class MessageSource:
     """Makes a message: the fixed one, or that under a userdata key; then fields by key; then the callback's."""
 
-    def __init__(self, what: str, empty: Any, fixed: Any, key: str | None, slots: Iterable[str],
-                 callback: UserCallback) -> None:
+    def __init__(
+        self, what: str, empty: Any, fixed: Any, key: str | None, slots: Iterable[str], callback: UserCallback
+    ) -> None:
         """Checks and keeps the rules.
 
         Args:
@@ -209,8 +217,9 @@ class AskingState(smach.State):
         reason: why the last execution did not succeed; "" when it did.
     """
 
-    def __init__(self, input_keys: Iterable[str], output_keys: Iterable[str], io_keys: Iterable[str],
-                 outcomes: Iterable[str]) -> None:
+    def __init__(
+        self, input_keys: Iterable[str], output_keys: Iterable[str], io_keys: Iterable[str], outcomes: Iterable[str]
+    ) -> None:
         """Declares succeeded, aborted, preempted, and what the user adds."""
         super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, io_keys)
         self.reason = ""
@@ -218,9 +227,7 @@ class AskingState(smach.State):
     def _stopped(self) -> bool:
         return self.preempt_requested() or going_down()
 
-    def _wait_for_server(
-        self, server: str, is_there: Callable[[], bool], limit_s: float | None, problem: str
-    ) -> bool:
+    def _wait_for_server(self, server: str, is_there: Callable[[], bool], limit_s: float | None, problem: str) -> bool:
         """Waits for the server; returns False when the state was asked to stop.
 
         Args:

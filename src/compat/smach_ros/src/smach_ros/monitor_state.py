@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state that checks the messages of a topic and ends when a condition no longer holds, or has held often enough."""
+
 from __future__ import annotations
 
 import threading

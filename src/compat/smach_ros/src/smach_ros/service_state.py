@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state that calls a service; asked to stop, it does not wait for the answer."""
+
 from __future__ import annotations
 
 import threading
@@ -108,8 +109,12 @@ class ServiceState(AskingState):
         """Waits for the service, calls it and delivers the answer."""
         self.reason = ""
         try:
-            if self._wait_for_server(f"service '{self._service_name}'", self._is_advertised,
-                                     self._server_wait_timeout_s, "it was not advertised"):
+            if self._wait_for_server(
+                f"service '{self._service_name}'",
+                self._is_advertised,
+                self._server_wait_timeout_s,
+                "it was not advertised",
+            ):
                 call = _Call(rospy.ServiceProxy(self._service_name, self._service_spec), self._source.make(userdata))
                 if self._wait_for_answer(call):
                     chosen = self._sink.deliver(userdata, self.get_registered_outcomes(), call.response)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state that gives an action server a goal and ends with it; asked to stop, it cancels the goal at once."""
+
 from __future__ import annotations
 
 import threading
@@ -19,9 +20,7 @@ __all__ = ["SimpleActionState"]
 SERVER_LOST_S = 5.0
 """How long a server may be gone [s] before its goal is given up."""
 
-_STATUS_NAMES = {
-    value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)
-}
+_STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)}
 
 
 class SimpleActionState(AskingState):
@@ -120,7 +119,9 @@ class SimpleActionState(AskingState):
         self._wake.clear()
         try:
             if not self._wait_for_server(
-                f"the server of action '{self._action_name}'", self._is_connected, self._server_wait_timeout_s,
+                f"the server of action '{self._action_name}'",
+                self._is_connected,
+                self._server_wait_timeout_s,
                 f"no server of type {self._action_spec._type} was at '{rospy.resolve_name(self._action_name)}'",
             ):
                 return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")

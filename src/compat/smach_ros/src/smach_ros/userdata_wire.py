@@ -4,6 +4,7 @@
 Pickles can run code. So only plain values and messages are written (of others, only their type), and nothing else
 is ever read.
 """
+
 from __future__ import annotations
 
 import base64

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Stops a state machine when ROS shuts down, while its states can still reach other nodes."""
+
 from __future__ import annotations
 
 import time

@@ -3,6 +3,7 @@
 
 A paused simulation stops the clock of ROS and the work with it; a node that is missing stays missing meanwhile.
 """
+
 from __future__ import annotations
 
 import time

@@ -3,6 +3,7 @@
 
 The functions and classes are those of the public module of this name, which graphical tools and user scripts import.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
@@ -36,23 +37,31 @@ def get_controller_managers(namespace: str = "/", initial_guess: Sequence[str] |
             which spares the master most questions.
     """
     known = set(initial_guess or ())
-    return sorted(candidate for candidate in _namespaces_that_list_controllers(namespace)
-                  if candidate in known or is_controller_manager(candidate))
+    return sorted(
+        candidate
+        for candidate in _namespaces_that_list_controllers(namespace)
+        if candidate in known or is_controller_manager(candidate)
+    )
 
 
 def is_controller_manager(namespace: str) -> bool:
     """Whether `namespace` has all services of a controller manager, each of the right type."""
-    return all(rosservice.get_service_type(f"{namespace.rstrip('/')}/{name}") == service_type
-               for name, service_type in MANAGER_SERVICES.items())
+    return all(
+        rosservice.get_service_type(f"{namespace.rstrip('/')}/{name}") == service_type
+        for name, service_type in MANAGER_SERVICES.items()
+    )
 
 
 def _namespaces_that_list_controllers(namespace: str) -> set[str]:
     try:
         services = rosservice.get_service_list(namespace=namespace)
-    except rosservice.ROSServiceIOException:   # no master: nothing runs
+    except rosservice.ROSServiceIOException:  # no master: nothing runs
         return set()
-    return {service[:-len(LIST_SERVICE)].rstrip("/") or "/" for service in services
-            if service.rpartition("/")[2] == LIST_SERVICE}
+    return {
+        service[: -len(LIST_SERVICE)].rstrip("/") or "/"
+        for service in services
+        if service.rpartition("/")[2] == LIST_SERVICE
+    }
 
 
 class ControllerManagerLister:
@@ -85,7 +94,7 @@ class ControllerLister:
         self._service: Any = None
 
     def __call__(self) -> list[ControllerState]:
-        for _ in range(2):   # the kept connection ends with the manager, and a new manager may be there
+        for _ in range(2):  # the kept connection ends with the manager, and a new manager may be there
             try:
                 if self._service is None:
                     self._service = rospy.ServiceProxy(self._service_name, ListControllers, persistent=True)
@@ -102,34 +111,46 @@ class ControllerLister:
             service.close()
 
 
-def filter_by_name(ctrl_list: Iterable[ControllerState], ctrl_name: str,
-                   match_substring: bool = False) -> list[ControllerState]:
+def filter_by_name(
+    ctrl_list: Iterable[ControllerState], ctrl_name: str, match_substring: bool = False
+) -> list[ControllerState]:
     """The controllers of that name, or with it in their name."""
     return _filter(ctrl_list, lambda controller: _matches(controller.name, ctrl_name, match_substring))
 
 
-def filter_by_type(ctrl_list: Iterable[ControllerState], ctrl_type: str,
-                   match_substring: bool = False) -> list[ControllerState]:
+def filter_by_type(
+    ctrl_list: Iterable[ControllerState], ctrl_type: str, match_substring: bool = False
+) -> list[ControllerState]:
     """The controllers of that type, or with it in their type."""
     return _filter(ctrl_list, lambda controller: _matches(controller.type, ctrl_type, match_substring))
 
 
-def filter_by_state(ctrl_list: Iterable[ControllerState], ctrl_state: str,
-                    match_substring: bool = False) -> list[ControllerState]:
+def filter_by_state(
+    ctrl_list: Iterable[ControllerState], ctrl_state: str, match_substring: bool = False
+) -> list[ControllerState]:
     """The controllers in that state, or with it in the name of their state."""
     return _filter(ctrl_list, lambda controller: _matches(controller.state, ctrl_state, match_substring))
 
 
-def filter_by_hardware_interface(ctrl_list: Iterable[ControllerState], hardware_interface: str,
-                                 match_substring: bool = False) -> list[ControllerState]:
+def filter_by_hardware_interface(
+    ctrl_list: Iterable[ControllerState], hardware_interface: str, match_substring: bool = False
+) -> list[ControllerState]:
     """The controllers that claim resources of that hardware interface, or of one with it in its name."""
-    return _filter(ctrl_list, lambda controller: any(
-        _matches(claim.hardware_interface, hardware_interface, match_substring)
-        for claim in controller.claimed_resources))
+    return _filter(
+        ctrl_list,
+        lambda controller: any(
+            _matches(claim.hardware_interface, hardware_interface, match_substring)
+            for claim in controller.claimed_resources
+        ),
+    )
 
 
-def filter_by_resources(ctrl_list: Iterable[ControllerState], resources: Iterable[str],
-                        hardware_interface: str | None = None, match_any: bool = False) -> list[ControllerState]:
+def filter_by_resources(
+    ctrl_list: Iterable[ControllerState],
+    resources: Iterable[str],
+    hardware_interface: str | None = None,
+    match_any: bool = False,
+) -> list[ControllerState]:
     """The controllers that claim these resources through one hardware interface.
 
     Args:
@@ -141,8 +162,11 @@ def filter_by_resources(ctrl_list: Iterable[ControllerState], resources: Iterabl
     wanted = set(resources)
 
     def claims(controller: ControllerState) -> bool:
-        claimed = [set(claim.resources) for claim in controller.claimed_resources
-                   if hardware_interface in (None, claim.hardware_interface)]
+        claimed = [
+            set(claim.resources)
+            for claim in controller.claimed_resources
+            if hardware_interface in (None, claim.hardware_interface)
+        ]
         return any(wanted & names if match_any else wanted <= names for names in claimed)
 
     return _filter(ctrl_list, claims)
@@ -152,8 +176,7 @@ def _matches(value: str, wanted: str, match_substring: bool) -> bool:
     return wanted in value if match_substring else wanted == value
 
 
-def _filter(controllers: Iterable[ControllerState],
-            fits: Callable[[ControllerState], bool]) -> list[ControllerState]:
+def _filter(controllers: Iterable[ControllerState], fits: Callable[[ControllerState], bool]) -> list[ControllerState]:
     return [controller for controller in controllers if fits(controller)]
 
 
@@ -161,5 +184,5 @@ def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
     """Names below `namespace` whose parameters have a `type` of their own, as those of controllers do; sorted."""
     prefix = f"{namespace.rstrip('/')}/"
     names = rosgraph.Master(rospy.get_name()).getParamNames()
-    below = [name[len(prefix):].split("/") for name in names if name.startswith(prefix)]
+    below = [name[len(prefix) :].split("/") for name in names if name.startswith(prefix)]
     return sorted(parts[0] for parts in below if len(parts) == 2 and parts[1] == "type")

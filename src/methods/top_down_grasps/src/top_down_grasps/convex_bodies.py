@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns the collision shapes of a URDF into convex bodies, and computes how far each reaches in a direction."""
+
 from __future__ import annotations
 
 import itertools

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Remembers where the objects were for which grasps were generated, so that a moved object is noticed."""
+
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
@@ -23,8 +24,9 @@ def same_place(one: SceneObject, other: SceneObject, tolerance_m: float) -> bool
 
 def at_rest(before: Sequence[SceneObject], now: Sequence[SceneObject]) -> bool:
     """Returns whether the same objects are seen twice, at the same places."""
-    return len(before) == len(now) and all(same_place(one, other, REST_M)
-                                           for one, other in zip(before, now, strict=True))
+    return len(before) == len(now) and all(
+        same_place(one, other, REST_M) for one, other in zip(before, now, strict=True)
+    )
 
 
 class GeneratedObjects:
@@ -43,5 +45,8 @@ class GeneratedObjects:
 
     def stale(self, objects: Iterable[SceneObject]) -> list[SceneObject]:
         """Returns the objects that are new, or not where they were."""
-        return [found for found in objects if found.name not in self._objects
-                or not same_place(found, self._objects[found.name], MOVED_M)]
+        return [
+            found
+            for found in objects
+            if found.name not in self._objects or not same_place(found, self._objects[found.name], MOVED_M)
+        ]

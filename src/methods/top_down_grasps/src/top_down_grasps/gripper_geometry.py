@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Computes from the robot description how wide a two-finger gripper opens, and where its parts are then."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -139,26 +140,40 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     model = _Model(urdf)
     limit = model.joints[joint].limit if joint in model.joints else None
     if limit is None or grasp_link not in model.links:
-        raise GripperGeometryError(f"the robot description lacks the joint '{joint}' with limits, or the link "
-                                   f"'{grasp_link}'; name the gripper's actuated joint and the grasp frame")
+        raise GripperGeometryError(
+            f"the robot description lacks the joint '{joint}' with limits, or the link "
+            f"'{grasp_link}'; name the gripper's actuated joint and the grasp frame"
+        )
     positions = np.linspace(limit.lower, limit.upper, SAMPLES)
     parts = list(_parts(model, grasp_link, joint, positions))
     fingers = model.finger_links(joint)
     measured = [_measure(parts, fingers, grasp_link, sample) for sample in range(SAMPLES)]
     openings = np.array([each.opening for each in measured])
     middle = measured[int(np.argmin(np.abs(openings - openings.max() / 2)))]
-    marked = tuple(HandPart(part.link, part.corners, part.planes, any(part is pad for pad in middle.pads))
-                   for part in parts)
-    return GripperGeometry(joint, positions, openings, np.array([each.pad_centre for each in measured]),
-                           np.array([each.tip for each in measured]), middle.pad_half_width, middle.pad_half_height,
-                           marked)
+    marked = tuple(
+        HandPart(part.link, part.corners, part.planes, any(part is pad for pad in middle.pads)) for part in parts
+    )
+    return GripperGeometry(
+        joint,
+        positions,
+        openings,
+        np.array([each.pad_centre for each in measured]),
+        np.array([each.tip for each in measured]),
+        middle.pad_half_width,
+        middle.pad_half_height,
+        marked,
+    )
 
 
 def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
     """Places the collision shapes of the hand in the grasp frame, at every joint position."""
     for link in model.hand_links(joint):
-        transforms = np.array([np.linalg.inv(model.pose(grasp_link, {joint: position})) @
-                               model.pose(link, {joint: position}) for position in positions.tolist()])
+        transforms = np.array(
+            [
+                np.linalg.inv(model.pose(grasp_link, {joint: position})) @ model.pose(link, {joint: position})
+                for position in positions.tolist()
+            ]
+        )
         for body in model.bodies_of(link):
             corners = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.corners) + transforms[:, None, :3, 3]
             normals = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.planes[:, :3])
@@ -183,15 +198,23 @@ def _measure(parts: list[HandPart], fingers: list[str], grasp_link: str, sample:
     right = [part for part in tips if part.corners[sample, :, 0].mean() > 0]
     left = [part for part in tips if part.corners[sample, :, 0].mean() <= 0]
     if not right or not left:
-        raise GripperGeometryError(f"the last finger links {fingers} have no collision shapes on both sides of "
-                                   f"'{grasp_link}'; give each a collision element")
+        raise GripperGeometryError(
+            f"the last finger links {fingers} have no collision shapes on both sides of "
+            f"'{grasp_link}'; give each a collision element"
+        )
     right_pad = min(right, key=lambda part: float(part.corners[sample, :, 0].min()))
     left_pad = max(left, key=lambda part: float(part.corners[sample, :, 0].max()))
     pad = right_pad.corners[sample]
     opening = max(0.0, float(pad[:, 0].min() - left_pad.corners[sample, :, 0].max()))
     low, high = pad.min(axis=0), pad.max(axis=0)
-    return _Measure(opening, float(low[2] + high[2]) / 2, max(float(part.corners[sample, :, 2].max()) for part in tips),
-                    float(high[1] - low[1]) / 2, float(high[2] - low[2]) / 2, (right_pad, left_pad))
+    return _Measure(
+        opening,
+        float(low[2] + high[2]) / 2,
+        max(float(part.corners[sample, :, 2].max()) for part in tips),
+        float(high[1] - low[1]) / 2,
+        float(high[2] - low[2]) / 2,
+        (right_pad, left_pad),
+    )
 
 
 class _Model:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Converts collision objects of the planning scene to surfaces in the planning frame."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -92,8 +93,10 @@ def _primitive(primitive: Any, where: str) -> Surface:
         case (4, 2):
             return surface_points.cylinder(sizes[0], sizes[1], 0.0)
         case _:
-            raise SceneObjectError(f"{where} has type {primitive.type} with {len(sizes)} dimensions; allowed are box "
-                                   "(3), sphere (1), cylinder (2) and cone (2)")
+            raise SceneObjectError(
+                f"{where} has type {primitive.type} with {len(sizes)} dimensions; allowed are box "
+                "(3), sphere (1), cylinder (2) and cone (2)"
+            )
 
 
 def scene_object(message: Any) -> SceneObject | None:
@@ -108,13 +111,17 @@ def scene_object(message: Any) -> SceneObject | None:
     Raises:
         SceneObjectError: A part cannot be understood.
     """
-    parts = [_placed(_primitive(shape, f"object '{message.id}', primitive {number}"), pose)
-             for number, (shape, pose) in enumerate(zip(message.primitives, message.primitive_poses, strict=True))]
+    parts = [
+        _placed(_primitive(shape, f"object '{message.id}', primitive {number}"), pose)
+        for number, (shape, pose) in enumerate(zip(message.primitives, message.primitive_poses, strict=True))
+    ]
     for shape, pose in zip(message.meshes, message.mesh_poses, strict=True):
         vertices = np.array([[p.x, p.y, p.z] for p in shape.vertices], dtype=float).reshape(-1, 3)
         triangles = np.array([t.vertex_indices for t in shape.triangles], dtype=np.int64).reshape(-1, 3)
         if not len(triangles) or triangles.max() >= len(vertices):
-            raise SceneObjectError(f"object '{message.id}' has a mesh of {len(vertices)} vertices and {len(triangles)} "
-                                   "triangles that does not hold together")
+            raise SceneObjectError(
+                f"object '{message.id}' has a mesh of {len(vertices)} vertices and {len(triangles)} "
+                "triangles that does not hold together"
+            )
         parts.append(_placed(surface_points.mesh(vertices, triangles), pose))
     return SceneObject(message.id, _placed(surface_points.joined(parts), message.pose)) if parts else None

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the parameters of the grasp generator, and refuses values that make no sense."""
+
 from __future__ import annotations
 
 import math
@@ -61,7 +62,8 @@ def read_settings() -> GeneratorSettings:
         yaw_step_rad=_number("~yaw_step", defaults.yaw_step_rad, 0.02, math.pi),
         place_step_m=_number("~place_step", defaults.place_step_m, 0.002, 0.5),
         best_reach_m=_number("~best_reach", defaults.best_reach_m, 0.0, 10.0),
-        base_xy_m=(_number("~base_x", 0.0), _number("~base_y", 0.0)))
+        base_xy_m=(_number("~base_x", 0.0), _number("~base_y", 0.0)),
+    )
     return GeneratorSettings(
         frame=str(rospy.get_param("origin_frame_name", "world")),
         crop=CropBox((low[0], low[1], low[2]), (high[0], high[1], high[2])),
@@ -75,13 +77,17 @@ def read_settings() -> GeneratorSettings:
         max_checks=int(_number("~max_checks", 40, 1, 100000)),
         check_reachability=bool(rospy.get_param("~check_reachability", True)),
         scene_timeout_s=_number("~scene_timeout", 20.0, 0.0, 3600.0),
-        top_down=top_down)
+        top_down=top_down,
+    )
 
 
 def _number(name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
     value = rospy.get_param(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        rospy.logerr_throttle(10.0, f"Parameter '{rospy.resolve_name(name)}' is {value!r}, allowed is a number from "
-                                    f"{low} to {high}; {default} is used instead.")
+        rospy.logerr_throttle(
+            10.0,
+            f"Parameter '{rospy.resolve_name(name)}' is {value!r}, allowed is a number from "
+            f"{low} to {high}; {default} is used instead.",
+        )
         return float(default)
     return float(value)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the grasps of a generator in the grasp manager: new ones take the place of those stored before."""
+
 from __future__ import annotations
 
 import rospy

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Watches the planning scene, generates top-down grasps for what stands there, and stores them in the grasp manager."""
+
 from __future__ import annotations
 
 import threading
@@ -78,8 +79,10 @@ class TopDownGraspGenerator:
         self._scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
         settings = read_settings()
         if not settings.gripper_joint:
-            raise NoGraspError(f"parameter '{rospy.resolve_name('~gripper_joint')}' is not set; it has to name the "
-                               "actuated joint of the fingers; set it in generative_methods_config.yaml")
+            raise NoGraspError(
+                f"parameter '{rospy.resolve_name('~gripper_joint')}' is not set; it has to name the "
+                "actuated joint of the fingers; set it in generative_methods_config.yaml"
+            )
         self._commander = ArmCommander(settings.arm_group)
         try:
             self._commander.connect()
@@ -89,8 +92,10 @@ class TopDownGraspGenerator:
             self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
-        self._services = [rospy.Service("~generate", Trigger, lambda _: self._on_demand(refresh=False)),
-                          rospy.Service("~refresh", Trigger, lambda _: self._on_demand(refresh=True))]
+        self._services = [
+            rospy.Service("~generate", Trigger, lambda _: self._on_demand(refresh=False)),
+            rospy.Service("~refresh", Trigger, lambda _: self._on_demand(refresh=True)),
+        ]
 
     def watch(self) -> None:
         """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
@@ -151,8 +156,9 @@ class TopDownGraspGenerator:
                 return objects
             before = objects
 
-    def _signal_grasps(self, settings: GeneratorSettings, objects: list[SceneObject],
-                       refresh: bool) -> tuple[bool, str]:
+    def _signal_grasps(
+        self, settings: GeneratorSettings, objects: list[SceneObject], refresh: bool
+    ) -> tuple[bool, str]:
         """Stores grasps in place of the earlier ones and signals it, or signals that what is there cannot be grasped.
 
         Args:
@@ -189,22 +195,31 @@ class TopDownGraspGenerator:
         ranked: list[tuple[SceneObject, TopDownGrasp]] = []
         for found in objects:
             support = max(found.bottom, settings.crop.low[2]) if settings.crop.holds(found.centre) else found.bottom
-            ranked += [(found, grasp)
-                       for grasp in top_down_grasps(found.surface, support, self._gripper, settings.top_down)]
+            ranked += [
+                (found, grasp) for grasp in top_down_grasps(found.surface, support, self._gripper, settings.top_down)
+            ]
         if not ranked:
-            sizes = "; ".join(f"'{found.name}' with the sides " + " x ".join(
-                f"{side:.3f}" for side in found.surface.points.max(axis=0) - found.surface.points.min(axis=0)) + " m"
-                for found in objects)
-            raise NoGraspError(f"no part of {sizes} can be grasped from above: the gripper opens to "
-                               f"{self._gripper.max_opening:.3f} m and needs flat or round sides")
+            sizes = "; ".join(
+                f"'{found.name}' with the sides "
+                + " x ".join(
+                    f"{side:.3f}" for side in found.surface.points.max(axis=0) - found.surface.points.min(axis=0)
+                )
+                + " m"
+                for found in objects
+            )
+            raise NoGraspError(
+                f"no part of {sizes} can be grasped from above: the gripper opens to "
+                f"{self._gripper.max_opening:.3f} m and needs flat or round sides"
+            )
         ranked.sort(key=lambda pair: -pair[1].quality)
         return self._reachable(ranked, settings)
 
-    def _reachable(self, ranked: list[tuple[SceneObject, TopDownGrasp]],
-                   settings: GeneratorSettings) -> list[StandardisedGrasp]:
+    def _reachable(
+        self, ranked: list[tuple[SceneObject, TopDownGrasp]], settings: GeneratorSettings
+    ) -> list[StandardisedGrasp]:
         chosen: list[StandardisedGrasp] = []
         reasons: Counter[str] = Counter()
-        tried = ranked[:settings.max_checks]
+        tried = ranked[: settings.max_checks]
         for found, grasp in tried:
             message = self._message(found, grasp, settings)
             reason = self._why_unreachable(message) if settings.check_reachability else ""
@@ -216,8 +231,10 @@ class TopDownGraspGenerator:
                 break
         if not chosen:
             names = sorted({found.name for found, _ in tried})
-            raise NoGraspError(f"no grasp of {names} is reachable: all {len(tried)} that were tried fail, for example "
-                               f"because {reasons.most_common(1)[0][0]}")
+            raise NoGraspError(
+                f"no grasp of {names} is reachable: all {len(tried)} that were tried fail, for example "
+                f"because {reasons.most_common(1)[0][0]}"
+            )
         return chosen
 
     def _why_unreachable(self, grasp: StandardisedGrasp) -> str:
@@ -238,12 +255,21 @@ class TopDownGraspGenerator:
     def _message(self, found: SceneObject, grasp: TopDownGrasp, settings: GeneratorSettings) -> StandardisedGrasp:
         x, y, z = grasp.position
         heights = (z + settings.top_down.approach_distance_m, z, z + settings.top_down.lift_distance_m)
-        poses = [generate_pose_stamped_message(settings.frame, (x, y, height), grasp.quaternion_xyzw)
-                 for height in heights]
+        poses = [
+            generate_pose_stamped_message(settings.frame, (x, y, height), grasp.quaternion_xyzw) for height in heights
+        ]
         closed = [self._gripper.closed_position]
-        return get_standardised_grasp([self._gripper.joint], [grasp.pregrasp_joint], closed, closed, [settings.torque],
-                                      *poses, grasp_quality=grasp.quality, hand_id=settings.hand_id,
-                                      object_id=found.name)
+        return get_standardised_grasp(
+            [self._gripper.joint],
+            [grasp.pregrasp_joint],
+            closed,
+            closed,
+            [settings.torque],
+            *poses,
+            grasp_quality=grasp.quality,
+            hand_id=settings.hand_id,
+            object_id=found.name,
+        )
 
     def _candidates(self, settings: GeneratorSettings) -> list[SceneObject]:
         """Objects to grasp: the named one, or all in the crop box.
@@ -256,20 +282,26 @@ class TopDownGraspGenerator:
         if settings.object_name:
             named = [found for found in objects if is_named(found.name, settings.object_name)]
             if not named:
-                raise NoObjectError(f"the planning scene has no object '{settings.object_name}'; "
-                                    f"it has {sorted(found.name for found in objects)}")
+                raise NoObjectError(
+                    f"the planning scene has no object '{settings.object_name}'; "
+                    f"it has {sorted(found.name for found in objects)}"
+                )
             return named
         inside = [found for found in objects if settings.crop.holds(found.centre)]
         if not inside:
-            raise NoObjectError(f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
-                                f"frame '{settings.frame}'; there are "
-                                f"{[_place(found) for found in objects] or 'no objects'}")
+            raise NoObjectError(
+                f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
+                f"frame '{settings.frame}'; there are "
+                f"{[_place(found) for found in objects] or 'no objects'}"
+            )
         return inside
 
     def _scene_objects(self) -> list[SceneObject]:
-        components = PlanningSceneComponents(components=PlanningSceneComponents.WORLD_OBJECT_NAMES |
-                                             PlanningSceneComponents.WORLD_OBJECT_GEOMETRY |
-                                             PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
+        components = PlanningSceneComponents(
+            components=PlanningSceneComponents.WORLD_OBJECT_NAMES
+            | PlanningSceneComponents.WORLD_OBJECT_GEOMETRY
+            | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
+        )
         answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
         self._attached = {item.object.id for item in answer.scene.robot_state.attached_collision_objects}
         objects = []

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns shapes into points on their surfaces, so that the search for grasps is the same for every shape."""
+
 from __future__ import annotations
 
 import math
@@ -35,8 +36,13 @@ class Surface:
 
     def moved(self, rotation: Array, translation: Array) -> Surface:
         """Returns the surface after a rotation (3, 3) and a translation (3,) [m]."""
-        return Surface(self.points @ rotation.T + translation, self.normals @ rotation.T, self.volume,
-                       rotation @ self.centroid + translation, self.axes @ rotation.T)
+        return Surface(
+            self.points @ rotation.T + translation,
+            self.normals @ rotation.T,
+            self.volume,
+            rotation @ self.centroid + translation,
+            self.axes @ rotation.T,
+        )
 
 
 def _steps(length: float) -> Array:
@@ -92,8 +98,9 @@ def cylinder(height: float, radius: float, top_radius: float | None = None) -> S
         normals.append(np.tile([0.0, 0.0, math.copysign(1.0, end)], (ra.size, 1)))
     volume = math.pi * height * (radius**2 + radius * top + top**2) / 3
     centre_z = height * ((radius**2 + 2 * radius * top + 3 * top**2) / (4 * (radius**2 + radius * top + top**2)) - 0.5)
-    return Surface(np.vstack(points), np.vstack(normals), volume, np.array([0.0, 0.0, centre_z]),
-                   np.array([[0.0, 0.0, 1.0]]))
+    return Surface(
+        np.vstack(points), np.vstack(normals), volume, np.array([0.0, 0.0, centre_z]), np.array([[0.0, 0.0, 1.0]])
+    )
 
 
 def sphere(radius: float) -> Surface:
@@ -130,8 +137,11 @@ def mesh(vertices: Array, triangles: npt.NDArray[np.int64]) -> Surface:
         unit, signed, volume = -unit, -signed, -volume
     extent = float(np.prod(np.ptp(vertices, axis=0)))
     closed = volume > 0.01 * extent
-    centroid = (signed[:, None] * corners.sum(axis=1) / 4.0).sum(axis=0) / volume if closed else (
-        (vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+    centroid = (
+        (signed[:, None] * corners.sum(axis=1) / 4.0).sum(axis=0) / volume
+        if closed
+        else ((vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+    )
     points, normals = [], []
     for triangle, normal, double_area in zip(corners, unit, double_areas, strict=True):
         count = int(min(40, max(1, math.ceil(math.sqrt(double_area) / SPACING_M))))
@@ -149,6 +159,10 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
     """Joins the surfaces of the parts of one object."""
     volumes = np.array([surface.volume for surface in surfaces])
     centroid = (volumes[:, None] * np.array([surface.centroid for surface in surfaces])).sum(axis=0) / volumes.sum()
-    return Surface(np.vstack([surface.points for surface in surfaces]),
-                   np.vstack([surface.normals for surface in surfaces]), float(volumes.sum()), centroid,
-                   np.vstack([surface.axes for surface in surfaces]))
+    return Surface(
+        np.vstack([surface.points for surface in surfaces]),
+        np.vstack([surface.normals for surface in surfaces]),
+        float(volumes.sum()),
+        centroid,
+        np.vstack([surface.axes for surface in surfaces]),
+    )

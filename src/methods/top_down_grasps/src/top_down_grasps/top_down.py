@@ -8,6 +8,7 @@ while the pads close: where it would, the hand opens wider or stays higher. What
 sides face the pads, how near the grasp is to the centre of mass, how much room there is, how much of the pads touches,
 and how comfortable the place is for the arm.
 """
+
 from __future__ import annotations
 
 import math
@@ -85,8 +86,9 @@ class TopDownGrasp:
         return (math.cos(self.yaw / 2), math.sin(self.yaw / 2), 0.0, 0.0)
 
 
-def top_down_grasps(surface: Surface, support_z: float, gripper: GripperGeometry,
-                    settings: TopDownSettings) -> list[TopDownGrasp]:
+def top_down_grasps(
+    surface: Surface, support_z: float, gripper: GripperGeometry, settings: TopDownSettings
+) -> list[TopDownGrasp]:
     """Finds the grasps of an object.
 
     Args:
@@ -105,8 +107,9 @@ def top_down_grasps(surface: Surface, support_z: float, gripper: GripperGeometry
         across = np.array([math.sin(yaw), -math.cos(yaw)])
         x, y = surface.points[:, :2] @ closing, surface.points[:, :2] @ across
         facing = surface.normals[:, :2] @ closing
-        flat = _Slice(x, y, surface.points[:, 2], facing,
-                      np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]]))
+        flat = _Slice(
+            x, y, surface.points[:, 2], facing, np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]])
+        )
         for place in _places(y, float(surface.centroid[:2] @ across), settings.place_step_m):
             grasp = _grasp_at(flat, place, yaw, surface, support_z, gripper, settings)
             if grasp is not None:
@@ -161,24 +164,39 @@ def _places(y: Array, centre: float, step: float) -> Iterable[float]:
                 yield place
 
 
-def _grasp_at(flat: _Slice, place: float, yaw: float, surface: Surface, support_z: float, gripper: GripperGeometry,
-              settings: TopDownSettings) -> TopDownGrasp | None:
+def _grasp_at(
+    flat: _Slice,
+    place: float,
+    yaw: float,
+    surface: Surface,
+    support_z: float,
+    gripper: GripperGeometry,
+    settings: TopDownSettings,
+) -> TopDownGrasp | None:
     between = np.abs(flat.y - place) <= gripper.pad_half_width
     if not between.any():
         return None
     hold = _highest_hold(flat, place, between, float(surface.centroid[2]), support_z, gripper, settings)
     if hold is None:
         return None
-    alignment = min(_alignment(flat, hold.touching & (flat.x <= hold.low + CONTACT_DEPTH_M), -1.0),
-                    _alignment(flat, hold.touching & (flat.x >= hold.high - CONTACT_DEPTH_M), 1.0))
+    alignment = min(
+        _alignment(flat, hold.touching & (flat.x <= hold.low + CONTACT_DEPTH_M), -1.0),
+        _alignment(flat, hold.touching & (flat.x >= hold.high - CONTACT_DEPTH_M), 1.0),
+    )
     if alignment < settings.min_side_alignment:
         return None
     closing, across = (math.cos(yaw), math.sin(yaw)), (math.sin(yaw), -math.cos(yaw))
     middle = (hold.low + hold.high) / 2
     position = (middle * closing[0] + place * across[0], middle * closing[1] + place * across[1], hold.z)
     offset = math.dist((position[0], position[1], hold.pad_z), tuple(surface.centroid))
-    quality = _quality(alignment, offset, (gripper.max_opening - hold.opening) / gripper.max_opening,
-                       hold.overlap / (2 * gripper.pad_half_height), position, settings)
+    quality = _quality(
+        alignment,
+        offset,
+        (gripper.max_opening - hold.opening) / gripper.max_opening,
+        hold.overlap / (2 * gripper.pad_half_height),
+        position,
+        settings,
+    )
     return TopDownGrasp(position, yaw, hold.high - hold.low, gripper.position_for(hold.opening), quality)
 
 
@@ -204,8 +222,15 @@ class _Hold:
     touching: npt.NDArray[np.bool_]
 
 
-def _highest_hold(flat: _Slice, place: float, between: npt.NDArray[np.bool_], centroid_z: float, support_z: float,
-                  gripper: GripperGeometry, settings: TopDownSettings) -> _Hold | None:
+def _highest_hold(
+    flat: _Slice,
+    place: float,
+    between: npt.NDArray[np.bool_],
+    centroid_z: float,
+    support_z: float,
+    gripper: GripperGeometry,
+    settings: TopDownSettings,
+) -> _Hold | None:
     """Raises the hand from where the pads are over the centre of mass until all of it is clear of the object.
 
     How wide the hand must open depends on how deep it goes, and how deep it can go on how wide it is: a few rounds
@@ -213,8 +238,10 @@ def _highest_hold(flat: _Slice, place: float, between: npt.NDArray[np.bool_], ce
     """
     pad_offset = gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))
     top = float(flat.z[np.abs(flat.y - place) <= gripper.pad_half_width + 0.01].max())
-    z = max(min(centroid_z, top - gripper.pad_half_height / 2) + pad_offset,
-            support_z + gripper.max_tip + settings.tip_clearance_m)
+    z = max(
+        min(centroid_z, top - gripper.pad_half_height / 2) + pad_offset,
+        support_z + gripper.max_tip + settings.tip_clearance_m,
+    )
     for _ in range(HEIGHT_ROUNDS):
         pad_z = z - pad_offset
         touching = between & (np.abs(flat.z - pad_z) <= gripper.pad_half_height)
@@ -224,8 +251,9 @@ def _highest_hold(flat: _Slice, place: float, between: npt.NDArray[np.bool_], ce
         low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
         middle = (low + high) / 2
         straddled = flat.x[between & (flat.z >= z - gripper.max_tip)]
-        needed = 2 * (max(float(straddled.max()) - middle, middle - float(straddled.min())) +
-                      settings.finger_clearance_m)
+        needed = 2 * (
+            max(float(straddled.max()) - middle, middle - float(straddled.min())) + settings.finger_clearance_m
+        )
         if needed > gripper.max_opening:
             return None
         lowest, opening = _lowest_height(flat.top_around(middle, place), high - low, needed, z, gripper, settings)
@@ -235,8 +263,9 @@ def _highest_hold(flat: _Slice, place: float, between: npt.NDArray[np.bool_], ce
     return None
 
 
-def _lowest_height(top: Array, width: float, needed: float, wanted: float, gripper: GripperGeometry,
-                   settings: TopDownSettings) -> tuple[float, float]:
+def _lowest_height(
+    top: Array, width: float, needed: float, wanted: float, gripper: GripperGeometry, settings: TopDownSettings
+) -> tuple[float, float]:
     """Chooses the opening with which the hand can come down to a wanted height, or else the farthest.
 
     Args:
@@ -254,10 +283,12 @@ def _lowest_height(top: Array, width: float, needed: float, wanted: float, gripp
     coming = np.linspace(needed, gripper.max_opening, OPENING_STEPS)
     openings = np.concatenate([closing, coming])
     while_closing = np.maximum.accumulate(
-        gripper.lowest_heights(openings, top, CLOSING_CLEARANCE_M, with_pads=False, floor=wanted))
+        gripper.lowest_heights(openings, top, CLOSING_CLEARANCE_M, with_pads=False, floor=wanted)
+    )
     # The pads' own room is in the opening already; without the last bit, rounding would open the hand a step wider.
-    coming_down = gripper.lowest_heights(coming, top, max(0.0, settings.finger_clearance_m - CONTACT_DEPTH_M),
-                                         with_pads=True, floor=wanted)
+    coming_down = gripper.lowest_heights(
+        coming, top, max(0.0, settings.finger_clearance_m - CONTACT_DEPTH_M), with_pads=True, floor=wanted
+    )
     heights = np.maximum(while_closing[CLOSING_STEPS:], coming_down)
     chosen = int(np.argmax(heights <= heights.min() + HEIGHT_TOLERANCE_M))
     return float(heights[chosen]), float(coming[chosen])
@@ -270,8 +301,14 @@ def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:
     return float(facing.mean()) if facing.size else 0.0
 
 
-def _quality(alignment: float, offset_m: float, room: float, overlap: float, position: tuple[float, float, float],
-             settings: TopDownSettings) -> float:
+def _quality(
+    alignment: float,
+    offset_m: float,
+    room: float,
+    overlap: float,
+    position: tuple[float, float, float],
+    settings: TopDownSettings,
+) -> float:
     reach = math.dist(position[:2], settings.base_xy_m)
     reach_score = 1.0 - min(1.0, abs(reach - settings.best_reach_m) / 0.5)
     centred = 1.0 - min(1.0, offset_m / 0.06)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A limit on waiting, by a clock that a loaded machine slows down together with the simulated world."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

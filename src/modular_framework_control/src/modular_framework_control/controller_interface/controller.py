@@ -6,6 +6,7 @@ control loop and must not block. What is started there inherits the priority of 
 in `init`. All time a controller knows is the time it is given there, so that it behaves alike under simulated and real
 time.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns the error of a joint into a command, with the gains users write below `gains/<joint>` or `pid`."""
+
 from __future__ import annotations
 
 import math
@@ -92,8 +93,10 @@ def read_pid(gains_nh: NodeHandle) -> Pid:
         ParameterError: no `p`, or a value of the wrong kind.
     """
     if not gains_nh.has_param("p"):
-        raise ParameterError(f"parameter {join_names(gains_nh.namespace, 'p')} is not set; a joint that is controlled "
-                             "by velocity or effort needs its gains: p, and if wanted i, d, i_clamp, antiwindup")
+        raise ParameterError(
+            f"parameter {join_names(gains_nh.namespace, 'p')} is not set; a joint that is controlled "
+            "by velocity or effort needs its gains: p, and if wanted i, d, i_clamp, antiwindup"
+        )
     p, i, d = (read_number(gains_nh, key, 0.0, None) for key in ("p", "i", "d"))
     clamp = abs(read_number(gains_nh, "i_clamp", 0.0, None))
     i_min = -abs(read_number(gains_nh, "i_clamp_min", -clamp, None))

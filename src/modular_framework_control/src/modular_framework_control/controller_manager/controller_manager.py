@@ -4,6 +4,7 @@
 Threads that may wait (services) load and unload controllers and request switches. The control loop calls `update`,
 which never waits for them: the list of controllers is replaced as a whole, a switch is handed over in one attribute.
 """
+
 from __future__ import annotations
 
 import math
@@ -66,9 +67,15 @@ class ControllerManager:
         clock: real time [s], for the statistics.
     """
 
-    def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle, types: ControllerTypes | None = None,
-                 attach: Attach = _attach_nothing, update_wait_s: float = 10.0,
-                 clock: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(
+        self,
+        robot_hw: RobotHW,
+        root_nh: NodeHandle,
+        types: ControllerTypes | None = None,
+        attach: Attach = _attach_nothing,
+        update_wait_s: float = 10.0,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
         self._robot_hw = robot_hw
         self._root_nh = root_nh
         self.types = types if types is not None else ControllerTypes()
@@ -162,21 +169,26 @@ class ControllerManager:
             controller_type = controller_nh.get_param("type")
             if not isinstance(controller_type, str) or not controller_type:
                 where = join_names(controller_nh.namespace, "type")
-                raise ControllerError(f"cannot load controller '{name}': parameter {where} is {controller_type!r}; "
-                                      f"expected one of: {', '.join(self.types.names)}. Is the controller file loaded?")
+                raise ControllerError(
+                    f"cannot load controller '{name}': parameter {where} is {controller_type!r}; "
+                    f"expected one of: {', '.join(self.types.names)}. Is the controller file loaded?"
+                )
             controller = self.types.create(controller_type)
             info = ControllerInfo(name, controller_type, self._init_controller(name, controller, controller_nh))
             try:
                 detach = self._attach(name, controller)
             except Exception as error:  # user code may raise anything
                 _close(name, controller, lambda: None)
-                raise ControllerError(f"cannot load controller '{name}': opening its topics and actions raised "
-                                      f"{type(error).__name__}: {error}") from error
+                raise ControllerError(
+                    f"cannot load controller '{name}': opening its topics and actions raised "
+                    f"{type(error).__name__}: {error}"
+                ) from error
             self._detach[name] = lambda: _close(name, controller, detach)
             self._loaded = (*self._loaded, LoadedController(info, controller))
 
-    def _init_controller(self, name: str, controller: Controller,
-                         controller_nh: NodeHandle) -> tuple[InterfaceResources, ...]:
+    def _init_controller(
+        self, name: str, controller: Controller, controller_nh: NodeHandle
+    ) -> tuple[InterfaceResources, ...]:
         for interface in self._robot_hw.interfaces:
             interface.take_claims()
         try:
@@ -205,8 +217,14 @@ class ControllerManager:
             self._loaded = tuple(other for other in self._loaded if other is not entry)
             self._detach.pop(name)()
 
-    def switch_controller(self, start: Sequence[str], stop: Sequence[str], strictness: int = Strictness.STRICT,
-                          start_asap: bool = False, timeout_s: float = 0.0) -> None:
+    def switch_controller(
+        self,
+        start: Sequence[str],
+        stop: Sequence[str],
+        strictness: int = Strictness.STRICT,
+        start_asap: bool = False,
+        timeout_s: float = 0.0,
+    ) -> None:
         """Stops and starts controllers in one cycle of the control loop; returns when that is done.
 
         Args:
@@ -221,8 +239,7 @@ class ControllerManager:
                 started, or not carried out because the control loop did not run or has ended.
         """
         with self._services:
-            plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop,
-                               Strictness.of(strictness))
+            plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop, Strictness.of(strictness))
             if not plan.start and not plan.stop:
                 return
             request = SwitchRequest(plan, start_asap, timeout_s)
@@ -237,8 +254,10 @@ class ControllerManager:
             conflict = self._robot_hw.check_for_conflict(request.plan.resulting)
             prepared = not conflict and self._robot_hw.prepare_switch(*request.hardware_lists)
         except Exception as error:  # a user's hardware may raise anything
-            raise ControllerError("cannot switch controllers: check_for_conflict() or prepare_switch() of the hardware "
-                                  f"raised {type(error).__name__}: {error}") from error
+            raise ControllerError(
+                "cannot switch controllers: check_for_conflict() or prepare_switch() of the hardware "
+                f"raised {type(error).__name__}: {error}"
+            ) from error
         if conflict:
             raise ControllerError(f"cannot switch controllers: {conflict}")
         if not prepared:
@@ -259,13 +278,17 @@ class ControllerManager:
             self._pending = None
             request.give_up(self._last_time_s)
         if not request.done.is_set():
-            raise ControllerError(f"the control loop did not carry out the switch: it made no cycle for "
-                                  f"{self._update_wait_s:.1f} s; is it running, or paused?")
+            raise ControllerError(
+                f"the control loop did not carry out the switch: it made no cycle for "
+                f"{self._update_wait_s:.1f} s; is it running, or paused?"
+            )
 
     def list_controllers(self) -> list[ControllerReport]:
         """All loaded controllers in the order they were loaded."""
-        return [ControllerReport(entry.info, entry.state, entry.failure, entry.statistics.snapshot())
-                for entry in self._loaded]
+        return [
+            ControllerReport(entry.info, entry.state, entry.failure, entry.statistics.snapshot())
+            for entry in self._loaded
+        ]
 
     def list_controller_types(self) -> list[tuple[str, str]]:
         """Known type names, each with the base class it is reported under."""
@@ -280,8 +303,10 @@ class ControllerManager:
         with self._services:
             names = [entry.name for entry in self._loaded]
             if names and not force_kill:
-                raise ControllerError(f"cannot reload controller libraries: loaded controllers: {self._names()}; "
-                                      "unload them or ask for force_kill")
+                raise ControllerError(
+                    f"cannot reload controller libraries: loaded controllers: {self._names()}; "
+                    "unload them or ask for force_kill"
+                )
             self.switch_controller([], names, Strictness.BEST_EFFORT)
             for name in reversed(names):
                 self.unload_controller(name)

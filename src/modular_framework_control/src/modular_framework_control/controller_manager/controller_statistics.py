@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How long the updates of a controller take, and how often they make the control loop late."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -63,5 +64,6 @@ class UpdateStatistics:
     def snapshot(self) -> StatisticsSnapshot:
         """The figures so far; may be asked from any thread."""
         variance_s2 = self._squares / self._count if self._count else 0.0
-        return StatisticsSnapshot(self._updated_at_s, self._max_s, self._mean_s, variance_s2, self._overruns,
-                                  self._last_overrun_s)
+        return StatisticsSnapshot(
+            self._updated_at_s, self._max_s, self._mean_s, variance_s2, self._overruns, self._last_overrun_s
+        )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One switch of controllers: checked on a thread that may wait, carried out cycle by cycle in the control loop."""
+
 from __future__ import annotations
 
 import logging
@@ -160,8 +161,9 @@ class SwitchPlan:
     resulting: tuple[ControllerInfo, ...]
 
 
-def plan_switch(loaded: Mapping[str, LoadedController], start: Sequence[str], stop: Sequence[str],
-                strictness: Strictness) -> SwitchPlan:
+def plan_switch(
+    loaded: Mapping[str, LoadedController], start: Sequence[str], stop: Sequence[str], strictness: Strictness
+) -> SwitchPlan:
     """Applies the rules of STRICT and BEST_EFFORT to a request.
 
     A controller that runs and is named in both lists is restarted. Named in both while it does not run, it cannot be
@@ -198,8 +200,11 @@ def plan_switch(loaded: Mapping[str, LoadedController], start: Sequence[str], st
         raise ControllerError(f"{'; '.join(faults)} (strictness STRICT; loaded controllers: {names})")
     for fault in faults:
         LOGGER.warning("switch_controller: left out: %s", fault)
-    resulting = tuple(entry.info for entry in loaded.values()
-                      if entry.name in kept_start or (entry.running and entry.name not in kept_stop))
+    resulting = tuple(
+        entry.info
+        for entry in loaded.values()
+        if entry.name in kept_start or (entry.running and entry.name not in kept_stop)
+    )
     return SwitchPlan(tuple(loaded[name] for name in kept_start), tuple(loaded[name] for name in kept_stop), resulting)
 
 
@@ -229,8 +234,10 @@ class SwitchRequest:
     def hardware_lists(self) -> tuple[list[ControllerInfo], list[ControllerInfo]]:
         """Infos of what newly starts and what really stops; restarts do not concern the hardware."""
         start, stop = self.plan.start, self.plan.stop
-        return ([entry.info for entry in start if entry not in stop],
-                [entry.info for entry in stop if entry not in start])
+        return (
+            [entry.info for entry in start if entry not in stop],
+            [entry.info for entry in stop if entry not in start],
+        )
 
     def step(self, robot_hw: RobotHW, time_s: float) -> bool:
         """One cycle of the switch, in the control loop; True when it is finished."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds controller classes under the names users write in controller files."""
+
 from __future__ import annotations
 
 import importlib
@@ -15,24 +16,25 @@ _MOBILE_BASE = "modular_framework_control.mobile_base"
 _JOINT_COMMAND = f"{_CONTROLLERS}.joint_command_controllers"
 _CLOSED_LOOP = f"{_CONTROLLERS}.closed_loop_trajectory_controllers"
 _POS_VEL = f"{_CONTROLLERS}.position_velocity_trajectory_controllers"
+_TRAJECTORY = f"{_CONTROLLERS}.joint_trajectory_controller"
+_SENSORS = f"{_CONTROLLERS}.sensor_controllers"
+_ACKERMANN = f"{_MOBILE_BASE}.ackermann_steering_controller"
+_FOUR_WHEEL = f"{_MOBILE_BASE}.four_wheel_steering_controller"
+_EFFORT_GRIPPER = f"{_CONTROLLERS}.effort_gripper_controller"
 BUILT_IN_TYPES: dict[str, str] = {
     "joint_state_controller/JointStateController": f"{_CONTROLLERS}.joint_state_controller:JointStateController",
-    "force_torque_sensor_controller/ForceTorqueSensorController":
-        f"{_CONTROLLERS}.sensor_controllers:ForceTorqueSensorController",
-    "imu_sensor_controller/ImuSensorController": f"{_CONTROLLERS}.sensor_controllers:ImuSensorController",
-    "scaled_controllers/SpeedScalingStateController": f"{_CONTROLLERS}.sensor_controllers:SpeedScalingStateController",
-    "position_controllers/JointTrajectoryController":
-        f"{_CONTROLLERS}.joint_trajectory_controller:JointTrajectoryController",
-    "position_controllers/ScaledJointTrajectoryController":
-        f"{_CONTROLLERS}.joint_trajectory_controller:JointTrajectoryController",
+    "force_torque_sensor_controller/ForceTorqueSensorController": f"{_SENSORS}:ForceTorqueSensorController",
+    "imu_sensor_controller/ImuSensorController": f"{_SENSORS}:ImuSensorController",
+    "scaled_controllers/SpeedScalingStateController": f"{_SENSORS}:SpeedScalingStateController",
+    "position_controllers/JointTrajectoryController": f"{_TRAJECTORY}:JointTrajectoryController",
+    "position_controllers/ScaledJointTrajectoryController": f"{_TRAJECTORY}:JointTrajectoryController",
     "pos_vel_controllers/JointTrajectoryController": f"{_POS_VEL}:PosVelJointTrajectoryController",
     "pos_vel_acc_controllers/JointTrajectoryController": f"{_POS_VEL}:PosVelAccJointTrajectoryController",
     "velocity_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:VelocityJointTrajectoryController",
     "velocity_controllers/ScaledJointTrajectoryController": f"{_CLOSED_LOOP}:VelocityJointTrajectoryController",
     "effort_controllers/JointTrajectoryController": f"{_CLOSED_LOOP}:EffortJointTrajectoryController",
     "position_controllers/GripperActionController": f"{_CONTROLLERS}.gripper_action_controller:GripperActionController",
-    "effort_controllers/GripperActionController":
-        f"{_CONTROLLERS}.effort_gripper_controller:EffortGripperActionController",
+    "effort_controllers/GripperActionController": f"{_EFFORT_GRIPPER}:EffortGripperActionController",
     "position_controllers/JointPositionController": f"{_JOINT_COMMAND}:PositionJointPositionController",
     "position_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:PositionJointGroupPositionController",
     "velocity_controllers/JointPositionController": f"{_JOINT_COMMAND}:VelocityJointPositionController",
@@ -44,10 +46,8 @@ BUILT_IN_TYPES: dict[str, str] = {
     "effort_controllers/JointGroupPositionController": f"{_JOINT_COMMAND}:EffortJointGroupPositionController",
     "effort_controllers/JointGroupEffortController": f"{_JOINT_COMMAND}:EffortJointGroupEffortController",
     "diff_drive_controller/DiffDriveController": f"{_MOBILE_BASE}.diff_drive_controller:DiffDriveController",
-    "ackermann_steering_controller/AckermannSteeringController":
-        f"{_MOBILE_BASE}.ackermann_steering_controller:AckermannSteeringController",
-    "four_wheel_steering_controller/FourWheelSteeringController":
-        f"{_MOBILE_BASE}.four_wheel_steering_controller:FourWheelSteeringController",
+    "ackermann_steering_controller/AckermannSteeringController": f"{_ACKERMANN}:AckermannSteeringController",
+    "four_wheel_steering_controller/FourWheelSteeringController": f"{_FOUR_WHEEL}:FourWheelSteeringController",
 }
 
 
@@ -89,23 +89,26 @@ class ControllerTypes:
         try:
             controller_class = getattr(importlib.import_module(module_name), class_name)
         except (ImportError, AttributeError) as error:
-            raise ControllerError(f"controller type '{type_name}': cannot load {class_name} of {module_name}: "
-                                  f"{error}") from error
+            raise ControllerError(
+                f"controller type '{type_name}': cannot load {class_name} of {module_name}: {error}"
+            ) from error
         controller: Controller = controller_class()
         return controller
 
     def _create_plugin(self, type_name: str) -> Controller:
         if type_name not in self._plugins:
             faults = "".join(f"; {fault}" for fault in self._plugins.faults)
-            raise ControllerError(f"unknown controller type '{type_name}'; known types: {', '.join(self.names)}"
-                                  f"{faults}")
+            raise ControllerError(
+                f"unknown controller type '{type_name}'; known types: {', '.join(self.names)}{faults}"
+            )
         try:
             controller: Controller = self._plugins.load(type_name, Controller)()
         except PluginError as error:
             raise ControllerError(f"controller type '{type_name}': {error}") from error
         except Exception as error:  # a user's constructor may raise anything
-            raise ControllerError(f"controller type '{type_name}': its constructor raised {type(error).__name__}: "
-                                  f"{error}") from error
+            raise ControllerError(
+                f"controller type '{type_name}': its constructor raised {type(error).__name__}: {error}"
+            ) from error
         return controller
 
     def reload(self) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the faults of the hardware in every cycle, and logs when they change."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -29,8 +30,9 @@ class FaultWatch:
             if faults:  # user code may return values of any type
                 faults = [HardwareFault(str(fault.reason), frozenset(fault.joints)) for fault in faults]
         except Exception as error:  # user code may raise anything; hardware in an unknown state counts as faulty
-            faults = (HardwareFault(f"fault() raised {type(error).__name__}: {error}",
-                                    self._robot_hw.commanded_joints),)
+            faults = (
+                HardwareFault(f"fault() raised {type(error).__name__}: {error}", self._robot_hw.commanded_joints),
+            )
         if faults or self.text:
             self._log_change("; ".join(fault.reason for fault in faults))
         return faults

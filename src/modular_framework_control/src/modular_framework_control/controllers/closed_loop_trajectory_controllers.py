@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectory controllers for joints that take velocities or efforts: what a position-controlled joint does inside
 itself, these do with gains."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -34,8 +35,14 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
         for handle, pid, forward, velocity, position_error, velocity_error in zip(
-                self._handles, self.pids.values(), self._velocity_ff, desired[VELOCITY].tolist(),
-                error[POSITION].tolist(), error[VELOCITY].tolist(), strict=True):
+            self._handles,
+            self.pids.values(),
+            self._velocity_ff,
+            desired[VELOCITY].tolist(),
+            error[POSITION].tolist(),
+            error[VELOCITY].tolist(),
+            strict=True,
+        ):
             handle.command = forward * velocity + pid.command(position_error, velocity_error, period_s)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A gripper whose joint takes efforts: gains make the way to its goal an effort, and the goal's bound holds for it."""
+
 from __future__ import annotations
 
 from typing import Any

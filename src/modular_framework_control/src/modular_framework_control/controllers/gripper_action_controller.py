@@ -4,6 +4,7 @@
 A grasp ends in a stall: the fingers stop short of the goal because they hold an object. As in ros_controllers the goal
 is then aborted with `stalled` set, and the command stays in force, so that the fingers keep their grip.
 """
+
 from __future__ import annotations
 
 import math
@@ -116,8 +117,9 @@ class GripperActionController(Controller):
         if not self._running:
             raise GripperGoalError("the controller is not running; start it first")
         if not math.isfinite(position) or not math.isfinite(max_effort):
-            raise GripperGoalError(f"got position {position}, max_effort {max_effort}; expected finite numbers (effort "
-                                   "0 = default)")
+            raise GripperGoalError(
+                f"got position {position}, max_effort {max_effort}; expected finite numbers (effort 0 = default)"
+            )
         self._mailbox.put(_Goal(position, abs(max_effort), goal_handle))
         if not self._running:
             self._reject_waiting("the controller was stopped")
@@ -155,7 +157,7 @@ class GripperActionController(Controller):
 
     def _end_all(self, status: GoalStatus, text: str) -> None:
         self._running = False
-        if self._active is not None:    # a gripper at its goal keeps its grip, a moving one stops
+        if self._active is not None:  # a gripper at its goal keeps its grip, a moving one stops
             self._hold()
             self._apply(0.0)
         self._finish(status, self._state(False, False), text)
@@ -209,9 +211,12 @@ class GripperActionController(Controller):
             self._rest_position = position
             self._rest_since_s = time_s
         elif time_s - self._rest_since_s > self._stall_timeout_s:
-            self._finish(GoalStatus.ABORTED, self._state(True, False),
-                         f"stalled: joint '{self._handle.name}' stands at {position:.6g}, {error:+.6g} short of its "
-                         f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s")
+            self._finish(
+                GoalStatus.ABORTED,
+                self._state(True, False),
+                f"stalled: joint '{self._handle.name}' stands at {position:.6g}, {error:+.6g} short of its "
+                f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s",
+            )
             return
         if self.on_feedback is not None and time_s >= self._next_feedback_s:
             self._next_feedback_s = next_due(self._next_feedback_s, self._monitor_period_s, time_s)

@@ -3,6 +3,7 @@
 
 If the hardware takes the commanded quantity, the command is passed on; if it takes another one, a PID computes that.
 """
+
 from __future__ import annotations
 
 import math
@@ -74,8 +75,10 @@ class JointCommandController(Controller):
         key = "joint" if self.single else "joints"
         self.joint_names = read_names(controller_nh, key)
         if self.single and len(self.joint_names) != 1:
-            raise ParameterError(f"parameter {join_names(controller_nh.namespace, key)}: got {self.joint_names!r}; "
-                                 "expected the name of one joint")
+            raise ParameterError(
+                f"parameter {join_names(controller_nh.namespace, key)}: got {self.joint_names!r}; "
+                "expected the name of one joint"
+            )
         self._handles = [hw.get_handle(name) for name in self.joint_names]
         return True
 
@@ -91,8 +94,10 @@ class JointCommandController(Controller):
         if self._fault:
             raise ControllerError(self._fault)
         if len(values) != len(self.joint_names) or not all(map(math.isfinite, values)):
-            raise ControllerError(f"got {list(values)!r}; expected {len(self.joint_names)} finite numbers, for: "
-                                  f"{', '.join(self.joint_names)}")
+            raise ControllerError(
+                f"got {list(values)!r}; expected {len(self.joint_names)} finite numbers, for: "
+                f"{', '.join(self.joint_names)}"
+            )
         self._set_points = tuple(values)
 
     def starting(self, time_s: float) -> None:
@@ -202,8 +207,18 @@ class GainsController(JointCommandController):
         self._cycles += 1
         if self.single and self.on_state is not None and self._cycles % CYCLES_PER_REPORT == 0:
             value, rate = self._measured()
-            self.on_state(JointControlSnapshot(time_s, period_s, self._set_points[0], value, rate, self._error,
-                                               self._handles[0].command, self._pids[0].gains))
+            self.on_state(
+                JointControlSnapshot(
+                    time_s,
+                    period_s,
+                    self._set_points[0],
+                    value,
+                    rate,
+                    self._error,
+                    self._handles[0].command,
+                    self._pids[0].gains,
+                )
+            )
 
     def stopping(self, time_s: float) -> None:
         for handle in self._handles:

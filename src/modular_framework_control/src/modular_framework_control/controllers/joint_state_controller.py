@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reports the measured state of all joints at a fixed rate."""
+
 from __future__ import annotations
 
 import logging
@@ -72,16 +73,27 @@ class JointStateController(Controller):
             return
         self._next_s = next_due(self._next_s, self._period_s, time_s)
         joints = (*self._handles, *self._extra)
-        self.on_state(JointStateSnapshot(time_s, self._names, [joint.position for joint in joints],
-                                         [joint.velocity for joint in joints], [joint.effort for joint in joints]))
+        self.on_state(
+            JointStateSnapshot(
+                time_s,
+                self._names,
+                [joint.position for joint in joints],
+                [joint.velocity for joint in joints],
+                [joint.effort for joint in joints],
+            )
+        )
 
 
 def _extra_joints(controller_nh: NodeHandle) -> list[JointStateHandle]:
     entries = controller_nh.get_param("extra_joints", [])
     where = join_names(controller_nh.namespace, "extra_joints")
     if not isinstance(entries, list):
-        LOGGER.error("parameter %s is ignored: got %r; expected a list of mappings with name, %s", where, entries,
-                     ", ".join(STATE_KEYS))
+        LOGGER.error(
+            "parameter %s is ignored: got %r; expected a list of mappings with name, %s",
+            where,
+            entries,
+            ", ".join(STATE_KEYS),
+        )
         return []
     joints: dict[str, JointStateHandle] = {}
     for number, entry in enumerate(entries):

@@ -5,6 +5,7 @@ Goals, commands and cancellations from any thread go through a mailbox, which `u
 depends on time is decided there, with the time that `update` is given. A trajectory has a clock of its own, which slows
 down and stops with the robot.
 """
+
 from __future__ import annotations
 
 import logging
@@ -88,8 +89,12 @@ class JointTrajectoryController(Controller):
         self._handles = [hw.get_handle(name) for name in self.joint_names]
         known = limits_of(self._handles, root_nh)
         self._limits = MotionLimits.of(known)
-        self._rules = GoalRules(tuple(self.joint_names), read_tolerances(controller_nh, self.joint_names), self._limits,
-                                read_bool(controller_nh, "allow_partial_joints_goal", False))
+        self._rules = GoalRules(
+            tuple(self.joint_names),
+            read_tolerances(controller_nh, self.joint_names),
+            self._limits,
+            read_bool(controller_nh, "allow_partial_joints_goal", False),
+        )
         self._stop_motion = StopMotion(read_number(controller_nh, "stop_trajectory_duration", 0.0), self._limits)
         self._state_period_s = period_of(read_number(controller_nh, "state_publish_rate", 50.0))
         self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
@@ -138,8 +143,10 @@ class JointTrajectoryController(Controller):
             raise ControllerError("the controller is not running; nothing is desired")
         asked_s, known_from_s = self._clock.expected_at(time_s), self._plan.known_from_s
         if known_from_s is not None and asked_s < known_from_s - SHORTEST_SEGMENT_S:
-            raise ControllerError(f"got {time_s:.9g} s, which is before the motion under way began, by "
-                                  f"{known_from_s - asked_s:.6g} s of its trajectory; ask for a later time")
+            raise ControllerError(
+                f"got {time_s:.9g} s, which is before the motion under way began, by "
+                f"{known_from_s - asked_s:.6g} s of its trajectory; ask for a later time"
+            )
         return self._clock.slowed(self._plan.sample(asked_s))
 
     # ---- control loop ----
@@ -273,14 +280,22 @@ class JointTrajectoryController(Controller):
         origin_s = self._clock.at(goal.stamp_s) if goal.stamp_s != 0.0 else now_s
         end_s = origin_s + float(goal.spline.times_s[-1])
         if end_s <= now_s + SHORTEST_SEGMENT_S:
-            return (f"all {len(goal.spline.times_s)} points lie in the past: the last one was due "
-                    f"{now_s - end_s:.6g} s before the goal was taken up; give a later header stamp or time_from_start")
+            return (
+                f"all {len(goal.spline.times_s)} points lie in the past: the last one was due "
+                f"{now_s - end_s:.6g} s before the goal was taken up; give a later header stamp or time_from_start"
+            )
         splice_s = max(now_s, origin_s)
         if end_s <= splice_s + SHORTEST_SEGMENT_S:
             splice_s = now_s
         joints = list(goal.joints)
-        track = splice(goal.spline, joints, origin_s, splice_s, self._plan.sample(splice_s)[:, joints],
-                       self._continuous[joints].tolist())
+        track = splice(
+            goal.spline,
+            joints,
+            origin_s,
+            splice_s,
+            self._plan.sample(splice_s)[:, joints],
+            self._continuous[joints].tolist(),
+        )
         refusal = self._beyond_limits(goal, track, splice_s - origin_s)
         if refusal:
             return refusal
@@ -296,15 +311,24 @@ class JointTrajectoryController(Controller):
         first = int(np.searchsorted(goal.spline.times_s, late_s, side="right"))
         joints = list(goal.joints)
         return goal.violations.text(first, first + 1) or first_segment_violations(
-            track, [self.joint_names[joint] for joint in joints], self._limits.of_joints(joints),
-            self._actual[POSITION, joints], first)
+            track,
+            [self.joint_names[joint] for joint in joints],
+            self._limits.of_joints(joints),
+            self._actual[POSITION, joints],
+            first,
+        )
 
     def _warn_of_late_points(self, goal: ValidatedGoal, late_s: float) -> None:
         times_s = goal.spline.times_s if goal.spline is not None else np.zeros(0)
         late = int(np.searchsorted(times_s, late_s, side="right"))
         if late > 1 or (late == 1 and late_s > 0.0):
-            LOGGER.warning("%s: the first %d of %d points are left out, they lie in the past; the next one is due in "
-                           "%.3f s", self._namespace, late, len(times_s), times_s[late] - late_s)
+            LOGGER.warning(
+                "%s: the first %d of %d points are left out, they lie in the past; the next one is due in %.3f s",
+                self._namespace,
+                late,
+                len(times_s),
+                times_s[late] - late_s,
+            )
 
     def _refuse(self, goal: ValidatedGoal, reason: str) -> None:
         if goal.goal_handle is None:
@@ -321,8 +345,9 @@ class JointTrajectoryController(Controller):
     def _stop(self) -> None:
         """Stops the motion, beginning at the measured positions."""
         desired, actual = self._desired_and_measured()
-        self._plan.follow(self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate),
-                          self._clock.now_s)
+        self._plan.follow(
+            self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate), self._clock.now_s
+        )
         for handle in self._handles:
             handle.held = self._stop_motion.holds(self._clock.rate)
 
@@ -332,16 +357,22 @@ class JointTrajectoryController(Controller):
         if late_s < 0.0:
             outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""
             if outside:
-                self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
-                             f"path tolerance violated: {outside}")
+                self._finish(
+                    GoalStatus.ABORTED,
+                    TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
+                    f"path tolerance violated: {outside}",
+                )
             return bool(outside)
         outside = violations(error, tolerances.goal, self.joint_names)
         if not outside:
             self._finish(GoalStatus.SUCCEEDED, TrajectoryErrorCode.SUCCESSFUL, "goal reached")
         elif late_s >= tolerances.goal_time_s:
-            self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
-                         f"goal tolerance violated {late_s:.6g} s after the end of the trajectory (goal_time "
-                         f"{tolerances.goal_time_s:.6g} s): {outside}")
+            self._finish(
+                GoalStatus.ABORTED,
+                TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
+                f"goal tolerance violated {late_s:.6g} s after the end of the trajectory (goal_time "
+                f"{tolerances.goal_time_s:.6g} s): {outside}",
+            )
             return True
         return False
 

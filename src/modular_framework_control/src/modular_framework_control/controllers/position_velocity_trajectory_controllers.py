@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectory controllers for joints whose own control takes more of a trajectory than its positions."""
+
 from __future__ import annotations
 
 from typing import Any, ClassVar

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a robot offers to controllers: handles, interfaces, limits, transmissions, and the hardware itself."""
+
 from modular_framework_control.hardware_interface.handles import (
     ActuatorHandle,
     ForceTorqueSensorHandle,

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Several pieces of hardware that controllers see as one robot: an arm and its gripper, two arms, ..."""
+
 from __future__ import annotations
 
 import logging
@@ -39,9 +40,13 @@ class HardwarePart:
         """The controllers that claim something of this hardware, with those claims only."""
         kept: list[ControllerInfo] = []
         for controller in controllers:
-            claims = [InterfaceResources(claim.hardware_interface, tuple(
-                          name for name in claim.resources if name in self.resources.get(claim.hardware_interface, ())))
-                      for claim in controller.claimed_resources]
+            claims = [
+                InterfaceResources(
+                    claim.hardware_interface,
+                    tuple(name for name in claim.resources if name in self.resources.get(claim.hardware_interface, ())),
+                )
+                for claim in controller.claimed_resources
+            ]
             mine = tuple(claim for claim in claims if claim.resources)
             if mine:
                 kept.append(ControllerInfo(controller.name, controller.type, mine))
@@ -105,19 +110,25 @@ class CombinedRobotHW(RobotHW):
         for part in self._parts:
             for what in ("read", "write"):
                 if (part.name, what) in self._raised:
-                    yield HardwareFault(f"hardware '{part.name}': {self._raised[part.name, what]}",
-                                        part.hardware.commanded_joints)
+                    yield HardwareFault(
+                        f"hardware '{part.name}': {self._raised[part.name, what]}", part.hardware.commanded_joints
+                    )
 
     def _reported_faults(self) -> list[HardwareFault]:
-        return [HardwareFault(f"hardware '{part.name}': {fault.reason}", fault.joints)
-                for part in self._parts for fault in part.hardware.faults()]
+        return [
+            HardwareFault(f"hardware '{part.name}': {fault.reason}", fault.joints)
+            for part in self._parts
+            for fault in part.hardware.faults()
+        ]
 
     def _make_part(self, name: str, root_nh: NodeHandle, part_nh: NodeHandle) -> HardwarePart:
         where = f"entry '{name}' of robot_hardware"
         type_name = part_nh.get_param("type")
         if not isinstance(type_name, str) or not type_name:
-            raise ParameterError(f"{where}: parameter {join_names(part_nh.namespace, 'type')} is {type_name!r}; "
-                                 "expected the name of a hardware class, package/Class")
+            raise ParameterError(
+                f"{where}: parameter {join_names(part_nh.namespace, 'type')} is {type_name!r}; "
+                "expected the name of a hardware class, package/Class"
+            )
         try:
             hardware = self._make(type_name)
             initialised = hardware.init(root_nh, part_nh)
@@ -149,8 +160,9 @@ class CombinedRobotHW(RobotHW):
         for part in self._parts:
             self._cycle(part, "write", part.hardware.write, time_s, period_s)
 
-    def _cycle(self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float,
-               period_s: float) -> None:
+    def _cycle(
+        self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float, period_s: float
+    ) -> None:
         """Reads or writes one part; an exception is a fault of this part until the same step succeeds again."""
         try:
             step(time_s, period_s)
@@ -170,15 +182,23 @@ class CombinedRobotHW(RobotHW):
         """The controllers with their claims on joints that several parts command, which no part sees as a whole."""
         commanded = Counter(name for part in self._parts for name in part.hardware.commanded_joints)
         for controller in controllers:
-            yield ControllerInfo(controller.name, controller.type, tuple(
-                InterfaceResources(claim.hardware_interface, tuple(n for n in claim.resources if commanded[n] > 1))
-                for claim in controller.claimed_resources))
+            yield ControllerInfo(
+                controller.name,
+                controller.type,
+                tuple(
+                    InterfaceResources(claim.hardware_interface, tuple(n for n in claim.resources if commanded[n] > 1))
+                    for claim in controller.claimed_resources
+                ),
+            )
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
         for part, mine in self._concerned_by(start, stop):
             if part.hardware.prepare_switch(*mine) is not True:
-                LOGGER.error("hardware '%s' refused to prepare a switch (start: %s; stop: %s)", part.name,
-                             *(", ".join(controller.name for controller in side) or "none" for side in mine))
+                LOGGER.error(
+                    "hardware '%s' refused to prepare a switch (start: %s; stop: %s)",
+                    part.name,
+                    *(", ".join(controller.name for controller in side) or "none" for side in mine),
+                )
                 return False
         return True
 
@@ -186,8 +206,9 @@ class CombinedRobotHW(RobotHW):
         for part, mine in self._concerned_by(start, stop):
             part.hardware.do_switch(*mine)
 
-    def _concerned_by(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]
-                      ) -> Iterator[tuple[HardwarePart, tuple[list[ControllerInfo], list[ControllerInfo]]]]:
+    def _concerned_by(
+        self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]
+    ) -> Iterator[tuple[HardwarePart, tuple[list[ControllerInfo], list[ControllerInfo]]]]:
         for part in self._parts:
             mine = part.concerned(start), part.concerned(stop)
             if any(mine):
@@ -206,16 +227,19 @@ class CombinedRobotHW(RobotHW):
         return SwitchState.DONE
 
 
-def _combined(interface_class: type[HardwareInterface[Any]],
-              offers: Sequence[tuple[HardwarePart, HardwareInterface[Any]]]) -> HardwareInterface[Any]:
+def _combined(
+    interface_class: type[HardwareInterface[Any]], offers: Sequence[tuple[HardwarePart, HardwareInterface[Any]]]
+) -> HardwareInterface[Any]:
     """One interface with the handles of several parts."""
     handles: dict[str, Any] = {}
     owners: dict[str, str] = {}
     for part, interface in offers:
         for handle in interface.handles:
             if handle.name in owners:
-                both = (f"{interface_class.type_name}: joint '{handle.name}' is in hardware '{owners[handle.name]}' "
-                        f"and in '{part.name}'")
+                both = (
+                    f"{interface_class.type_name}: joint '{handle.name}' is in hardware '{owners[handle.name]}' "
+                    f"and in '{part.name}'"
+                )
                 if interface_class.claims_resources:
                     raise HardwareInterfaceError(f"robot_hardware: {both}; only one of them may command it")
                 LOGGER.warning("%s; the latter is used", both)

@@ -3,6 +3,7 @@
 
 The `RobotHW` makes one handle per thing and keeps it; reading and writing it is reading and writing attributes.
 """
+
 from __future__ import annotations
 
 import math
@@ -91,8 +92,11 @@ class JointHandle:
 
 def unmeasured(handles: Iterable[JointHandle]) -> str:
     """Names the joints whose measured position is not a finite number; "" if there are none."""
-    faults = [f"joint '{handle.name}' is measured at {handle.position}" for handle in handles
-              if not math.isfinite(handle.position)]
+    faults = [
+        f"joint '{handle.name}' is measured at {handle.position}"
+        for handle in handles
+        if not math.isfinite(handle.position)
+    ]
     return f"{', '.join(faults)}; expected a position: see why the hardware reads none" if faults else ""
 
 
@@ -197,8 +201,16 @@ class ImuSensorHandle:
             0 when they are not known, the first -1 when the quantity is not measured.
     """
 
-    __slots__ = ("name", "frame_id", "orientation", "angular_velocity", "linear_acceleration",
-                 "orientation_covariance", "angular_velocity_covariance", "linear_acceleration_covariance")
+    __slots__ = (
+        "name",
+        "frame_id",
+        "orientation",
+        "angular_velocity",
+        "linear_acceleration",
+        "orientation_covariance",
+        "angular_velocity_covariance",
+        "linear_acceleration_covariance",
+    )
 
     def __init__(self, name: str, frame_id: str) -> None:
         self.name = name
@@ -206,5 +218,6 @@ class ImuSensorHandle:
         self.orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
         self.angular_velocity: Vector = (0.0, 0.0, 0.0)
         self.linear_acceleration: Vector = (0.0, 0.0, 0.0)
-        self.orientation_covariance = self.angular_velocity_covariance = self.linear_acceleration_covariance = \
-            (0.0,) * 9
+        self.orientation_covariance = self.angular_velocity_covariance = self.linear_acceleration_covariance = (
+            0.0,
+        ) * 9

@@ -5,6 +5,7 @@ A `RobotHW` makes one handle per joint. A controller gets the handle from an int
 writes plain attributes. Interfaces that command joints record which handles were taken (a *claim*), so that two
 controllers never command the same joint through interfaces that exclude each other.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -60,8 +61,10 @@ class HardwareInterface(Generic[HandleT]):
             HardwareInterfaceError: a handle of that name is already registered.
         """
         if handle.name in self._handles:
-            raise HardwareInterfaceError(f"{self.type_name}: {self.noun} '{handle.name}' is registered twice; "
-                                         f"register each {self.noun} once per interface")
+            raise HardwareInterfaceError(
+                f"{self.type_name}: {self.noun} '{handle.name}' is registered twice; "
+                f"register each {self.noun} once per interface"
+            )
         self._handles[handle.name] = handle
         return handle
 
@@ -167,14 +170,25 @@ class ImuSensorInterface(HardwareInterface[ImuSensorHandle]):
     noun = "sensor"
 
 
-CommandInterface = (PositionJointInterface | VelocityJointInterface | EffortJointInterface | PosVelJointInterface
-                    | PosVelAccJointInterface)
+CommandInterface = (
+    PositionJointInterface
+    | VelocityJointInterface
+    | EffortJointInterface
+    | PosVelJointInterface
+    | PosVelAccJointInterface
+)
 AnyInterface = JointStateInterface | CommandInterface
 
 COMMAND_INTERFACES: tuple[type[CommandInterface], ...] = (
-    PositionJointInterface, VelocityJointInterface, EffortJointInterface, PosVelJointInterface, PosVelAccJointInterface)
+    PositionJointInterface,
+    VelocityJointInterface,
+    EffortJointInterface,
+    PosVelJointInterface,
+    PosVelAccJointInterface,
+)
 INTERFACES_BY_NAME: dict[str, type[AnyInterface]] = {
-    interface.type_name: interface for interface in (JointStateInterface, *COMMAND_INTERFACES)}
+    interface.type_name: interface for interface in (JointStateInterface, *COMMAND_INTERFACES)
+}
 
 
 def interface_from_name(type_name: str) -> type[AnyInterface]:
@@ -208,10 +222,30 @@ class ControllerInfo:
 
 
 __all__ = [
-    "COMMAND_INTERFACES", "INTERFACES_BY_NAME", "AnyInterface", "CommandInterface", "ControllerInfo",
-    "EffortJointInterface", "ForceTorqueSensorHandle", "ForceTorqueSensorInterface", "HandleT", "HardwareInterface",
-    "HardwareInterfaceError", "ImuSensorHandle", "ImuSensorInterface", "InterfaceResources", "JointHandle",
-    "JointStateHandle", "JointStateInterface", "PosVelAccJointHandle", "PosVelAccJointInterface", "PosVelJointHandle",
-    "PosVelJointInterface", "PositionJointInterface", "SpeedScalingHandle", "SpeedScalingInterface",
-    "VelocityJointInterface", "interface_from_name",
+    "COMMAND_INTERFACES",
+    "INTERFACES_BY_NAME",
+    "AnyInterface",
+    "CommandInterface",
+    "ControllerInfo",
+    "EffortJointInterface",
+    "ForceTorqueSensorHandle",
+    "ForceTorqueSensorInterface",
+    "HandleT",
+    "HardwareInterface",
+    "HardwareInterfaceError",
+    "ImuSensorHandle",
+    "ImuSensorInterface",
+    "InterfaceResources",
+    "JointHandle",
+    "JointStateHandle",
+    "JointStateInterface",
+    "PosVelAccJointHandle",
+    "PosVelAccJointInterface",
+    "PosVelJointHandle",
+    "PosVelJointInterface",
+    "PositionJointInterface",
+    "SpeedScalingHandle",
+    "SpeedScalingInterface",
+    "VelocityJointInterface",
+    "interface_from_name",
 ]

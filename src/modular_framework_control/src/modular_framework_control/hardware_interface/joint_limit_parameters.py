@@ -7,6 +7,7 @@ and for soft limits `has_soft_limits`, `soft_lower_limit`, `soft_upper_limit`, `
 ros_control, a value without its `has_...: true` is not in force, and a group that is not complete changes nothing;
 since limits are there for safety, the log says so.
 """
+
 from __future__ import annotations
 
 import logging
@@ -75,8 +76,11 @@ def soft_limits_from_urdf(robot_description: str) -> dict[str, SoftJointLimits]:
     Raises:
         ParameterError: the text is not XML, or a value is not a number.
     """
-    return {joint.name: _soft_limits_of(joint.safety, joint.kind == "continuous")
-            for joint in parse_description(robot_description).movable_joints() if joint.safety is not None}
+    return {
+        joint.name: _soft_limits_of(joint.safety, joint.kind == "continuous")
+        for joint in parse_description(robot_description).movable_joints()
+        if joint.safety is not None
+    }
 
 
 def _soft_limits_of(safety: SafetyController, continuous: bool) -> SoftJointLimits:
@@ -114,11 +118,16 @@ def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) 
         continuous = read_bool(handle, "angle_wraparound", limits.continuous)
         limits = replace(limits, min_position=-INFINITY, max_position=INFINITY, continuous=continuous)
     if limits.min_position > limits.max_position:
-        raise ParameterError(f"parameters {handle.namespace}: the range of the joint is from {limits.min_position} to "
-                             f"{limits.max_position}; min_position must not exceed max_position")
-    return replace(limits, max_velocity=_largest(handle, "velocity", limits.max_velocity),
-                   max_acceleration=_largest(handle, "acceleration", limits.max_acceleration),
-                   max_effort=_largest(handle, "effort", limits.max_effort))
+        raise ParameterError(
+            f"parameters {handle.namespace}: the range of the joint is from {limits.min_position} to "
+            f"{limits.max_position}; min_position must not exceed max_position"
+        )
+    return replace(
+        limits,
+        max_velocity=_largest(handle, "velocity", limits.max_velocity),
+        max_acceleration=_largest(handle, "acceleration", limits.max_acceleration),
+        max_effort=_largest(handle, "effort", limits.max_effort),
+    )
 
 
 def _given(handle: NodeHandle, key: str) -> bool | None:
@@ -131,11 +140,17 @@ def _complete(handle: NodeHandle, has: str, keys: tuple[str, ...], minimum: floa
     if _given(handle, has):
         if len(present) == len(keys):
             return [read_number(handle, key, 0.0, minimum) for key in keys]
-        LOGGER.warning("parameters %s: %s is true, but of %s only %s are set; they are ignored, set all of them",
-                       handle.namespace, has, ", ".join(keys), ", ".join(present) or "none")
+        LOGGER.warning(
+            "parameters %s: %s is true, but of %s only %s are set; they are ignored, set all of them",
+            handle.namespace,
+            has,
+            ", ".join(keys),
+            ", ".join(present) or "none",
+        )
     elif present and not handle.has_param(has):
-        LOGGER.warning("parameters %s: %s without %s: true; they are ignored, set it", handle.namespace,
-                       ", ".join(present), has)
+        LOGGER.warning(
+            "parameters %s: %s without %s: true; they are ignored, set it", handle.namespace, ", ".join(present), has
+        )
     return None
 
 
@@ -146,8 +161,9 @@ def _largest(handle: NodeHandle, what: str, known: float) -> float:
     return INFINITY if _given(handle, f"has_{what}_limits") is False else known
 
 
-def soft_limits_with_parameters(name: str, limits: SoftJointLimits | None,
-                                root_nh: NodeHandle) -> SoftJointLimits | None:
+def soft_limits_with_parameters(
+    name: str, limits: SoftJointLimits | None, root_nh: NodeHandle
+) -> SoftJointLimits | None:
     """`limits`, or what `joint_limits/<name>/` puts in their place; None when neither is there.
 
     Raises:
@@ -159,9 +175,13 @@ def soft_limits_with_parameters(name: str, limits: SoftJointLimits | None,
         return limits
     lower, upper, k_position, k_velocity = values
     if lower >= upper:
-        raise ParameterError(f"parameters {handle.namespace}: soft limits from {lower} to {upper}; soft_lower_limit "
-                             "must be below soft_upper_limit")
+        raise ParameterError(
+            f"parameters {handle.namespace}: soft limits from {lower} to {upper}; soft_lower_limit "
+            "must be below soft_upper_limit"
+        )
     if min(k_position, k_velocity) < 0.0:
-        raise ParameterError(f"parameters {handle.namespace}: k_position is {k_position} and k_velocity {k_velocity}; "
-                             "neither may be negative")
+        raise ParameterError(
+            f"parameters {handle.namespace}: k_position is {k_position} and k_velocity {k_velocity}; "
+            "neither may be negative"
+        )
     return SoftJointLimits(lower, upper, k_position, k_velocity)

@@ -5,6 +5,7 @@ A hardware does so first thing in `write`: with one object per command handle (`
 at once (`JointLimitGuard`). The rules for positions, velocities and efforts, with and without soft limits, are those of
 ros_control's joint_limits_interface.
 """
+
 from __future__ import annotations
 
 import math
@@ -153,7 +154,7 @@ class _Saturation:
         return self._command
 
     def _set_limited(self, command: float) -> None:
-        self._limited = self.handle.command = command + 0.0   # a new object: `is` finds commands of others
+        self._limited = self.handle.command = command + 0.0  # a new object: `is` finds commands of others
 
 
 class VelocityJointSaturation(_Saturation):
@@ -226,8 +227,12 @@ def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits)
     return max(-largest, min(largest, lowest)), max(-largest, min(largest, highest))
 
 
-def limit_handle(interface_class: type[HardwareInterface[Any]], handle: JointHandle, limits: JointLimits,
-                 soft_limits: SoftJointLimits | None = None) -> JointLimiter:
+def limit_handle(
+    interface_class: type[HardwareInterface[Any]],
+    handle: JointHandle,
+    limits: JointLimits,
+    soft_limits: SoftJointLimits | None = None,
+) -> JointLimiter:
     """What keeps the commands of a handle within limits, by what the handle commands; the handle then says its limits.
 
     Args:
@@ -260,9 +265,12 @@ def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[Joint
     unknown = [handle.name for handle in handles if handle.limits is None]
     description = root_nh.get_param("robot_description") if unknown else None
     described = limits_from_urdf(description) if isinstance(description, str) else {}
-    return [handle.limits if handle.limits is not None
-            else limits_with_parameters(handle.name, described.get(handle.name, JointLimits()), root_nh)
-            for handle in handles]
+    return [
+        handle.limits
+        if handle.limits is not None
+        else limits_with_parameters(handle.name, described.get(handle.name, JointLimits()), root_nh)
+        for handle in handles
+    ]
 
 
 class JointLimitGuard:
@@ -289,8 +297,14 @@ class JointLimitGuard:
             for handle in interface.handles if interface.claims_resources else ():
                 name = handle.name
                 self.limits[name] = limits_with_parameters(name, known.get(name, JointLimits()), root_nh)
-                self._limiters.append(limit_handle(type(interface), handle, self.limits[name],
-                                                   soft_limits_with_parameters(name, soft.get(name), root_nh)))
+                self._limiters.append(
+                    limit_handle(
+                        type(interface),
+                        handle,
+                        self.limits[name],
+                        soft_limits_with_parameters(name, soft.get(name), root_nh),
+                    )
+                )
 
     def enforce(self, period_s: float) -> None:
         """Replaces every command by the nearest allowed one; `period_s` [s] is the time since the last call."""
@@ -305,7 +319,20 @@ class JointLimitGuard:
                 limiter.reset()
 
 
-__all__ = ["EffortJointSaturation", "JointLimitGuard", "JointLimiter", "JointLimits", "PosVelJointSaturation",
-           "PositionJointSaturation", "SoftJointLimits", "VelocityJointSaturation", "limit_handle", "limits_from_urdf",
-           "limits_of", "limits_with_parameters", "soft_limits_from_urdf", "soft_limits_with_parameters",
-           "soft_velocities"]
+__all__ = [
+    "EffortJointSaturation",
+    "JointLimitGuard",
+    "JointLimiter",
+    "JointLimits",
+    "PosVelJointSaturation",
+    "PositionJointSaturation",
+    "SoftJointLimits",
+    "VelocityJointSaturation",
+    "limit_handle",
+    "limits_from_urdf",
+    "limits_of",
+    "limits_with_parameters",
+    "soft_limits_from_urdf",
+    "soft_limits_with_parameters",
+    "soft_velocities",
+]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Mock hardware: joints that follow their commands exactly, for demonstrations and tests without robot or physics."""
+
 from __future__ import annotations
 
 import logging
@@ -72,7 +73,7 @@ class MockRobotHW(RobotHW):
             return
         for handle, position in zip(self._handles, self._sent, strict=True):
             state = handle.state
-            if self._sent_period_s > 0.0:     # without time the velocity does not change
+            if self._sent_period_s > 0.0:  # without time the velocity does not change
                 state.velocity = (position - state.position) / self._sent_period_s
             state.position = position
 
@@ -99,5 +100,7 @@ def _read_interface(robot_hw_nh: NodeHandle) -> type[CommandInterface]:
     for interface in COMMAND_INTERFACES:
         if value in (interface.__name__, interface.type_name):
             return interface
-    raise ParameterError(f"parameter {join_names(robot_hw_nh.namespace, 'command_interface')}: got {value!r}; expected "
-                         f"one of: {', '.join(interface.__name__ for interface in COMMAND_INTERFACES)}")
+    raise ParameterError(
+        f"parameter {join_names(robot_hw_nh.namespace, 'command_interface')}: got {value!r}; expected "
+        f"one of: {', '.join(interface.__name__ for interface in COMMAND_INTERFACES)}"
+    )

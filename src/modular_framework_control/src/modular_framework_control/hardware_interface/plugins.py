@@ -11,6 +11,7 @@ and the description names, per Python module, the classes in it:
       <class name="my_package/MyHW" type="MyHW" base_class_type="hardware_interface::RobotHW"/>
     </library>
 """
+
 from __future__ import annotations
 
 import importlib
@@ -101,17 +102,20 @@ class PluginIndex:
         plugin = self._plugins().get(name)
         if plugin is None:
             faults = f"; faulty descriptions: {'; '.join(self._faults)}" if self._faults else ""
-            raise PluginError(f"no package of this workspace offers a {self._base} named {name!r}; known: "
-                              f"{', '.join(self.names) or 'none'}{faults}. A package offers one by <export>"
-                              f"<{EXPORT_TAG} plugin=\"${{prefix}}/plugins.xml\"/></export> in its package.xml")
+            raise PluginError(
+                f"no package of this workspace offers a {self._base} named {name!r}; known: "
+                f"{', '.join(self.names) or 'none'}{faults}. A package offers one by <export>"
+                f'<{EXPORT_TAG} plugin="${{prefix}}/plugins.xml"/></export> in its package.xml'
+            )
         where = f"{plugin.class_name} of {plugin.module} (offered as {name} by {plugin.origin})"
         try:
             loaded = getattr(self._module(plugin.module), plugin.class_name)
         except Exception as error:  # a user's module may raise anything when it is imported
             raise PluginError(f"cannot load {where}: {type(error).__name__}: {error}") from error
         if not isinstance(loaded, type) or not issubclass(loaded, expected):
-            raise PluginError(f"{where} is no {expected.__name__}; derive it from "
-                              f"{expected.__module__}.{expected.__name__}")
+            raise PluginError(
+                f"{where} is no {expected.__name__}; derive it from {expected.__module__}.{expected.__name__}"
+            )
         return loaded
 
     def reload(self) -> None:
@@ -172,17 +176,20 @@ def read_description(path: Path) -> list[Plugin]:
         raise PluginError(f"plugin description {path}: {error}") from error
     plugins: list[Plugin] = []
     faults: list[str] = []
-    for library in ([root] if root.tag == "library" else root.findall("library")):
+    for library in [root] if root.tag == "library" else root.findall("library"):
         for entry in library.findall("class"):
             values = {key: entry.get(key, "") for key in ("name", "type", "base_class_type")}
             values["path (of library)"] = library.get("path", "")
             missing = [key for key, value in values.items() if not value]
             if missing or values["name"].count("/") != 1:
-                faults.append(f"class {values['name']!r}: " + (f"no {', '.join(missing)}" if missing else
-                                                               "its name must have the form package/Class"))
+                faults.append(
+                    f"class {values['name']!r}: "
+                    + (f"no {', '.join(missing)}" if missing else "its name must have the form package/Class")
+                )
                 continue
-            plugins.append(Plugin(values["name"], values["base_class_type"], values["path (of library)"],
-                                  values["type"], path))
+            plugins.append(
+                Plugin(values["name"], values["base_class_type"], values["path (of library)"], values["type"], path)
+            )
     if faults:
         raise PluginError(f"plugin description {path}: {'; '.join(faults)}")
     return plugins

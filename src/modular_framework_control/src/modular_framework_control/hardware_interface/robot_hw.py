@@ -5,6 +5,7 @@ Hardware is one subclass: a constructor without parameters, `init` that register
 that fills the joint states and `write` that sends the commands. The owner of the loop calls once per cycle:
 `hw.read(t, dt)`, `controller_manager.update(t, dt)`, `hw.write(t, dt)`.
 """
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
@@ -137,8 +138,9 @@ class RobotHW:
     @property
     def commanded_joints(self) -> frozenset[str]:
         """Names of the joints that controllers can command."""
-        return frozenset(name for interface in self._interfaces.values() if interface.claims_resources
-                         for name in interface.names)
+        return frozenset(
+            name for interface in self._interfaces.values() if interface.claims_resources for name in interface.names
+        )
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         """Why these controllers may not run together; "" when they may.
@@ -153,12 +155,16 @@ class RobotHW:
                 for joint in claim.resources:
                     owner, interface = owners.setdefault(joint, (controller.name, claim.hardware_interface))
                     if owner != controller.name:
-                        conflicts[f"joint '{joint}' is claimed by '{owner}' and by '{controller.name}'; stop one of "
-                                  "them in the same request"] = None
+                        conflicts[
+                            f"joint '{joint}' is claimed by '{owner}' and by '{controller.name}'; stop one of "
+                            "them in the same request"
+                        ] = None
                     elif interface != claim.hardware_interface:
-                        conflicts[f"joint '{joint}' is claimed by '{owner}' through {interface} and through "
-                                  f"{claim.hardware_interface}; a controller may claim a joint through one interface "
-                                  "only, change its parameters"] = None
+                        conflicts[
+                            f"joint '{joint}' is claimed by '{owner}' through {interface} and through "
+                            f"{claim.hardware_interface}; a controller may claim a joint through one interface "
+                            "only, change its parameters"
+                        ] = None
         return "; ".join(conflicts)
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:

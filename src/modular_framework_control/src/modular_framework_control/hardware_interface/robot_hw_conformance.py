@@ -7,6 +7,7 @@ pytest finds the rest. Hardware that takes long to make may be handed out again 
 
 What belongs to the control loop is called from a thread of its own, as the loop does.
 """
+
 from __future__ import annotations
 
 import math
@@ -193,7 +194,8 @@ class RobotHWConformance(ABC):
             least_s = TIMELY_SHARE * (jump - 2.0 * self.tolerance) / limits[handle.name].max_velocity
             assert least_s >= 5 * self.period_s, (
                 f"a jump of {jump} of {handle.name} takes too few cycles; give a greater one, more room at the start, "
-                "a smaller tolerance or a shorter period")
+                "a smaller tolerance or a shorter period"
+            )
             assert self._duration_of_jump(robot_hw, handle, goals) >= least_s, handle
 
     def _duration_of_jump(self, robot_hw: RobotHW, handle: JointHandle, goals: Mapping[str, float]) -> float:
@@ -205,8 +207,9 @@ class RobotHWConformance(ABC):
                 left_s = self._read_s
             if abs(handle.position - goals[handle.name]) <= self.tolerance:
                 return self._read_s - left_s
-        raise AssertionError(f"{handle.name} has not come from {start} to {goals[handle.name]}, but to "
-                             f"{handle.position}")
+        raise AssertionError(
+            f"{handle.name} has not come from {start} to {goals[handle.name]}, but to {handle.position}"
+        )
 
     def test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them(self) -> None:
         robot_hw, handles = self._ready()

@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joints of a `RobotHW` whose actuators are known: handles of both, and the way between them in each cycle.
 
-    def init(self, root_nh, robot_hw_nh):
-        self._transmissions = RobotTransmissions(self, root_nh, ["motor_1", "motor_2"])
-        self._guard = JointLimitGuard(self, root_nh)
-        return True
+def init(self, root_nh, robot_hw_nh):
+    self._transmissions = RobotTransmissions(self, root_nh, ["motor_1", "motor_2"])
+    self._guard = JointLimitGuard(self, root_nh)
+    return True
 
-    def read(self, time_s, period_s):
-        for motor in self._transmissions.actuators.values():
-            motor.position, motor.velocity, motor.effort = ...      # what is measured
-        self._transmissions.propagate_states()
+def read(self, time_s, period_s):
+    for motor in self._transmissions.actuators.values():
+        motor.position, motor.velocity, motor.effort = ...      # what is measured
+    self._transmissions.propagate_states()
 
-    def write(self, time_s, period_s):
-        self._guard.enforce(period_s)
-        self._transmissions.propagate_commands()
-        ... = motor.command_position                                # what is sent
+def write(self, time_s, period_s):
+    self._guard.enforce(period_s)
+    self._transmissions.propagate_commands()
+    ... = motor.command_position                                # what is sent
 """
+
 from __future__ import annotations
 
 import math
@@ -70,23 +71,35 @@ class RobotTransmissions:
         self.actuators = {name: ActuatorHandle(name) for name in actuators}
         description = root_nh.get_param("robot_description")
         if not isinstance(description, str):
-            raise ParameterError(f"parameter {join_names(root_nh.namespace, 'robot_description')} is not set; the "
-                                 "transmissions are found there: load the robot description first")
-        self._infos = [info for info in read_transmissions(description) if not self.actuators.keys().isdisjoint(
-            info.actuators)]
+            raise ParameterError(
+                f"parameter {join_names(root_nh.namespace, 'robot_description')} is not set; the "
+                "transmissions are found there: load the robot description first"
+            )
+        self._infos = [
+            info for info in read_transmissions(description) if not self.actuators.keys().isdisjoint(info.actuators)
+        ]
         self._check_actuators()
         states = _interface(robot_hw, JointStateInterface)
-        self._states = {name: states.register_handle(JointStateHandle(name))
-                        for info in self._infos for name in info.joints}
+        self._states = {
+            name: states.register_handle(JointStateHandle(name)) for info in self._infos for name in info.joints
+        }
         self._paths = [path for info in self._infos for path in self._command_paths(robot_hw, info)]
         self._began = False
 
     def _check_actuators(self) -> None:
         known = {name for info in self._infos for name in info.actuators}
-        faults = [f"{info.where}: actuator '{name}' is not there; this hardware has: {', '.join(self.actuators)}"
-                  for info in self._infos for name in info.actuators if name not in self.actuators]
-        faults += [f"robot_description: actuator '{name}' has no <transmission>; actuators that have one: "
-                   f"{', '.join(sorted(known)) or 'none'}" for name in self.actuators if name not in known]
+        faults = [
+            f"{info.where}: actuator '{name}' is not there; this hardware has: {', '.join(self.actuators)}"
+            for info in self._infos
+            for name in info.actuators
+            if name not in self.actuators
+        ]
+        faults += [
+            f"robot_description: actuator '{name}' has no <transmission>; actuators that have one: "
+            f"{', '.join(sorted(known)) or 'none'}"
+            for name in self.actuators
+            if name not in known
+        ]
         if faults:
             raise TransmissionError("; ".join(faults))
 
@@ -96,7 +109,8 @@ class RobotTransmissions:
         ways: tuple[tuple[type[CommandedInterface], Callable[[Values], Values], str], ...] = (
             (PositionJointInterface, transmission.actuator_positions, "command_position"),
             (VelocityJointInterface, transmission.actuator_velocities, "command_velocity"),
-            (EffortJointInterface, transmission.actuator_efforts, "command_effort"))
+            (EffortJointInterface, transmission.actuator_efforts, "command_effort"),
+        )
         paths = []
         for interface_class, convert, attribute in ways:
             if interface_class in info.interfaces:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the <transmission> elements of a robot description, in the layout of ros_control; names all faults at once."""
+
 from __future__ import annotations
 
 import math
@@ -25,10 +26,14 @@ from modular_framework_urdf import robot as urdf
 from modular_framework_urdf.robot import LocatedText, TransmissionPart
 
 Interfaces = tuple[type[HardwareInterface[Any]], ...]
-SIMPLE, DIFFERENTIAL, FOUR_BAR = (f"transmission_interface/{name}" for name in (
-    "SimpleTransmission", "DifferentialTransmission", "FourBarLinkageTransmission"))
-INTERFACES = {interface.type_name: interface for interface in (
-    JointStateInterface, PositionJointInterface, VelocityJointInterface, EffortJointInterface)}
+SIMPLE, DIFFERENTIAL, FOUR_BAR = (
+    f"transmission_interface/{name}"
+    for name in ("SimpleTransmission", "DifferentialTransmission", "FourBarLinkageTransmission")
+)
+INTERFACES = {
+    interface.type_name: interface
+    for interface in (JointStateInterface, PositionJointInterface, VelocityJointInterface, EffortJointInterface)
+}
 WHERE = "robot_description"
 
 
@@ -81,11 +86,14 @@ def read_transmissions(description: str) -> list[TransmissionInfo]:
             faults.append(str(fault))
             continue
         for kind, mine, taken in (
-                ("transmission", {info.name}, {other.name for other in infos}),
-                ("joint", set(info.joints), {name for other in infos for name in other.joints}),
-                ("actuator", set(info.actuators), {name for other in infos for name in other.actuators})):
-            faults += [f"{info.where}: {kind} '{name}' is named by another transmission too; name each once"
-                       for name in sorted(mine & taken)]
+            ("transmission", {info.name}, {other.name for other in infos}),
+            ("joint", set(info.joints), {name for other in infos for name in other.joints}),
+            ("actuator", set(info.actuators), {name for other in infos for name in other.actuators}),
+        ):
+            faults += [
+                f"{info.where}: {kind} '{name}' is named by another transmission too; name each once"
+                for name in sorted(mine & taken)
+            ]
         infos.append(info)
     if faults:
         raise TransmissionError("; ".join(faults))
@@ -108,9 +116,14 @@ class _Reader:
             raise _FaultError(self._line, f"{self._label}: {found}; allowed: {SIMPLE}, {DIFFERENTIAL}, {FOUR_BAR}")
         joints = self._in_order("joint", self._transmission.joints)
         actuators = self._in_order("actuator", self._transmission.actuators)
-        return TransmissionInfo(name, self._line, self._formulas(actuators, joints),
-                                tuple(part.name for part in actuators), tuple(part.name for part in joints),
-                                self._interfaces(joints))
+        return TransmissionInfo(
+            name,
+            self._line,
+            self._formulas(actuators, joints),
+            tuple(part.name for part in actuators),
+            tuple(part.name for part in joints),
+            self._interfaces(joints),
+        )
 
     def _formulas(self, actuators: list[TransmissionPart], joints: list[TransmissionPart]) -> Transmission:
         reductions = [self._reduction(actuator, None) for actuator in actuators]
@@ -136,8 +149,11 @@ class _Reader:
         wanted = [f"{tag}1", f"{tag}2"]
         if sorted(roles) != wanted:
             found = ", ".join(f"'{part.role}'" for part in parts)
-            raise _FaultError(parts[0].line, f"{self._label}: the roles of its <{tag}> are {found}; expected "
-                              f"<role>{wanted[0]}</role> in one and <role>{wanted[1]}</role> in the other")
+            raise _FaultError(
+                parts[0].line,
+                f"{self._label}: the roles of its <{tag}> are {found}; expected "
+                f"<role>{wanted[0]}</role> in one and <role>{wanted[1]}</role> in the other",
+            )
         return [roles[role] for role in wanted]
 
     def _reduction(self, part: TransmissionPart, default: float | None) -> float:
@@ -156,15 +172,17 @@ class _Reader:
             value = math.nan
         nonzero = tag == "mechanicalReduction"
         if not math.isfinite(value) or (nonzero and value == 0.0):
-            raise _FaultError(given.line, f"{label} is '{given.text}'; expected a number"
-                              + (" other than 0" if nonzero else ""))
+            raise _FaultError(
+                given.line, f"{label} is '{given.text}'; expected a number" + (" other than 0" if nonzero else "")
+            )
         return value
 
     def _interfaces(self, joints: list[TransmissionPart]) -> Interfaces:
         found = [self._interfaces_of(joint) for joint in joints]
         if any(set(other) != set(found[0]) for other in found):
-            raise _FaultError(self._line, f"{self._label}: its joints have different hardware interfaces; give all "
-                              "of them the same")
+            raise _FaultError(
+                self._line, f"{self._label}: its joints have different hardware interfaces; give all of them the same"
+            )
         return found[0]
 
     def _interfaces_of(self, joint: TransmissionPart) -> Interfaces:

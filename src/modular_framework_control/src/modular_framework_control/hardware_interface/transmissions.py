@@ -5,6 +5,7 @@ Each maps positions, velocities and efforts from actuators to joints and back; b
 Ratios are `n`, of actuators `n_a` and of joints `n_j`; a ratio above 1 makes slower and stronger, a negative one turns
 the direction round. Offsets are positions of the joints where the actuators are at 0.
 """
+
 from __future__ import annotations
 
 import math
@@ -139,8 +140,10 @@ class DifferentialTransmission(_PairTransmission):
 
     def actuator_efforts(self, joints: Values) -> Values:
         first, second = (value / n for value, n in zip(joints, self.joint_reduction, strict=True))
-        return ((first + second) / (2.0 * self.actuator_reduction[0]),
-                (first - second) / (2.0 * self.actuator_reduction[1]))
+        return (
+            (first + second) / (2.0 * self.actuator_reduction[0]),
+            (first - second) / (2.0 * self.actuator_reduction[1]),
+        )
 
 
 @dataclass(frozen=True)
@@ -163,12 +166,16 @@ class FourBarLinkageTransmission(_PairTransmission):
         return first, (actuators[1] * self.actuator_reduction[1] - first) * self.joint_reduction[1]
 
     def actuator_velocities(self, joints: Values) -> Values:
-        return (joints[0] * self.joint_reduction[0] * self.actuator_reduction[0],
-                (joints[0] + joints[1] * self.joint_reduction[1]) * self.actuator_reduction[1])
+        return (
+            joints[0] * self.joint_reduction[0] * self.actuator_reduction[0],
+            (joints[0] + joints[1] * self.joint_reduction[1]) * self.actuator_reduction[1],
+        )
 
     def actuator_efforts(self, joints: Values) -> Values:
-        return (joints[0] / (self.joint_reduction[0] * self.actuator_reduction[0]),
-                (joints[0] + joints[1] / self.joint_reduction[1]) / self.actuator_reduction[1])
+        return (
+            joints[0] / (self.joint_reduction[0] * self.actuator_reduction[0]),
+            (joints[0] + joints[1] / self.joint_reduction[1]) / self.actuator_reduction[1],
+        )
 
 
 def _check(reductions: Values, offsets: Values) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot description, with the kind of error that controllers and hardware raise for wrong parameters."""
+
 from __future__ import annotations
 
 from modular_framework_ros.node_handle import ParameterError

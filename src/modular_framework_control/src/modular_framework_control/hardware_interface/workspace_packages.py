@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Knows where the packages of the sourced workspace are."""
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Drives a base like a car: a rear wheel drives, a front wheel in the middle steers."""
+
 from __future__ import annotations
 
 import math
@@ -36,10 +37,16 @@ class AckermannSteeringController(MobileBaseController):
         super().init(hw, root_nh, controller_nh)
         wheel = read_name(controller_nh, "rear_wheel", "rear_wheel_joint", "joint")
         steer = read_name(controller_nh, "front_steer", "front_steer_joint", "joint")
-        base = (read_positive(controller_nh, "wheel_separation_h", 1.0) if controller_nh.has_param("wheel_separation_h")
-                else _wheel_base_of(WheelGeometry(root_nh, "wheel_separation_h"), wheel, steer))
-        radius = (read_positive(controller_nh, "wheel_radius", 1.0) if controller_nh.has_param("wheel_radius")
-                  else WheelGeometry(root_nh, "wheel_radius").radius(wheel, ("cylinder",)))
+        base = (
+            read_positive(controller_nh, "wheel_separation_h", 1.0)
+            if controller_nh.has_param("wheel_separation_h")
+            else _wheel_base_of(WheelGeometry(root_nh, "wheel_separation_h"), wheel, steer)
+        )
+        radius = (
+            read_positive(controller_nh, "wheel_radius", 1.0)
+            if controller_nh.has_param("wheel_radius")
+            else WheelGeometry(root_nh, "wheel_radius").radius(wheel, ("cylinder",))
+        )
         self._wheel_base = base * read_positive(controller_nh, "wheel_separation_h_multiplier", 1.0)
         self._radius = radius * read_positive(controller_nh, "wheel_radius_multiplier", 1.0)
         self._steer_factor = read_positive(controller_nh, "steer_pos_multiplier", 1.0)
@@ -89,6 +96,8 @@ class AckermannSteeringController(MobileBaseController):
 def _wheel_base_of(geometry: WheelGeometry, wheel: str, steer: str) -> float:
     base = abs(float(geometry.between(wheel, steer)[0]))
     if base <= 0.0:
-        raise ParameterError(f"robot_description: joint '{steer}' is not ahead of joint '{wheel}'; expected axles that "
-                             "are apart; set wheel_separation_h, or correct the description")
+        raise ParameterError(
+            f"robot_description: joint '{steer}' is not ahead of joint '{wheel}'; expected axles that "
+            "are apart; set wheel_separation_h, or correct the description"
+        )
     return base

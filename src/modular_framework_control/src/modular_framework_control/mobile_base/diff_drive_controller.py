@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Drives a base that turns by the difference between the wheels on its left and on its right."""
+
 from __future__ import annotations
 
 import math
@@ -74,8 +75,15 @@ class _Wheel:
         handle = self.handle
         rate = 1.0 / period_s if period_s > 0.0 else 0.0
         self._desired_position += handle.command * period_s
-        state = WheelState(handle.position, handle.velocity, (handle.velocity - self._velocity) * rate, handle.effort,
-                           self._desired_position, handle.command, (handle.command - self._desired_velocity) * rate)
+        state = WheelState(
+            handle.position,
+            handle.velocity,
+            (handle.velocity - self._velocity) * rate,
+            handle.effort,
+            self._desired_position,
+            handle.command,
+            (handle.command - self._desired_velocity) * rate,
+        )
         self._velocity, self._desired_velocity = handle.velocity, handle.command
         return state
 
@@ -112,16 +120,23 @@ class DiffDriveController(MobileBaseController):
         super().init(hw, root_nh, controller_nh)
         left, right = read_names(controller_nh, "left_wheel"), read_names(controller_nh, "right_wheel")
         if len(left) != len(right) or set(left) & set(right):
-            raise ParameterError(f"parameters {join_names(controller_nh.namespace, 'left_wheel')} and right_wheel: got "
-                                 f"{left} and {right}; expected as many joints on either side, each named once")
+            raise ParameterError(
+                f"parameters {join_names(controller_nh.namespace, 'left_wheel')} and right_wheel: got "
+                f"{left} and {right}; expected as many joints on either side, each named once"
+            )
         self.wheel_names = [*left, *right]
         self.publishes_command = read_bool(controller_nh, "publish_cmd", False)
         self.publishes_wheels = read_bool(controller_nh, "publish_wheel_joint_controller_state", False)
-        self._separation = (read_positive(controller_nh, "wheel_separation", 1.0)
-                            if controller_nh.has_param("wheel_separation") else
-                            _separation_of(WheelGeometry(root_nh, "wheel_separation"), left[0], right[0]))
-        self._radius = (read_positive(controller_nh, "wheel_radius", 1.0) if controller_nh.has_param("wheel_radius")
-                        else WheelGeometry(root_nh, "wheel_radius").radius(left[0]))
+        self._separation = (
+            read_positive(controller_nh, "wheel_separation", 1.0)
+            if controller_nh.has_param("wheel_separation")
+            else _separation_of(WheelGeometry(root_nh, "wheel_separation"), left[0], right[0])
+        )
+        self._radius = (
+            read_positive(controller_nh, "wheel_radius", 1.0)
+            if controller_nh.has_param("wheel_radius")
+            else WheelGeometry(root_nh, "wheel_radius").radius(left[0])
+        )
         self._left = [_Wheel(hw.get_handle(name)) for name in left]
         self._right = [_Wheel(hw.get_handle(name)) for name in right]
         self._limits = TwistLimits(self._linear_limits, self._angular_limits)
@@ -130,10 +145,17 @@ class DiffDriveController(MobileBaseController):
     def _read_settings(self, controller_nh: NodeHandle) -> DiffDriveSettings:
         basic = super()._read_settings(controller_nh)
         both = controller_nh.has_param("wheel_radius_multiplier")
-        left, right = (read_positive(controller_nh, "wheel_radius_multiplier" if both else
-                                     f"{side}_wheel_radius_multiplier", 1.0) for side in ("left", "right"))
-        return DiffDriveSettings(basic.publish_rate, basic.enable_odom_tf, left, right,
-                                 read_positive(controller_nh, "wheel_separation_multiplier", 1.0))
+        left, right = (
+            read_positive(controller_nh, "wheel_radius_multiplier" if both else f"{side}_wheel_radius_multiplier", 1.0)
+            for side in ("left", "right")
+        )
+        return DiffDriveSettings(
+            basic.publish_rate,
+            basic.enable_odom_tf,
+            left,
+            right,
+            read_positive(controller_nh, "wheel_separation_multiplier", 1.0),
+        )
 
     def starting(self, time_s: float) -> None:
         super().starting(time_s)
@@ -148,15 +170,19 @@ class DiffDriveController(MobileBaseController):
     def _geometry(self) -> tuple[float, float, float]:
         """Radius of the left and of the right wheels, and their separation [m]."""
         settings = self.settings
-        return (self._radius * settings.left_wheel_radius_multiplier,
-                self._radius * settings.right_wheel_radius_multiplier,
-                self._separation * settings.wheel_separation_multiplier)
+        return (
+            self._radius * settings.left_wheel_radius_multiplier,
+            self._radius * settings.right_wheel_radius_multiplier,
+            self._separation * settings.wheel_separation_multiplier,
+        )
 
     def _positions(self) -> tuple[float, float]:
         """Mean position of the left and of the right wheels [rad]."""
         count = len(self._left)
-        return (sum(wheel.handle.position for wheel in self._left) / count,
-                sum(wheel.handle.position for wheel in self._right) / count)
+        return (
+            sum(wheel.handle.position for wheel in self._left) / count,
+            sum(wheel.handle.position for wheel in self._right) / count,
+        )
 
     def _follow_wheels(self, time_s: float) -> bool:
         if self._open_loop:
@@ -196,6 +222,8 @@ class DiffDriveController(MobileBaseController):
 def _separation_of(geometry: WheelGeometry, left: str, right: str) -> float:
     separation = geometry.distance(left, right)
     if separation <= 0.0:
-        raise ParameterError(f"robot_description: joints '{left}' and '{right}' are at the same place; expected wheels "
-                             "that are apart; set wheel_separation, or correct the description")
+        raise ParameterError(
+            f"robot_description: joints '{left}' and '{right}' are at the same place; expected wheels "
+            "that are apart; set wheel_separation, or correct the description"
+        )
     return separation

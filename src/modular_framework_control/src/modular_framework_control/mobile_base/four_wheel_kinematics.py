@@ -4,6 +4,7 @@
 The order of the wheels is front left, front right, rear left, rear right. Each turns about a vertical steering axis and
 is mounted outside of that axis, at a distance of `steering_offset`.
 """
+
 from __future__ import annotations
 
 import math
@@ -96,8 +97,8 @@ class FourWheelGeometry:
         rows, values = [], []
         for (x, y), side, angle, velocity in zip(self.axes(), SIDES, angles, velocities, strict=True):
             cosine, sine = math.cos(angle), math.sin(angle)
-            rows.append((cosine, sine, x * sine - y * cosine - side * self.steering_offset))    # along the wheel
-            rows.append((-sine, cosine, x * cosine + y * sine))                                 # across it
+            rows.append((cosine, sine, x * sine - y * cosine - side * self.steering_offset))  # along the wheel
+            rows.append((-sine, cosine, x * cosine + y * sine))  # across it
             values += [velocity * self.wheel_radius, 0.0]
         linear, lateral, angular = np.linalg.lstsq(np.array(rows), np.array(values), rcond=None)[0].tolist()
         return PlanarTwist(linear, lateral, angular)
@@ -106,6 +107,6 @@ class FourWheelGeometry:
 def axle_angle(left: float, right: float) -> float:
     """Angle of the middle of an axle whose wheels steer by two angles [rad]: its slope is their harmonic mean."""
     slopes = math.tan(left), math.tan(right)
-    if slopes[0] * slopes[1] <= 0.0:    # one is straight, or they point to different sides and there is no such mean
+    if slopes[0] * slopes[1] <= 0.0:  # one is straight, or they point to different sides and there is no such mean
         return (left + right) / 2.0
     return math.atan(2.0 * slopes[0] * slopes[1] / (slopes[0] + slopes[1]))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Drives a base whose four wheels all drive and steer."""
+
 from __future__ import annotations
 
 import math
@@ -147,8 +148,10 @@ class FourWheelSteeringController(MobileBaseController):
     def _report(self, time_s: float) -> bool:
         velocity, angle = self.odometry, [steering.position for steering in self._steerings]
         axles = axle_angle(angle[0], angle[1]), axle_angle(angle[2], angle[3])
-        speed = math.copysign(math.hypot(velocity.linear, velocity.lateral),
-                              velocity.linear if abs(velocity.linear) > SLOWEST else velocity.lateral)
+        speed = math.copysign(
+            math.hypot(velocity.linear, velocity.lateral),
+            velocity.linear if abs(velocity.linear) > SLOWEST else velocity.lateral,
+        )
         period_s, self._last_s = time_s - self._last_s, time_s
         acceleration = self._rates[0].of(speed, period_s)
         values = speed, acceleration, self._rates[1].of(acceleration, period_s)
@@ -159,7 +162,7 @@ class FourWheelSteeringController(MobileBaseController):
         return due
 
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        if command is None and self._steering is not None:      # it comes to rest on the curve that it is on
+        if command is None and self._steering is not None:  # it comes to rest on the curve that it is on
             command = replace(self._steering, speed=0.0)
         self._steering = command if isinstance(command, SteeringCommand) else None
         if self._steering is not None:
@@ -176,8 +179,9 @@ class FourWheelSteeringController(MobileBaseController):
 
     def _steer(self, command: SteeringCommand, period_s: float) -> list[float]:
         """Angles of the steering joints, which do not depend on the speed [rad]."""
-        front, rear = (clamped(angle, -math.pi / 2.0, math.pi / 2.0)
-                       for angle in (command.front_angle, command.rear_angle))
+        front, rear = (
+            clamped(angle, -math.pi / 2.0, math.pi / 2.0) for angle in (command.front_angle, command.rear_angle)
+        )
         speed = self._limits.limit_linear(command.speed, period_s)
         self._twist = self.geometry.twist_of_axles(speed, front, rear)
         self._limits.last = BaseVelocity(speed, self._twist.angular)
@@ -197,14 +201,17 @@ def _joints(controller_nh: NodeHandle, keys: list[str]) -> list[str]:
     for key in keys:
         names = read_names(controller_nh, key)
         if len(names) != 2:
-            raise ParameterError(f"parameter {join_names(controller_nh.namespace, key)}: got {names}; expected two "
-                                 "joints, the left one and the right one")
+            raise ParameterError(
+                f"parameter {join_names(controller_nh.namespace, key)}: got {names}; expected two "
+                "joints, the left one and the right one"
+            )
         found += names
     return found
 
 
-def _read_geometry(root_nh: NodeHandle, controller_nh: NodeHandle, wheels: list[str],
-                   steerings: list[str]) -> FourWheelGeometry:
+def _read_geometry(
+    root_nh: NodeHandle, controller_nh: NodeHandle, wheels: list[str], steerings: list[str]
+) -> FourWheelGeometry:
     def given(key: str, looked_up: Callable[[WheelGeometry], float]) -> float:
         if controller_nh.has_param(key):
             return read_number(controller_nh, key, 0.0)
@@ -214,10 +221,15 @@ def _read_geometry(root_nh: NodeHandle, controller_nh: NodeHandle, wheels: list[
         given("track", lambda urdf: urdf.distance(wheels[0], wheels[1])),
         given("wheel_base", lambda urdf: urdf.distance(wheels[0], wheels[2])),
         given("wheel_radius", lambda urdf: urdf.radius(wheels[0])),
-        given("wheel_steering_y_offset", lambda urdf: urdf.distance(steerings[0], wheels[0])))
-    if (min(geometry.track, geometry.wheel_base, geometry.wheel_radius) <= 0.0
-            or geometry.track <= 2.0 * geometry.steering_offset):
-        raise ParameterError(f"parameters {join_names(controller_nh.namespace, '')}: the wheels are at {geometry}; "
-                             "expected track, wheel_base and wheel_radius above 0, and wheel_steering_y_offset below "
-                             "half the track; set them, or correct robot_description")
+        given("wheel_steering_y_offset", lambda urdf: urdf.distance(steerings[0], wheels[0])),
+    )
+    if (
+        min(geometry.track, geometry.wheel_base, geometry.wheel_radius) <= 0.0
+        or geometry.track <= 2.0 * geometry.steering_offset
+    ):
+        raise ParameterError(
+            f"parameters {join_names(controller_nh.namespace, '')}: the wheels are at {geometry}; "
+            "expected track, wheel_base and wheel_radius above 0, and wheel_steering_y_offset below "
+            "half the track; set them, or correct robot_description"
+        )
     return geometry

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What controllers of mobile bases have in common: commands that grow old, limits, odometry and what is published."""
+
 from __future__ import annotations
 
 import math
@@ -121,10 +122,12 @@ class MobileBaseController(Controller, ABC):
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         self.settings = self._read_settings(controller_nh)
-        self.frames = BaseFrames(read_name(controller_nh, "odom_frame_id", "odom", "frame"),
-                                 read_name(controller_nh, "base_frame_id", "base_link", "frame"),
-                                 _diagonal(controller_nh, "pose_covariance_diagonal"),
-                                 _diagonal(controller_nh, "twist_covariance_diagonal"))
+        self.frames = BaseFrames(
+            read_name(controller_nh, "odom_frame_id", "odom", "frame"),
+            read_name(controller_nh, "base_frame_id", "base_link", "frame"),
+            _diagonal(controller_nh, "pose_covariance_diagonal"),
+            _diagonal(controller_nh, "twist_covariance_diagonal"),
+        )
         self._open_loop = read_bool(controller_nh, "open_loop", False)
         self._timeout_s = read_number(controller_nh, "cmd_vel_timeout", 0.5)
         self.allows_several_publishers = read_bool(controller_nh, "allow_multiple_cmd_vel_publishers", True)
@@ -135,8 +138,9 @@ class MobileBaseController(Controller, ABC):
         return True
 
     def _read_settings(self, controller_nh: NodeHandle) -> BaseSettings:
-        return BaseSettings(read_number(controller_nh, "publish_rate", 50.0),
-                            read_bool(controller_nh, "enable_odom_tf", True))
+        return BaseSettings(
+            read_number(controller_nh, "publish_rate", 50.0), read_bool(controller_nh, "enable_odom_tf", True)
+        )
 
     # ---- any thread ----
 
@@ -164,7 +168,7 @@ class MobileBaseController(Controller, ABC):
     def starting(self, time_s: float) -> None:
         self._brake()
         self._forget()
-        self._rate = math.inf      # of no settings: they are taken over in the first cycle
+        self._rate = math.inf  # of no settings: they are taken over in the first cycle
         self.odometry.start(time_s)
         self._refusal = ""
 
@@ -179,7 +183,7 @@ class MobileBaseController(Controller, ABC):
         self._forget()
 
     def on_hardware_recovered(self, time_s: float) -> None:
-        self._forget()      # a command may have come just as the fault did
+        self._forget()  # a command may have come just as the fault did
         self._refusal = ""
 
     def update(self, time_s: float, period_s: float) -> None:
@@ -200,8 +204,11 @@ class MobileBaseController(Controller, ABC):
         if self.on_odometry is None or time_s < self._next_s:
             return False
         self._next_s = next_due(self._next_s, period_s, time_s)
-        self.on_odometry(OdometrySnapshot(time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular,
-                                          settings.enable_odom_tf))
+        self.on_odometry(
+            OdometrySnapshot(
+                time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular, settings.enable_odom_tf
+            )
+        )
         return True
 
     def _in_force(self, time_s: float) -> Any:
@@ -251,8 +258,10 @@ class TwistLimits:
         """The velocity to command in this cycle, `period_s` [s] after the last."""
         last, before = self.last, self._before_last
         self._before_last = last
-        self.last = BaseVelocity(self._linear.limit(wanted.linear, last.linear, before.linear, period_s),
-                                 self._angular.limit(wanted.angular, last.angular, before.angular, period_s))
+        self.last = BaseVelocity(
+            self._linear.limit(wanted.linear, last.linear, before.linear, period_s),
+            self._angular.limit(wanted.angular, last.angular, before.angular, period_s),
+        )
         return self.last
 
     def limit_linear(self, wanted: float, period_s: float) -> float:
@@ -289,9 +298,14 @@ def read_name(handle: NodeHandle, key: str, default: str, what: str) -> str:
 
 def _diagonal(handle: NodeHandle, key: str) -> Diagonal:
     values = handle.get_param(key)
-    if (not isinstance(values, (list, tuple)) or len(values) != 6
-            or any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values)):
-        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {values!r}; expected six "
-                             "numbers: the variances along x, y, z and about x, y, z")
+    if (
+        not isinstance(values, (list, tuple))
+        or len(values) != 6
+        or any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values)
+    ):
+        raise ParameterError(
+            f"parameter {join_names(handle.namespace, key)}: got {values!r}; expected six "
+            "numbers: the variances along x, y, z and about x, y, z"
+        )
     x, y, z, roll, pitch, yaw = map(float, values)
     return x, y, z, roll, pitch, yaw

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where a base on a plane has come to, by what its wheels have turned."""
+
 from __future__ import annotations
 
 import math

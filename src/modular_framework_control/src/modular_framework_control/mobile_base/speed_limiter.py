@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Limits of velocity, acceleration and jerk of a mobile base, under the parameter names of ros_controllers."""
+
 from __future__ import annotations
 
 import math
@@ -66,11 +67,14 @@ def _range(limits_nh: NodeHandle, what: str) -> tuple[float, float]:
         return UNLIMITED
     where = join_names(limits_nh.namespace, largest)
     if not limits_nh.has_param(largest):
-        raise ParameterError(f"parameter {where} is not set although {switch} is true; give the largest {what}, or set "
-                             f"{switch} to false")
+        raise ParameterError(
+            f"parameter {where} is not set although {switch} is true; give the largest {what}, or set {switch} to false"
+        )
     highest = read_number(limits_nh, largest, 0.0, None)
     lowest = read_number(limits_nh, smallest, -highest, None)
     if not lowest <= 0.0 <= highest:
-        raise ParameterError(f"parameters {where} and {smallest}: got {highest} and {lowest}; the largest {what} must "
-                             "be at least 0 and the smallest at most 0, or the base could not stand still")
+        raise ParameterError(
+            f"parameters {where} and {smallest}: got {highest} and {lowest}; the largest {what} must "
+            "be at least 0 and the smallest at most 0, or the base could not stand still"
+        )
     return lowest, highest

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Radius of wheels and distances between them, from the robot description."""
+
 from __future__ import annotations
 
 import math
@@ -31,8 +32,10 @@ class WheelGeometry:
         self._remedy = f"set {wanted_for} in the controller's parameters, or correct the description"
         description = root_nh.get_param("robot_description")
         if not isinstance(description, str):
-            raise ParameterError(f"{self._where} is not set, and {wanted_for} is looked up there; load the robot "
-                                 f"description, or set {wanted_for} in the controller's parameters")
+            raise ParameterError(
+                f"{self._where} is not set, and {wanted_for} is looked up there; load the robot "
+                f"description, or set {wanted_for} in the controller's parameters"
+            )
         robot = self._read(description)
         self._joints = {joint.name: joint for joint in robot.joints}
         self._links = {link.name: link for link in robot.links}
@@ -41,8 +44,10 @@ class WheelGeometry:
         try:
             return read_urdf(description, self._where)
         except AttributeFault as fault:
-            raise ParameterError(f"{self._where}: <{fault.tag} {fault.key}> of {fault.owner} is '{fault.text}'; "
-                                 f"expected {fault.expected}; {self._remedy}") from fault
+            raise ParameterError(
+                f"{self._where}: <{fault.tag} {fault.key}> of {fault.owner} is '{fault.text}'; "
+                f"expected {fault.expected}; {self._remedy}"
+            ) from fault
         except XmlError as error:
             raise ParameterError(str(error)) from error
 
@@ -75,27 +80,35 @@ class WheelGeometry:
         name = self._joint(joint).child
         link = self._links.get(name)
         if link is None:
-            raise ParameterError(f"{self._where}: joint '{joint}' has the child link '{name}', which is not there; "
-                                 f"links: {', '.join(sorted(self._links)) or 'none'}; {self._remedy}")
+            raise ParameterError(
+                f"{self._where}: joint '{joint}' has the child link '{name}', which is not there; "
+                f"links: {', '.join(sorted(self._links)) or 'none'}; {self._remedy}"
+            )
         found = link.collisions[0].shapes if link.collisions else ()
         for shape in found:
             if shape.tag in shapes and isinstance(shape, Cylinder | Sphere):
                 return self._checked(shape, name)
         tags = ", ".join(f"<{shape.tag}>" for shape in found) or ("empty" if link.collisions else "none")
-        raise ParameterError(f"{self._where}: collision geometry of the wheel link '{name}' is {tags}; expected "
-                             f"{' or '.join(f'<{tag}>' for tag in shapes)}, whose radius is the wheel's; "
-                             f"{self._remedy}")
+        raise ParameterError(
+            f"{self._where}: collision geometry of the wheel link '{name}' is {tags}; expected "
+            f"{' or '.join(f'<{tag}>' for tag in shapes)}, whose radius is the wheel's; "
+            f"{self._remedy}"
+        )
 
     def _joint(self, name: str) -> Joint:
         if name not in self._joints:
-            raise ParameterError(f"{self._where}: there is no joint '{name}'; joints: "
-                                 f"{', '.join(sorted(self._joints)) or 'none'}; {self._remedy}")
+            raise ParameterError(
+                f"{self._where}: there is no joint '{name}'; joints: "
+                f"{', '.join(sorted(self._joints)) or 'none'}; {self._remedy}"
+            )
         return self._joints[name]
 
     def _checked(self, wheel: Cylinder | Sphere, link: str) -> float:
         if not 0.0 < wheel.radius < math.inf:
-            raise ParameterError(f"{self._where}: <{wheel.tag} radius> of link '{link}' is '{wheel.radius:g}'; "
-                                 f"expected a number above 0; {self._remedy}")
+            raise ParameterError(
+                f"{self._where}: <{wheel.tag} radius> of link '{link}' is '{wheel.radius:g}'; "
+                f"expected a number above 0; {self._remedy}"
+            )
         return wheel.radius
 
     def _frame(self, link: str) -> Array:
@@ -108,5 +121,7 @@ class WheelGeometry:
                 return frame
             frame = carrier.origin.matrix() @ frame
             above = carrier.parent
-        raise ParameterError(f"{self._where}: the way from link '{link}' to the root link never ends; expected a tree "
-                             f"of links; {self._remedy}")
+        raise ParameterError(
+            f"{self._where}: the way from link '{link}' to the root link never ends; expected a tree "
+            f"of links; {self._remedy}"
+        )

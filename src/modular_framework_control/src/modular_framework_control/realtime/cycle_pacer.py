@@ -5,6 +5,7 @@ A system that was not made for real time takes a processor away for milliseconds
 that nothing may interrupt or, in a virtual machine, for other machines on the same host. A loop that sleeps there is
 woken only afterwards. The figures say how long that was, apart from the time that cycles themselves took too long.
 """
+
 from __future__ import annotations
 
 import time
@@ -93,9 +94,18 @@ class LoopStatistics:
     def figures(self) -> LoopFigures:
         """Returns the figures so far."""
         mean_s = self._work_s / self._cycles if self._cycles else 0.0
-        return LoopFigures(self._cycles, self._missed, self._overruns, self._percentile(0.5), self._percentile(0.99),
-                           self._late_max_s, mean_s, self._work_max_s, self._no_processor_s,
-                           self._no_processor_max_s)
+        return LoopFigures(
+            self._cycles,
+            self._missed,
+            self._overruns,
+            self._percentile(0.5),
+            self._percentile(0.99),
+            self._late_max_s,
+            mean_s,
+            self._work_max_s,
+            self._no_processor_s,
+            self._no_processor_max_s,
+        )
 
     def _percentile(self, share: float) -> float:
         counted, wanted = 0, share * sum(self._late)
@@ -120,8 +130,9 @@ class CyclePacer:
         woken_late_s: how long after its time the loop was woken for the cycle under way, 0 where it did not sleep [s].
     """
 
-    def __init__(self, period_s: float, clock: Callable[[], float] = time.monotonic,
-                 sleep: Callable[[float], None] = time.sleep) -> None:
+    def __init__(
+        self, period_s: float, clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], None] = time.sleep
+    ) -> None:
         self.woken_late_s = 0.0
         self._period_s = period_s
         self._clock = clock

@@ -4,6 +4,7 @@
 The control loop changes a goal handle and calls its listener, which must not block: the ROS interface of a controller
 only puts the new status into a queue that another thread processes.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable

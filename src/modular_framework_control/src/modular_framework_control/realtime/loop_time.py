@@ -8,6 +8,7 @@ system clock, as those of all other programs do.
 A loop that was delayed has not moved the robot meanwhile. Its time does not count the delay: motions continue later and
 do not catch up at once.
 """
+
 from __future__ import annotations
 
 import logging
@@ -53,13 +54,17 @@ class LoopTime:
         if held_up_s > 0.0:
             self._began_s -= held_up_s
             self.ahead_s += held_up_s
-            LOGGER.warning("the control loop was held up for %.3f s: motions go on as much later",
-                           held_up_s + self.longest_step_s)
+            LOGGER.warning(
+                "the control loop was held up for %.3f s: motions go on as much later", held_up_s + self.longest_step_s
+            )
         time_s = self._began_s + steady_s
         ahead_s = system_s - time_s
         if abs(ahead_s - self.ahead_s) > NOTICED_STEP_S and self._steady() - steady_s < QUICK_S:
             step_s, self.ahead_s = ahead_s - self.ahead_s, ahead_s
             if abs(step_s) > WARN_THRESHOLD_S:
-                LOGGER.warning("the clock of the system was set by %+.3f s: motions go on as if it had not been, the "
-                               "stamps of messages follow it", step_s)
+                LOGGER.warning(
+                    "the clock of the system was set by %+.3f s: motions go on as if it had not been, the "
+                    "stamps of messages follow it",
+                    step_s,
+                )
         return time_s

@@ -5,6 +5,7 @@ Any thread may put an item in; the loop drains the mailbox once per cycle, and s
 is no lock, because the loop would have to wait while the thread that holds it is not running. Appending to a deque and
 taking from it are atomic.
 """
+
 from __future__ import annotations
 
 from collections import deque

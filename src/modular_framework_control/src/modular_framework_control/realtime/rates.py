@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """When something that is done at a fixed rate is due again, counted in the time of the control loop."""
+
 import math
 
 

@@ -4,6 +4,7 @@
 What Python itself does against a steady loop is made small too: another thread gives the interpreter up after a
 fraction of a cycle, and the garbage collector ignores all objects that exist when the loop begins.
 """
+
 from __future__ import annotations
 
 import contextlib
@@ -47,15 +48,19 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     try:
         os.sched_setscheduler(caller, os.SCHED_FIFO, os.sched_param(priority))
         for thread in set(map(int, os.listdir("/proc/self/task"))) - {caller}:
-            with contextlib.suppress(ProcessLookupError):   # it has ended meanwhile
+            with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
                 os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority - OTHERS_BELOW))
     except OSError as error:
-        refused.append(f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "
-                       f"or docker run --cap-add SYS_NICE --ulimit rtprio={PRIORITY})")
+        refused.append(
+            f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "
+            f"or docker run --cap-add SYS_NICE --ulimit rtprio={PRIORITY})"
+        )
     reason = _lock_memory()
     if reason:
-        refused.append(f"locking of memory ({reason}; allow it with memlock unlimited in limits.conf, "
-                       "or docker run --ulimit memlock=-1)")
+        refused.append(
+            f"locking of memory ({reason}; allow it with memlock unlimited in limits.conf, "
+            "or docker run --ulimit memlock=-1)"
+        )
     return refused
 
 
@@ -66,11 +71,13 @@ def keep_processors_awake() -> list[str]:
         What was not permitted and why; nothing when all was.
     """
     try:
-        device = os.open(_LATENCY_DEVICE, os.O_WRONLY | os.O_CLOEXEC)   # the request holds as long as it is open
+        device = os.open(_LATENCY_DEVICE, os.O_WRONLY | os.O_CLOEXEC)  # the request holds as long as it is open
         os.write(device, (0).to_bytes(4, sys.byteorder))
     except OSError as error:
-        return [f"idle processors kept awake ({_LATENCY_DEVICE}: {error.strerror}; allow to write it with a rule of "
-                f"udev, or docker run --device {_LATENCY_DEVICE})"]
+        return [
+            f"idle processors kept awake ({_LATENCY_DEVICE}: {error.strerror}; allow to write it with a rule of "
+            f"udev, or docker run --device {_LATENCY_DEVICE})"
+        ]
     return []
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action server of a controller: passes goals to the control loop, and their status and results to the clients."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -36,8 +37,15 @@ class ControllerActionServer:
         outbox: thread that talks to ROS for the control loop.
     """
 
-    def __init__(self, name: str, action: type[Any], submit: Submit, cancel: Callable[[Any], None],
-                 make_result: MakeResult, outbox: Outbox) -> None:
+    def __init__(
+        self,
+        name: str,
+        action: type[Any],
+        submit: Submit,
+        cancel: Callable[[Any], None],
+        make_result: MakeResult,
+        outbox: Outbox,
+    ) -> None:
         self._submit = submit
         self._cancel = cancel
         self._make_result = make_result
@@ -58,7 +66,8 @@ class ControllerActionServer:
 
     def _on_goal(self, goal: ServerGoalHandle) -> None:
         goal_handle: RealtimeGoalHandle[Any] = RealtimeGoalHandle(
-            lambda changed: self._outbox.put(self._publish_status, changed, changed.status))
+            lambda changed: self._outbox.put(self._publish_status, changed, changed.status)
+        )
         self._goals[goal_handle] = goal
         try:
             self._submit(goal.get_goal(), goal_handle)
@@ -82,8 +91,12 @@ class ControllerActionServer:
             goal.set_accepted()
             return
         del self._goals[goal_handle]
-        finish = {GoalStatus.SUCCEEDED: goal.set_succeeded, GoalStatus.ABORTED: goal.set_aborted,
-                  GoalStatus.CANCELED: goal.set_canceled, GoalStatus.REJECTED: goal.set_rejected}[status]
+        finish = {
+            GoalStatus.SUCCEEDED: goal.set_succeeded,
+            GoalStatus.ABORTED: goal.set_aborted,
+            GoalStatus.CANCELED: goal.set_canceled,
+            GoalStatus.REJECTED: goal.set_rejected,
+        }[status]
         if status in (GoalStatus.ABORTED, GoalStatus.REJECTED):
             rospy.logwarn("%s: goal %s: %s", self._server.ns, status.value, goal_handle.text)
         finish(self._make_result(goal_handle), goal_handle.text)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command-line tool controller_group: controllers that belong together are started, and exchanged, together."""
+
 from __future__ import annotations
 
 import argparse
@@ -41,8 +42,9 @@ def read_groups(value: object) -> Groups:
     """
     where = f"parameter {rospy.resolve_name('controller_groups')}"
     if not isinstance(value, dict) or not value:
-        raise ControllerManagerClientError(f"{where}: got {value!r}; expected names of groups, each with the list of "
-                                           "its controllers")
+        raise ControllerManagerClientError(
+            f"{where}: got {value!r}; expected names of groups, each with the list of its controllers"
+        )
     for group, controllers in value.items():
         if not isinstance(controllers, list) or not all(isinstance(name, str) and name for name in controllers):
             raise ControllerManagerClientError(f"{where}/{group}: got {controllers!r}; expected a list of controllers")
@@ -61,13 +63,16 @@ def plan_group(groups: Groups, group: str, states: Mapping[str, str]) -> GroupPl
         ControllerManagerClientError: no such group, or it has no controllers.
     """
     if not groups.get(group):
-        raise ControllerManagerClientError(f"no controllers are defined for group '{group}'; known groups: "
-                                           f"{', '.join(sorted(groups))}")
+        raise ControllerManagerClientError(
+            f"no controllers are defined for group '{group}'; known groups: {', '.join(sorted(groups))}"
+        )
     wanted = tuple(dict.fromkeys(groups[group]))
     others = dict.fromkeys(name for names in groups.values() for name in names if name not in wanted)
-    return GroupPlan(tuple(name for name in wanted if name not in states),
-                     tuple(name for name in wanted if states.get(name) != "running"),
-                     tuple(name for name in others if states.get(name) == "running"))
+    return GroupPlan(
+        tuple(name for name in wanted if name not in states),
+        tuple(name for name in wanted if states.get(name) != "running"),
+        tuple(name for name in others if states.get(name) == "running"),
+    )
 
 
 def _list(groups: Groups) -> None:
@@ -84,8 +89,10 @@ def _bring_up(groups: Groups, group: str, client: ControllerManagerClient, switc
     plan = plan_group(groups, group, states)
     for name in plan.load:
         if not interface.load_controller(name, client):
-            raise ControllerManagerClientError(f"{'Cancel group switching' if switch else 'Group not spawned'}: "
-                                               f"controller '{name}' of group '{group}' was not loaded")
+            raise ControllerManagerClientError(
+                f"{'Cancel group switching' if switch else 'Group not spawned'}: "
+                f"controller '{name}' of group '{group}' was not loaded"
+            )
     if switch:
         interface.start_stop_controllers(plan.start, plan.stop, client)
         return
@@ -98,8 +105,10 @@ def controller_group_main() -> int:
     parser = argparse.ArgumentParser(prog="controller_group", description=controller_group_main.__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="list the groups and their controllers")
-    for name, text in (("spawn", "load and start the controllers of a group"),
-                       ("switch", "start the controllers of a group and stop those of the others, in one cycle")):
+    for name, text in (
+        ("spawn", "load and start the controllers of a group"),
+        ("switch", "start the controllers of a group and stop those of the others, in one cycle"),
+    ):
         commands.add_parser(name, help=text).add_argument("group", help="name of a group in controller_groups")
     arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
     rospy.init_node("controller_group", anonymous=True)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Topics, actions and services of each controller, under the names of ros_controllers."""
+
 from __future__ import annotations
 
 import contextlib
@@ -61,18 +62,21 @@ PID_GAINS = (
     Adjustable("d", -1e3, 1e3, "command per rate of the error"),
     Adjustable("i_clamp_min", -1e5, 0.0, "smallest part of the integral in the command"),
     Adjustable("i_clamp_max", 0.0, 1e5, "largest part of the integral in the command"),
-    Adjustable("antiwindup", False, True, "stop to add up errors at the bounds of the integral"))
+    Adjustable("antiwindup", False, True, "stop to add up errors at the bounds of the integral"),
+)
 
 
 class JointStateRosInterface:
     """Publishes `joint_states` (sensor_msgs/JointState) in the namespace of the robot."""
 
-    def __init__(self, controller: JointStateController, namespace: str, name: str, outbox: Outbox,
-                 loop_time: LoopTime) -> None:
+    def __init__(
+        self, controller: JointStateController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+    ) -> None:
         del name
         self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=10)
         controller.on_state = lambda snapshot: outbox.publish(
-            self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s))
+            self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s)
+        )
 
     def close(self) -> None:
         """Closes the topic."""
@@ -83,16 +87,23 @@ class JointTrajectoryRosInterface:
     """Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
     `<name>/query_state` (service)."""
 
-    def __init__(self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox,
-                 loop_time: LoopTime) -> None:
+    def __init__(
+        self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+    ) -> None:
         self._controller = controller
         self._name = join_names(namespace, name)
         self._loop_time = loop_time
-        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
             self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
             opened.callback(self._state.unregister)
-            self._action = ControllerActionServer(f"{self._name}/follow_joint_trajectory", FollowJointTrajectoryAction,
-                                                  self._submit, controller.cancel, _trajectory_result, outbox)
+            self._action = ControllerActionServer(
+                f"{self._name}/follow_joint_trajectory",
+                FollowJointTrajectoryAction,
+                self._submit,
+                controller.cancel,
+                _trajectory_result,
+                outbox,
+            )
             opened.callback(self._action.close)
             query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
             opened.callback(query.shutdown, "controller unloaded")
@@ -100,9 +111,11 @@ class JointTrajectoryRosInterface:
             opened.callback(command.unregister)
             self._opened = opened.pop_all()
         controller.on_state = lambda snapshot: outbox.publish(
-            self._state, lambda: conversions.snapshot_to_msg(snapshot, controller.joint_names, loop_time.ahead_s))
-        controller.on_feedback = lambda goal_handle, snapshot: outbox.put_droppable(self._feedback, goal_handle,
-                                                                                    snapshot)
+            self._state, lambda: conversions.snapshot_to_msg(snapshot, controller.joint_names, loop_time.ahead_s)
+        )
+        controller.on_feedback = lambda goal_handle, snapshot: outbox.put_droppable(
+            self._feedback, goal_handle, snapshot
+        )
 
     def close(self) -> None:
         """Closes topics, action and service."""
@@ -129,8 +142,9 @@ class JointTrajectoryRosInterface:
         return QueryTrajectoryStateResponse(self._controller.joint_names, *(row.tolist() for row in state))
 
     def _feedback(self, goal_handle: TrajectoryGoalHandle, snapshot: TrajectorySnapshot) -> None:
-        message = conversions.fill_snapshot(FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names,
-                                            self._loop_time.ahead_s)
+        message = conversions.fill_snapshot(
+            FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names, self._loop_time.ahead_s
+        )
         self._action.publish_feedback(goal_handle, message)
 
 
@@ -142,12 +156,19 @@ def _trajectory_result(goal_handle: RealtimeGoalHandle[TrajectoryErrorCode]) -> 
 class GripperRosInterface:
     """Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action)."""
 
-    def __init__(self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox,
-                 loop_time: LoopTime) -> None:
+    def __init__(
+        self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+    ) -> None:
         del loop_time
         self._controller = controller
-        self._action = ControllerActionServer(join_names(namespace, f"{name}/gripper_cmd"), GripperCommandAction,
-                                              self._submit, controller.cancel, _gripper_result, outbox)
+        self._action = ControllerActionServer(
+            join_names(namespace, f"{name}/gripper_cmd"),
+            GripperCommandAction,
+            self._submit,
+            controller.cancel,
+            _gripper_result,
+            outbox,
+        )
         controller.on_feedback = lambda goal_handle, state: outbox.put_droppable(self._feedback, goal_handle, state)
 
     def close(self) -> None:
@@ -180,8 +201,9 @@ _ROS_INTERFACES: tuple[tuple[type[Controller], Any], ...] = (
 )
 
 
-def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox,
-               loop_time: LoopTime) -> Callable[[], None]:
+def attach_ros(
+    controller: Controller, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+) -> Callable[[], None]:
     """Opens the topics, actions and services of a controller, and dynamic_reconfigure of its gains.
 
     Args:
@@ -194,7 +216,7 @@ def attach_ros(controller: Controller, namespace: str, name: str, outbox: Outbox
     Returns:
         What closes them.
     """
-    with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+    with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
         for controller_class, ros_interface in _ROS_INTERFACES:
             if isinstance(controller, controller_class):
                 opened.callback(ros_interface(controller, namespace, name, outbox, loop_time).close)

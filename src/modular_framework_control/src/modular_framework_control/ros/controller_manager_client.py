@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Asks a controller manager for something over ROS, and says which service failed when it does not answer."""
+
 from __future__ import annotations
 
 import threading
@@ -40,8 +41,13 @@ class ControllerManagerClient:
         await_clock: whether the time counts only from when the simulated clock, if it is to be used, has begun.
     """
 
-    def __init__(self, namespace: str = "", timeout_s: float = 30.0, ended: threading.Event | None = None,
-                 await_clock: bool = False) -> None:
+    def __init__(
+        self,
+        namespace: str = "",
+        timeout_s: float = 30.0,
+        ended: threading.Event | None = None,
+        await_clock: bool = False,
+    ) -> None:
         self.namespace = rospy.resolve_name(namespace) if namespace else rospy.get_namespace()
         self._timeout_s = timeout_s
         self._ended = ended if ended is not None else threading.Event()
@@ -59,12 +65,20 @@ class ControllerManagerClient:
         """Unloads a controller."""
         self._ask("unload_controller", UnloadController, f"controller '{name}' was not unloaded", name)
 
-    def switch(self, start: Sequence[str], stop: Sequence[str],
-               strictness: int = SwitchControllerRequest.STRICT) -> None:
+    def switch(
+        self, start: Sequence[str], stop: Sequence[str], strictness: int = SwitchControllerRequest.STRICT
+    ) -> None:
         """Stops and starts controllers."""
-        self._ask("switch_controller", SwitchController,
-                  f"controllers were not switched (start {list(start)}, stop {list(stop)})",
-                  list(start), list(stop), strictness, False, 0.0)
+        self._ask(
+            "switch_controller",
+            SwitchController,
+            f"controllers were not switched (start {list(start)}, stop {list(stop)})",
+            list(start),
+            list(stop),
+            strictness,
+            False,
+            0.0,
+        )
 
     def list_controllers(self) -> list[ControllerState]:
         """All loaded controllers."""
@@ -78,8 +92,12 @@ class ControllerManagerClient:
 
     def reload_libraries(self, force_kill: bool) -> None:
         """Searches again for controller classes."""
-        self._ask("reload_controller_libraries", ReloadControllerLibraries, "controller libraries were not reloaded",
-                  force_kill)
+        self._ask(
+            "reload_controller_libraries",
+            ReloadControllerLibraries,
+            "controller libraries were not reloaded",
+            force_kill,
+        )
 
     def _ask(self, service: str, kind: Any, failure: str, *arguments: Any) -> None:
         if not self._call(service, kind, *arguments).ok:
@@ -105,13 +123,16 @@ class ControllerManagerClient:
             except rospy.ROSException as error:
                 now_s = time.monotonic()
                 if self._ended.is_set() or rospy.is_shutdown():
-                    raise ControllerManagerClientError(f"ended while waiting for service {name}, after "
-                                                       f"{now_s - begun_s:.0f} s") from error
+                    raise ControllerManagerClientError(
+                        f"ended while waiting for service {name}, after {now_s - begun_s:.0f} s"
+                    ) from error
                 if self._await_clock and _simulation_is_starting():
                     deadline_s = now_s + self._timeout_s
                 elif now_s > deadline_s:
-                    raise ControllerManagerClientError(f"waited {now_s - begun_s:.0f} s for service {name} in vain; is "
-                                                       "the simulation or the hardware's node running?") from error
+                    raise ControllerManagerClientError(
+                        f"waited {now_s - begun_s:.0f} s for service {name} in vain; is "
+                        "the simulation or the hardware's node running?"
+                    ) from error
 
 
 def _simulation_is_starting() -> bool:

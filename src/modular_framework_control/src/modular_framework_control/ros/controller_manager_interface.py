@@ -4,6 +4,7 @@
 Each waits for its service as long as that takes, prints the text of the public tool and returns whether the manager did
 it. Why it refused is on the log.
 """
+
 from __future__ import annotations
 
 import math
@@ -44,8 +45,11 @@ def load_controller(name: str, client: Client = None) -> bool:
 
 def unload_controller(name: str, client: Client = None) -> bool:
     """Unloads a controller."""
-    return _answer(lambda: _client_or_default(client).unload(name), f"Unloaded '{name}' successfully",
-                   f"Error when unloading '{name}'")
+    return _answer(
+        lambda: _client_or_default(client).unload(name),
+        f"Unloaded '{name}' successfully",
+        f"Error when unloading '{name}'",
+    )
 
 
 def start_controller(name: str, client: Client = None) -> bool:
@@ -68,13 +72,17 @@ def stop_controllers(names: Sequence[str], client: Client = None) -> bool:
     return start_stop_controllers(stop_controllers=names, client=client)
 
 
-def start_stop_controllers(start_controllers: Sequence[str] = (), stop_controllers: Sequence[str] = (),
-                           client: Client = None) -> bool:
+def start_stop_controllers(
+    start_controllers: Sequence[str] = (), stop_controllers: Sequence[str] = (), client: Client = None
+) -> bool:
     """Starts and stops controllers in one switch, all of them or none."""
     start, stop = list(start_controllers), list(stop_controllers)
     done = [f"{word} {names} successfully" for word, names in (("Started", start), ("Stopped", stop)) if names]
-    return _answer(lambda: _client_or_default(client).switch(start, stop), "\n".join(done),
-                   f"Error when starting {start} and stopping {stop}")
+    return _answer(
+        lambda: _client_or_default(client).switch(start, stop),
+        "\n".join(done),
+        f"Error when starting {start} and stopping {stop}",
+    )
 
 
 def reload_libraries(force_kill: bool, restore: bool = False, client: Client = None) -> bool:
@@ -88,8 +96,11 @@ def reload_libraries(force_kill: bool, restore: bool = False, client: Client = N
     manager = _client_or_default(client)
     print("Restore:", restore)
     before = manager.list_controllers() if restore else []
-    if not _answer(lambda: manager.reload_libraries(force_kill), "Successfully reloaded libraries",
-                   "Failed to reload libraries. Do you still have controllers loaded?"):
+    if not _answer(
+        lambda: manager.reload_libraries(force_kill),
+        "Successfully reloaded libraries",
+        "Failed to reload libraries. Do you still have controllers loaded?",
+    ):
         return False
     if not restore:
         return True
@@ -99,8 +110,11 @@ def reload_libraries(force_kill: bool, restore: bool = False, client: Client = N
             manager.load(state.name)
         manager.switch([state.name for state in before if state.state == "running"], [])
 
-    return _answer(bring_back, "Controllers restored to original state",
-                   "Failed to restore the controllers to their original state")
+    return _answer(
+        bring_back,
+        "Controllers restored to original state",
+        "Failed to restore the controllers to their original state",
+    )
 
 
 def _answer(action: Callable[[], None], done: str, failed: str) -> bool:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Command-line tools for controllers: spawner, unspawner and controller_manager, as users of ros_control know them."""
+
 from __future__ import annotations
 
 import argparse
@@ -50,26 +51,35 @@ def controller_manager_main() -> int:
     """Send one request: load, unload, start, stop, spawn, kill, list, list-types or reload-libraries."""
     parser = argparse.ArgumentParser(prog="controller_manager", description=controller_manager_main.__doc__)
     commands = [*_PER_CONTROLLER, "list", "list-types", "reload-libraries"]
-    parser.add_argument("command", choices=commands, type=lambda word: _SHORT_COMMANDS.get(word, word),
-                        metavar=f"{{{','.join(commands)}}}",
-                        help="also lc, lt, sp, kl for list, list-types, spawn, kill")
-    parser.add_argument("--restore", action="store_true",
-                        help="with reload-libraries: load and start again what was there before")
+    parser.add_argument(
+        "command",
+        choices=commands,
+        type=lambda word: _SHORT_COMMANDS.get(word, word),
+        metavar=f"{{{','.join(commands)}}}",
+        help="also lc, lt, sp, kl for list, list-types, spawn, kill",
+    )
+    parser.add_argument(
+        "--restore", action="store_true", help="with reload-libraries: load and start again what was there before"
+    )
     _add_common(parser, names="*")
     return _run(parser, "controller_manager", _command)
 
 
 def _add_common(parser: argparse.ArgumentParser, names: str = "+") -> None:
     parser.add_argument("--namespace", default="", help="namespace of the robot")
-    parser.add_argument("--timeout", type=float, default=30.0,
-                        help="seconds to wait for the controller manager; 0 or less: for ever")
+    parser.add_argument(
+        "--timeout", type=float, default=30.0, help="seconds to wait for the controller manager; 0 or less: for ever"
+    )
     parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
     parser.add_argument("--shutdown-timeout", type=float, help="accepted, not used")
     parser.add_argument("controllers", nargs=names, help="names, or YAML files whose keys are names")
 
 
-def _run(parser: argparse.ArgumentParser, name: str,
-         action: Callable[[ControllerManagerClient, argparse.Namespace, threading.Event], None]) -> int:
+def _run(
+    parser: argparse.ArgumentParser,
+    name: str,
+    action: Callable[[ControllerManagerClient, argparse.Namespace, threading.Event], None],
+) -> int:
     arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -114,8 +124,9 @@ def names_of(arguments: Sequence[str]) -> list[str]:
 
 
 def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
-    rospy.loginfo("Controller Spawner: Waiting for service %s",
-                  join_names(client.namespace, "controller_manager/load_controller"))
+    rospy.loginfo(
+        "Controller Spawner: Waiting for service %s", join_names(client.namespace, "controller_manager/load_controller")
+    )
     client.list_controllers()
     if arguments.wait_for:
         _wait_for_topic(arguments.wait_for, arguments.timeout, ended)
@@ -182,8 +193,11 @@ def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, end
     inhibited: dict[str, None] = {}
     try:
         while not ended.is_set():
-            running = [entry.name for entry in client.list_controllers()
-                       if entry.name in arguments.controllers and entry.state == "running"]
+            running = [
+                entry.name
+                for entry in client.list_controllers()
+                if entry.name in arguments.controllers and entry.state == "running"
+            ]
             if running:
                 rospy.loginfo("Inhibiting controllers: %s", ", ".join(running))
                 client.switch([], running, SwitchControllerRequest.BEST_EFFORT)
@@ -201,8 +215,11 @@ def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> 
     warn_at_s = time.monotonic() + warn_after_s
     while not ready.wait(0.1) and not ended.is_set():
         if time.monotonic() > warn_at_s:
-            rospy.logwarn("Controller Spawner: topic %s has not said True for %.0f s; waiting for it still",
-                          rospy.resolve_name(topic), warn_after_s)
+            rospy.logwarn(
+                "Controller Spawner: topic %s has not said True for %.0f s; waiting for it still",
+                rospy.resolve_name(topic),
+                warn_after_s,
+            )
             warn_at_s = math.inf
     subscriber.unregister()
 
@@ -210,10 +227,13 @@ def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> 
 _SHORT_COMMANDS = {"lc": "list", "lt": "list-types", "sp": "spawn", "kl": "kill"}
 _Step = Callable[[str, ControllerManagerClient], bool]
 _PER_CONTROLLER: dict[str, tuple[_Step, ...]] = {
-    "load": (interface.load_controller,), "unload": (interface.unload_controller,),
-    "start": (interface.start_controller,), "stop": (interface.stop_controller,),
+    "load": (interface.load_controller,),
+    "unload": (interface.unload_controller,),
+    "start": (interface.start_controller,),
+    "stop": (interface.stop_controller,),
     "spawn": (interface.load_controller, interface.start_controller),
-    "kill": (interface.stop_controller, interface.unload_controller)}
+    "kill": (interface.stop_controller, interface.unload_controller),
+}
 
 
 def _command(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
@@ -223,8 +243,9 @@ def _command(client: ControllerManagerClient, arguments: argparse.Namespace, end
             raise ControllerManagerClientError(f"{arguments.command}: name at least one controller")
         done = [step(name, client) for step in _PER_CONTROLLER[arguments.command] for name in arguments.controllers]
         if not all(done):
-            raise ControllerManagerClientError(f"{arguments.command}: not done for all of: "
-                                               f"{', '.join(arguments.controllers)}")
+            raise ControllerManagerClientError(
+                f"{arguments.command}: not done for all of: {', '.join(arguments.controllers)}"
+            )
     elif arguments.command == "list":
         interface.list_controllers(client)
     elif arguments.command == "list-types":

@@ -4,6 +4,7 @@
 Messages are stamped by the ROS clock, controllers count in the time of the control loop: by `ahead_s` [s] the former is
 ahead of the latter (see `LoopTime`).
 """
+
 from __future__ import annotations
 
 import math
@@ -34,8 +35,12 @@ from modular_framework_control.trajectory.trajectory_goal import TrajectoryError
 
 def trajectory_from_msg(message: JointTrajectoryMsg, ahead_s: float = 0.0) -> JointTrajectory:
     """A trajectory_msgs/JointTrajectory as sent; it is not checked here."""
-    points = tuple(TrajectoryPoint(point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities),
-                                   tuple(point.accelerations)) for point in message.points)
+    points = tuple(
+        TrajectoryPoint(
+            point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
+        )
+        for point in message.points
+    )
     stamp = message.header.stamp
     return JointTrajectory(tuple(message.joint_names), points, stamp.to_sec() - ahead_s if stamp else 0.0)
 
@@ -47,8 +52,11 @@ def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
 def goal_from_msg(message: FollowJointTrajectoryGoal, ahead_s: float = 0.0) -> TrajectoryGoal:
     """A control_msgs/FollowJointTrajectoryGoal as sent; it is not checked here."""
     return TrajectoryGoal(
-        trajectory_from_msg(message.trajectory, ahead_s), _tolerances_from_msg(message.path_tolerance),
-        _tolerances_from_msg(message.goal_tolerance), message.goal_time_tolerance.to_sec())
+        trajectory_from_msg(message.trajectory, ahead_s),
+        _tolerances_from_msg(message.path_tolerance),
+        _tolerances_from_msg(message.goal_tolerance),
+        message.goal_time_tolerance.to_sec(),
+    )
 
 
 def trajectory_result_to_msg(code: TrajectoryErrorCode, text: str) -> FollowJointTrajectoryResult:
@@ -72,8 +80,9 @@ def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Seque
     return message
 
 
-def snapshot_to_msg(snapshot: TrajectorySnapshot, joint_names: Sequence[str],
-                    ahead_s: float = 0.0) -> JointTrajectoryControllerState:
+def snapshot_to_msg(
+    snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0
+) -> JointTrajectoryControllerState:
     """State of a trajectory controller."""
     return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names, ahead_s)
 
@@ -90,25 +99,37 @@ def gripper_feedback_to_msg(state: GripperState) -> GripperCommandFeedback:
 
 def joint_state_to_msg(snapshot: JointStateSnapshot, ahead_s: float = 0.0) -> JointState:
     """A sensor_msgs/JointState."""
-    message = JointState(name=snapshot.names, position=snapshot.positions, velocity=snapshot.velocities,
-                         effort=snapshot.efforts)
+    message = JointState(
+        name=snapshot.names, position=snapshot.positions, velocity=snapshot.velocities, effort=snapshot.efforts
+    )
     message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
     return message
 
 
 def controller_report_to_msg(report: ControllerReport) -> ControllerState:
     """One line of list_controllers; interfaces have the names of C++ there."""
-    claims = [HardwareInterfaceResources(claim.hardware_interface.replace("/", "::"), list(claim.resources))
-              for claim in report.info.claimed_resources]
+    claims = [
+        HardwareInterfaceResources(claim.hardware_interface.replace("/", "::"), list(claim.resources))
+        for claim in report.info.claimed_resources
+    ]
     return ControllerState(report.info.name, report.state.value, report.info.type, claims)
 
 
 def controller_statistics_to_msg(report: ControllerReport, ahead_s: float = 0.0) -> ControllerStatistics:
     """Update times of one controller; `variance_time`, a duration, is the square root of their variance."""
     figures = report.statistics
-    updated, overrun = (genpy.Time.from_sec(time_s + ahead_s if time_s else 0.0)
-                        for time_s in (figures.updated_at_s, figures.last_overrun_s))
+    updated, overrun = (
+        genpy.Time.from_sec(time_s + ahead_s if time_s else 0.0)
+        for time_s in (figures.updated_at_s, figures.last_overrun_s)
+    )
     return ControllerStatistics(
-        report.info.name, report.info.type, updated, report.state is LoadedState.RUNNING,
-        genpy.Duration.from_sec(figures.max_s), genpy.Duration.from_sec(figures.mean_s),
-        genpy.Duration.from_sec(math.sqrt(figures.variance_s2)), figures.overruns, overrun)
+        report.info.name,
+        report.info.type,
+        updated,
+        report.state is LoadedState.RUNNING,
+        genpy.Duration.from_sec(figures.max_s),
+        genpy.Duration.from_sec(figures.mean_s),
+        genpy.Duration.from_sec(math.sqrt(figures.variance_s2)),
+        figures.overruns,
+        overrun,
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Says, and waits until others say, that hardware is ready for controllers: the topics `topic_to_wait_for`."""
+
 from __future__ import annotations
 
 import threading
@@ -93,10 +94,15 @@ class HardwareReadiness:
             if rospy.is_shutdown() or ended.is_set():
                 return
             if time.monotonic() > deadline:
-                missing = ", ".join(f"topic {self._topics.awaited[name]} of hardware '{name}'"
-                                    for name, event in self._ready.items() if not event.is_set())
-                raise HardwareNotReadyError(f"waited {timeout_s:g} s in vain for True on {missing}; is the hardware "
-                                            "switched on and connected? (~ready_timeout gives it longer)")
+                missing = ", ".join(
+                    f"topic {self._topics.awaited[name]} of hardware '{name}'"
+                    for name, event in self._ready.items()
+                    if not event.is_set()
+                )
+                raise HardwareNotReadyError(
+                    f"waited {timeout_s:g} s in vain for True on {missing}; is the hardware "
+                    "switched on and connected? (~ready_timeout gives it longer)"
+                )
 
     def announce(self) -> None:
         """Publishes True, latched, for the hardware that does not do so itself."""

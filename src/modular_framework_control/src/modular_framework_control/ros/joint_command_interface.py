@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The topics of controllers that do at once what their topic `command` says."""
+
 from __future__ import annotations
 
 import contextlib
@@ -23,18 +24,20 @@ class JointCommandRosInterface:
     """Subscribes `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several. Publishes
     `<name>/state` (control_msgs/JointControllerState) of controllers that have gains for one joint."""
 
-    def __init__(self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox,
-                 loop_time: LoopTime) -> None:
+    def __init__(
+        self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+    ) -> None:
         self._controller = controller
         self._topic = join_names(namespace, f"{name}/command")
         kind = Float64 if controller.single else Float64MultiArray
-        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
             opened.callback(rospy.Subscriber(self._topic, kind, self._on_command, queue_size=1).unregister)
             if isinstance(controller, GainsController) and controller.single:
                 state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=1)
                 opened.callback(state.unregister)
                 controller.on_state = lambda snapshot: outbox.publish(
-                    state, lambda: joint_control_to_msg(snapshot, loop_time.ahead_s))
+                    state, lambda: joint_control_to_msg(snapshot, loop_time.ahead_s)
+                )
             self._opened = opened.pop_all()
 
     def _on_command(self, message: Float64 | Float64MultiArray) -> None:
@@ -53,9 +56,17 @@ def joint_control_to_msg(snapshot: JointControlSnapshot, ahead_s: float) -> Join
     """What a controller of one joint did; its stamp is `ahead_s` [s] ahead of the loop's time."""
     gains = snapshot.gains
     message = JointControllerState(
-        set_point=snapshot.set_point, process_value=snapshot.process_value,
-        process_value_dot=snapshot.process_value_dot, error=snapshot.error, time_step=snapshot.period_s,
-        command=snapshot.command, p=gains.p, i=gains.i, d=gains.d, i_clamp=gains.i_clamp_max,
-        antiwindup=gains.antiwindup)
+        set_point=snapshot.set_point,
+        process_value=snapshot.process_value,
+        process_value_dot=snapshot.process_value_dot,
+        error=snapshot.error,
+        time_step=snapshot.period_s,
+        command=snapshot.command,
+        p=gains.p,
+        i=gains.i,
+        d=gains.d,
+        i_clamp=gains.i_clamp_max,
+        antiwindup=gains.antiwindup,
+    )
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     return message

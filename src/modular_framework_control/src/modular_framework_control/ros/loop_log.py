@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Passes log records of the control loop to another thread, so that the loop never waits for a file or /rosout."""
+
 from __future__ import annotations
 
 import contextlib
@@ -42,7 +43,7 @@ class LoopLog(logging.Handler):
             return
         try:
             record.msg, record.args = record.getMessage(), None
-        except Exception:   # a wrong format must not end the loop
+        except Exception:  # a wrong format must not end the loop
             self._complain(self, record)
             return
         self._outbox.put(self._write, record)
@@ -54,8 +55,9 @@ class LoopLog(logging.Handler):
         if self._propagates:
             self._hand(logging.getLogger().callHandlers, self, record)
 
-    def _hand(self, take: Callable[[logging.LogRecord], object], handler: logging.Handler,
-              record: logging.LogRecord) -> None:
+    def _hand(
+        self, take: Callable[[logging.LogRecord], object], handler: logging.Handler, record: logging.LogRecord
+    ) -> None:
         """Passes the record to `handler`. An error of the handler is not logged, which would call the handler again."""
         try:
             take(record)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes how well the control loop keeps its rate, and whether the hardware has a fault."""
+
 from __future__ import annotations
 
 import threading
@@ -70,23 +71,37 @@ class LoopReport:
         late = figures.missed + figures.overruns
         late_since_last, self._late = late > self._late, late
         fault = self._fault()
-        text = (f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
-                f"{figures.missed} were left out")
+        text = (
+            f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
+            f"{figures.missed} were left out"
+        )
         if late_since_last:
-            rospy.logwarn_throttle(OVERRUN_WARNING_PERIOD_S,
-                                   f"control loop at {text}; the longest took {figures.work_max_s * 1e3:.1f} ms, its "
-                                   f"period is {self._period_s * 1e3:.1f} ms; it was without a processor for "
-                                   f"{figures.no_processor_max_s * 1e3:.1f} ms at most")
-        status = DiagnosticStatus(name=f"{rospy.get_name().lstrip('/')}: control loop", hardware_id=self._hardware,
-                                  message=f"hardware fault: {fault}; {text}" if fault else text)
+            rospy.logwarn_throttle(
+                OVERRUN_WARNING_PERIOD_S,
+                f"control loop at {text}; the longest took {figures.work_max_s * 1e3:.1f} ms, its "
+                f"period is {self._period_s * 1e3:.1f} ms; it was without a processor for "
+                f"{figures.no_processor_max_s * 1e3:.1f} ms at most",
+            )
+        status = DiagnosticStatus(
+            name=f"{rospy.get_name().lstrip('/')}: control loop",
+            hardware_id=self._hardware,
+            message=f"hardware fault: {fault}; {text}" if fault else text,
+        )
         level = DiagnosticStatus.WARN if late_since_last else DiagnosticStatus.OK
         status.level = DiagnosticStatus.ERROR if fault else level
-        values = {"rate": 1.0 / self._period_s, "cycles": figures.cycles, "missed": figures.missed,
-                  "overruns": figures.overruns, "late_p50_us": figures.late_p50_s * 1e6,
-                  "late_p99_us": figures.late_p99_s * 1e6, "late_max_us": figures.late_max_s * 1e6,
-                  "work_mean_us": figures.work_mean_s * 1e6, "work_max_us": figures.work_max_s * 1e6,
-                  "no_processor_us": figures.no_processor_s * 1e6,
-                  "no_processor_max_us": figures.no_processor_max_s * 1e6}
+        values = {
+            "rate": 1.0 / self._period_s,
+            "cycles": figures.cycles,
+            "missed": figures.missed,
+            "overruns": figures.overruns,
+            "late_p50_us": figures.late_p50_s * 1e6,
+            "late_p99_us": figures.late_p99_s * 1e6,
+            "late_max_us": figures.late_max_s * 1e6,
+            "work_mean_us": figures.work_mean_s * 1e6,
+            "work_max_us": figures.work_max_s * 1e6,
+            "no_processor_us": figures.no_processor_s * 1e6,
+            "no_processor_max_us": figures.no_processor_max_s * 1e6,
+        }
         status.values = [KeyValue(key, f"{value:.10g}") for key, value in values.items()] + [KeyValue("fault", fault)]
         message = DiagnosticArray(status=[status])
         message.header.stamp = rospy.Time.now()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Topics and adjustable settings of controllers of mobile bases, under the names of ros_controllers."""
+
 from __future__ import annotations
 
 import contextlib
@@ -36,18 +37,20 @@ DIFF_DRIVE_SETTINGS = (
     Adjustable("right_wheel_radius_multiplier", 0.5, 1.5, "factor of the radius of the right wheels"),
     Adjustable("wheel_separation_multiplier", 0.5, 1.5, "factor of the wheel separation"),
     Adjustable("publish_rate", 0.0, 2000.0, "of the odometry [Hz]; 0: none"),
-    Adjustable("enable_odom_tf", False, True, "publish the frame of the base on tf"))
+    Adjustable("enable_odom_tf", False, True, "publish the frame of the base on tf"),
+)
 
 
 class MobileBaseRosInterface:
     """Subscribes `<name>/cmd_vel` (geometry_msgs/Twist); publishes `<name>/odom` (nav_msgs/Odometry) and, where that is
     switched on, the frame of the base on `/tf`."""
 
-    def __init__(self, controller: MobileBaseController, namespace: str, name: str, outbox: Outbox,
-                 loop_time: LoopTime) -> None:
+    def __init__(
+        self, controller: MobileBaseController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+    ) -> None:
         self._controller, self._name = controller, join_names(namespace, name)
         self._outbox, self._loop_time = outbox, loop_time
-        with contextlib.ExitStack() as opened:     # what is open when one cannot be opened is closed again
+        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
             self._open(opened)
             self._opened = opened.pop_all()
 
@@ -80,15 +83,18 @@ class MobileBaseRosInterface:
     def _subscribe(self, opened: contextlib.ExitStack, topic: str, kind: Any, command_of: Any) -> None:
         """Hands each message of a topic to the controller, as what `command_of` makes of it."""
         name = self._topic(topic)
-        subscribers: list[rospy.Subscriber] = []    # a message may come before there is anything to ask
+        subscribers: list[rospy.Subscriber] = []  # a message may come before there is anything to ask
 
         def on_message(message: Any) -> None:
             publishers = sum(subscriber.get_num_connections() for subscriber in subscribers)
             if publishers > 1 and not self._controller.allows_several_publishers:
                 self._controller.drop_command()
-                rospy.logerr_throttle(1.0, f"{name}: {publishers} publishers; only one is allowed, as "
-                                      f"{self._name}/allow_multiple_cmd_vel_publishers is false: the base is brought "
-                                      "to rest; end the others")
+                rospy.logerr_throttle(
+                    1.0,
+                    f"{name}: {publishers} publishers; only one is allowed, as "
+                    f"{self._name}/allow_multiple_cmd_vel_publishers is false: the base is brought "
+                    "to rest; end the others",
+                )
                 return
             try:
                 self._controller.submit(command_of(message))
@@ -112,11 +118,13 @@ class DiffDriveRosInterface(MobileBaseRosInterface):
         if controller.publishes_command:
             command = self._advertise(opened, "cmd_vel_out", TwistStamped)
             controller.on_command = lambda time_s, velocity: self._outbox.publish(
-                command, lambda: velocity_to_msg(time_s + self._loop_time.ahead_s, velocity))
+                command, lambda: velocity_to_msg(time_s + self._loop_time.ahead_s, velocity)
+            )
         if controller.publishes_wheels:
             wheels = self._advertise(opened, "wheel_joint_controller_state", JointTrajectoryControllerState)
             controller.on_wheels = lambda time_s, states: self._outbox.publish(
-                wheels, lambda: wheels_to_msg(time_s + self._loop_time.ahead_s, names, states))
+                wheels, lambda: wheels_to_msg(time_s + self._loop_time.ahead_s, names, states)
+            )
         settings = Reconfiguration(self._name, DIFF_DRIVE_SETTINGS, controller, "settings")
         opened.callback(settings.close)
         settings.connect()
@@ -133,12 +141,17 @@ class FourWheelSteeringRosInterface(MobileBaseRosInterface):
         from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 
         super()._open(opened)
-        self._subscribe(opened, "cmd_four_wheel_steering", FourWheelSteering, lambda command: SteeringCommand(
-            command.speed, command.front_steering_angle, command.rear_steering_angle))
+        self._subscribe(
+            opened,
+            "cmd_four_wheel_steering",
+            FourWheelSteering,
+            lambda command: SteeringCommand(command.speed, command.front_steering_angle, command.rear_steering_angle),
+        )
         steer = self._advertise(opened, "odom_steer", FourWheelSteeringStamped)
         frame = self._controller.frames.odom
         self._controller.on_steering = lambda snapshot: self._outbox.publish(
-            steer, lambda: fill_steering(FourWheelSteeringStamped(), snapshot, frame, self._loop_time.ahead_s))
+            steer, lambda: fill_steering(FourWheelSteeringStamped(), snapshot, frame, self._loop_time.ahead_s)
+        )
 
 
 def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> Odometry:
@@ -150,8 +163,10 @@ def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: flo
     message.pose.pose.orientation = _about_z(snapshot.heading)
     message.twist.twist.linear.x, message.twist.twist.linear.y = snapshot.linear, snapshot.lateral
     message.twist.twist.angular.z = snapshot.angular
-    for covariance, diagonal in ((message.pose.covariance, frames.pose_covariance),
-                                 (message.twist.covariance, frames.twist_covariance)):
+    for covariance, diagonal in (
+        (message.pose.covariance, frames.pose_covariance),
+        (message.twist.covariance, frames.twist_covariance),
+    ):
         covariance[::7] = diagonal
     return message
 

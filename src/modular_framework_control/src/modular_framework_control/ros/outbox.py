@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes the messages of the control loop on another thread, so that the loop never waits for ROS."""
+
 from __future__ import annotations
 
 import queue
@@ -39,7 +40,7 @@ class Outbox:
 
     def publish(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
         """Queues a message, made by `make` on the thread, unless there is no subscriber or too many jobs wait."""
-        if publisher.impl.has_connections():    # publisher.get_num_connections() would wait for a lock
+        if publisher.impl.has_connections():  # publisher.get_num_connections() would wait for a lock
             self.put_droppable(lambda: publisher.publish(make()))
 
     def flush(self, timeout_s: float = 2.0) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The control loop of a robot that is not simulated: hardware, controller manager and time in one node."""
+
 from __future__ import annotations
 
 import signal
@@ -77,8 +78,9 @@ class RobotHwNode:
         try:
             self._robot_hw = robot_hw_of_type(type_name)
         except PluginError as error:
-            raise ParameterError(f"parameter {self._nh.namespace}/type: unknown hardware type {type_name!r}: "
-                                 f"{error}") from error
+            raise ParameterError(
+                f"parameter {self._nh.namespace}/type: unknown hardware type {type_name!r}: {error}"
+            ) from error
         self._manager: RosControllerManager | None = None
         self._connected = threading.Event()
         self._failure = ""
@@ -93,8 +95,10 @@ class RobotHwNode:
         """
         self._warn_of_a_description_elsewhere()
         if not self._robot_hw.init(self._root_nh, self._hw_nh):
-            raise ParameterError(f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
-                                 "its own message above says why")
+            raise ParameterError(
+                f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
+                "its own message above says why"
+            )
         self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
         self._readiness.connect()
         self._manager = RosControllerManager(self._robot_hw, rospy.get_namespace(), loop_time=self._loop_time)
@@ -102,10 +106,16 @@ class RobotHwNode:
         self._report.connect()
 
     def _warn_of_a_description_elsewhere(self) -> None:
-        if (rospy.get_namespace() != "/" and not self._root_nh.has_param("robot_description")
-                and RosNodeHandle("/").has_param("robot_description")):
-            rospy.logwarn("/robot_description is not taken, the robot's own is looked for: %s/robot_description. "
-                          "Without one, no limits of joints are known from it", self._root_nh.namespace)
+        if (
+            rospy.get_namespace() != "/"
+            and not self._root_nh.has_param("robot_description")
+            and RosNodeHandle("/").has_param("robot_description")
+        ):
+            rospy.logwarn(
+                "/robot_description is not taken, the robot's own is looked for: %s/robot_description. "
+                "Without one, no limits of joints are known from it",
+                self._root_nh.namespace,
+            )
 
     def _fault(self) -> str:
         return self._manager.manager.fault if self._manager is not None else ""
@@ -149,15 +159,17 @@ class RobotHwNode:
         if rospy.rostime.is_wallclock():
             self._last_s = self._loop_time.now()
             pacer = CyclePacer(self._period_s)
-            pacer.run(lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed,
-                                                         pacer.woken_late_s))
+            pacer.run(
+                lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed, pacer.woken_late_s)
+            )
             return
         self._last_s = rospy.get_time()
-        while self._cycle(manager, rospy.get_time(), 0.0, 0):   # how late it is, is not known
+        while self._cycle(manager, rospy.get_time(), 0.0, 0):  # how late it is, is not known
             self._wait_for_simulated_clock()
 
-    def _cycle(self, manager: RosControllerManager, time_s: float, late_s: float, missed: int,
-               woken_late_s: float = 0.0) -> bool:
+    def _cycle(
+        self, manager: RosControllerManager, time_s: float, late_s: float, missed: int, woken_late_s: float = 0.0
+    ) -> bool:
         """Reads, updates, writes; returns whether the loop goes on."""
         begun_s = time.perf_counter()
         period_s = max(0.0, time_s - self._last_s)
@@ -210,8 +222,10 @@ class RobotHwNode:
 
     def _attempt_last(self, step: str) -> bool:
         """Reads or writes one period after the last cycle; returns whether that succeeded."""
-        return _attempt(f"last {step} of hardware {type(self._robot_hw).__name__}",
-                        lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s))
+        return _attempt(
+            f"last {step} of hardware {type(self._robot_hw).__name__}",
+            lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s),
+        )
 
     def _get_ready(self, manager: RosControllerManager) -> None:
         """Waits for the hardware and opens the services, beside the loop, which the hardware may need to get ready."""

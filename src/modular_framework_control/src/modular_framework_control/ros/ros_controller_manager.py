@@ -4,6 +4,7 @@
 Whoever owns the control loop makes one, calls `connect` once, then `update` in every cycle between the hardware's
 `read` and `write`, and `close` at the end.
 """
+
 from __future__ import annotations
 
 import time
@@ -56,8 +57,13 @@ class RosControllerManager:
         loop_time: says how stamps of messages differ from the time given to `update`; not at all when not given.
     """
 
-    def __init__(self, robot_hw: RobotHW, namespace: str = "/", types: ControllerTypes | None = None,
-                 loop_time: LoopTime | None = None) -> None:
+    def __init__(
+        self,
+        robot_hw: RobotHW,
+        namespace: str = "/",
+        types: ControllerTypes | None = None,
+        loop_time: LoopTime | None = None,
+    ) -> None:
         self._namespace = namespace
         self._outbox, self._log = Outbox(), LoopLog()
         self._loop_time = loop_time if loop_time is not None else LoopTime()
@@ -79,15 +85,17 @@ class RosControllerManager:
         """Advertises the services."""
         self._outbox.start()
         self._log.begin()
-        self._statistics = rospy.Publisher(join_names(self._namespace, "controller_manager/statistics"),
-                                           ControllersStatistics, queue_size=1)
+        self._statistics = rospy.Publisher(
+            join_names(self._namespace, "controller_manager/statistics"), ControllersStatistics, queue_size=1
+        )
         for name, kind, answer in (
-                ("load_controller", LoadController, self._on_load),
-                ("unload_controller", UnloadController, self._on_unload),
-                ("switch_controller", SwitchController, self._on_switch),
-                ("list_controllers", ListControllers, self._on_list),
-                ("list_controller_types", ListControllerTypes, self._on_list_types),
-                ("reload_controller_libraries", ReloadControllerLibraries, self._on_reload)):
+            ("load_controller", LoadController, self._on_load),
+            ("unload_controller", UnloadController, self._on_unload),
+            ("switch_controller", SwitchController, self._on_switch),
+            ("list_controllers", ListControllers, self._on_list),
+            ("list_controller_types", ListControllerTypes, self._on_list_types),
+            ("reload_controller_libraries", ReloadControllerLibraries, self._on_reload),
+        ):
             full_name = join_names(self._namespace, f"controller_manager/{name}")
             self._services.append(rospy.Service(full_name, kind, answer))
 
@@ -102,8 +110,10 @@ class RosControllerManager:
     def _statistics_message(self) -> ControllersStatistics:
         message = ControllersStatistics()
         message.header.stamp = rospy.Time.now()
-        message.controller = [conversions.controller_statistics_to_msg(report, self._loop_time.ahead_s)
-                              for report in self.manager.list_controllers()]
+        message.controller = [
+            conversions.controller_statistics_to_msg(report, self._loop_time.ahead_s)
+            for report in self.manager.list_controllers()
+        ]
         return message
 
     def close(self) -> None:
@@ -125,14 +135,23 @@ class RosControllerManager:
         return UnloadControllerResponse(_done(lambda: self.manager.unload_controller(request.name)))
 
     def _on_switch(self, request: Any) -> SwitchControllerResponse:
-        return SwitchControllerResponse(_done(lambda: self.manager.switch_controller(
-            request.start_controllers, request.stop_controllers, request.strictness, request.start_asap,
-            max(0.0, request.timeout))))
+        return SwitchControllerResponse(
+            _done(
+                lambda: self.manager.switch_controller(
+                    request.start_controllers,
+                    request.stop_controllers,
+                    request.strictness,
+                    request.start_asap,
+                    max(0.0, request.timeout),
+                )
+            )
+        )
 
     def _on_list(self, request: Any) -> ListControllersResponse:
         del request
-        return ListControllersResponse([conversions.controller_report_to_msg(report)
-                                        for report in self.manager.list_controllers()])
+        return ListControllersResponse(
+            [conversions.controller_report_to_msg(report) for report in self.manager.list_controllers()]
+        )
 
     def _on_list_types(self, request: Any) -> ListControllerTypesResponse:
         del request
@@ -141,7 +160,8 @@ class RosControllerManager:
 
     def _on_reload(self, request: Any) -> ReloadControllerLibrariesResponse:
         return ReloadControllerLibrariesResponse(
-            _done(lambda: self.manager.reload_controller_libraries(request.force_kill)))
+            _done(lambda: self.manager.reload_controller_libraries(request.force_kill))
+        )
 
 
 def _done(action: Callable[[], None]) -> bool:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The topics of controllers that report sensors: one a sensor, under its name in the namespace of the robot."""
+
 from __future__ import annotations
 
 import copy
@@ -31,15 +32,18 @@ class SensorRosInterface:
     """Publishes geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units,
     std_msgs/Float64 for the pace of a robot."""
 
-    def __init__(self, controller: SensorController, namespace: str, name: str, outbox: Outbox,
-                 loop_time: LoopTime) -> None:
+    def __init__(
+        self, controller: SensorController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
+    ) -> None:
         del name
         kind, to_msg = next(entry for of, entry in _MESSAGES.items() if isinstance(controller, of))
-        self._publishers = {sensor: rospy.Publisher(join_names(namespace, sensor), kind, queue_size=4)
-                            for sensor in controller.sensor_names}
+        self._publishers = {
+            sensor: rospy.Publisher(join_names(namespace, sensor), kind, queue_size=4)
+            for sensor in controller.sensor_names
+        }
 
         def report(time_s: float, handle: Any) -> None:
-            reading = copy.copy(handle)     # the loop goes on to change it
+            reading = copy.copy(handle)  # the loop goes on to change it
             outbox.publish(self._publishers[handle.name], lambda: to_msg(time_s + loop_time.ahead_s, reading))
 
         controller.on_reading = report

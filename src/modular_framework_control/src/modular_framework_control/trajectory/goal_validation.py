@@ -3,6 +3,7 @@
 
 This runs on the thread that received the goal, so that the control loop only has to check what depends on time.
 """
+
 from __future__ import annotations
 
 import math
@@ -58,8 +59,9 @@ class GoalRules:
     allow_partial: bool
 
 
-def validate_goal(goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None, rules: GoalRules,
-                  measured: Array) -> ValidatedGoal:
+def validate_goal(
+    goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None, rules: GoalRules, measured: Array
+) -> ValidatedGoal:
     """Checks a goal and computes its curve.
 
     Args:
@@ -83,13 +85,15 @@ def validate_goal(goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None
         check_points(trajectory)
         if math.isnan(goal.goal_time_tolerance_s):
             raise InvalidTrajectoryError("goal_time_tolerance is not a number")
-        own = tolerances_of_goal(tolerances, joint_names, joints, goal.path_tolerance, goal.goal_tolerance,
-                                 goal.goal_time_tolerance_s)
+        own = tolerances_of_goal(
+            tolerances, joint_names, joints, goal.path_tolerance, goal.goal_tolerance, goal.goal_time_tolerance_s
+        )
     except InvalidTrajectoryError as error:
         raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, str(error)) from error
     if not trajectory.points:
         return ValidatedGoal(joints, trajectory.stamp_s, None, own, goal_handle)
     spline = Spline(trajectory)
-    violations = limit_violations(spline, trajectory.joint_names, rules.limits.of_joints(joints),
-                                  measured[list(joints)])
+    violations = limit_violations(
+        spline, trajectory.joint_names, rules.limits.of_joints(joints), measured[list(joints)]
+    )
     return ValidatedGoal(joints, trajectory.stamp_s, spline, own, goal_handle, violations)

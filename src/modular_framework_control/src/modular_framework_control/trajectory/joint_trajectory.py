@@ -5,6 +5,7 @@ Between two points the curve is linear, cubic or quintic, by what both of them g
 velocities; positions, velocities and accelerations. The coefficients follow from the boundary conditions of each
 segment.
 """
+
 from __future__ import annotations
 
 import math
@@ -79,10 +80,14 @@ def segment_coefficients(start: Array, end: Array, duration_s: Array | float, or
     elif order == 3:
         rows = [p0, v0, (3.0 * way - t * (2.0 * v0 + v1)) / t**2, (t * (v0 + v1) - 2.0 * way) / t**3, none, none]
     else:
-        rows = [p0, v0, 0.5 * a0,
-                (20.0 * way - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3),
-                (-30.0 * way + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4),
-                (12.0 * way - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5)]
+        rows = [
+            p0,
+            v0,
+            0.5 * a0,
+            (20.0 * way - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3),
+            (-30.0 * way + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4),
+            (12.0 * way - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5),
+        ]
     return np.stack(rows, axis=-2)
 
 
@@ -105,16 +110,18 @@ class Spline:
         points = trajectory.points
         none = (0.0,) * len(trajectory.joint_names)
         self.times_s = np.array([point.time_s for point in points])
-        self.states = np.array([(point.positions, point.velocities or none, point.accelerations or none)
-                                for point in points])
+        self.states = np.array(
+            [(point.positions, point.velocities or none, point.accelerations or none) for point in points]
+        )
         self.orders = np.array([1 if not point.velocities else 5 if point.accelerations else 3 for point in points])
         self.coefficients = np.zeros((len(points) - 1, 6, len(none)))
         durations_s = np.diff(self.times_s)[:, np.newaxis]
         orders = np.minimum(self.orders[:-1], self.orders[1:])
         for order in (1, 3, 5):
             chosen = orders == order
-            self.coefficients[chosen] = segment_coefficients(self.states[:-1][chosen], self.states[1:][chosen],
-                                                             durations_s[chosen], order)
+            self.coefficients[chosen] = segment_coefficients(
+                self.states[:-1][chosen], self.states[1:][chosen], durations_s[chosen], order
+            )
 
 
 class Track:
@@ -131,8 +138,15 @@ class Track:
 
     __slots__ = ("joints", "end_s", "origin_s", "_starts_s", "_coefficients", "_end_position")
 
-    def __init__(self, joints: Sequence[int], starts_s: Sequence[float], coefficients: Array, end_s: float,
-                 end_position: Array, origin_s: float) -> None:
+    def __init__(
+        self,
+        joints: Sequence[int],
+        starts_s: Sequence[float],
+        coefficients: Array,
+        end_s: float,
+        end_position: Array,
+        origin_s: float,
+    ) -> None:
         self.joints = list(joints)
         self.end_s = end_s
         self.origin_s = origin_s
@@ -155,9 +169,11 @@ class Track:
         t = max(0.0, time_s - self._starts_s[i])
         t2 = t * t
         t3 = t2 * t
-        basis = ((1.0, t, t2, t3, t2 * t2, t2 * t3),
-                 (0.0, 1.0, 2.0 * t, 3.0 * t2, 4.0 * t3, 5.0 * t2 * t2),
-                 (0.0, 0.0, 2.0, 6.0 * t, 12.0 * t2, 20.0 * t3))
+        basis = (
+            (1.0, t, t2, t3, t2 * t2, t2 * t3),
+            (0.0, 1.0, 2.0 * t, 3.0 * t2, 4.0 * t3, 5.0 * t2 * t2),
+            (0.0, 0.0, 2.0, 6.0 * t, 12.0 * t2, 20.0 * t3),
+        )
         sampled: Array = np.dot(basis, self._coefficients[i])
         return sampled
 
@@ -171,12 +187,19 @@ class Track:
         kept = [i for i, joint in enumerate(self.joints) if joint not in joints]
         if not kept:
             return None
-        return Track([self.joints[i] for i in kept], self._starts_s, self._coefficients[:, :, kept], self.end_s,
-                     self._end_position[kept], self.origin_s)
+        return Track(
+            [self.joints[i] for i in kept],
+            self._starts_s,
+            self._coefficients[:, :, kept],
+            self.end_s,
+            self._end_position[kept],
+            self.origin_s,
+        )
 
 
-def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array,
-           continuous: Sequence[bool]) -> Track:
+def splice(
+    spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array, continuous: Sequence[bool]
+) -> Track:
     """Joins a new trajectory to the present motion: from `state` at `splice_s` to the first point after it, and on.
 
     When a point lies exactly at `splice_s` and agrees with `state` in position and velocity, the trajectory is followed
@@ -192,19 +215,21 @@ def splice(spline: Spline, joints: Sequence[int], origin_s: float, splice_s: flo
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
-    coefficients = spline.coefficients[max(0, first - 1):]
+    coefficients = spline.coefficients[max(0, first - 1) :]
     if offset.any():
         coefficients = coefficients.copy()
         coefficients[:, 0] += offset
     if not (first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset)):
         target = spline.states[first].copy()
         target[POSITION] += offset
-        bridge = segment_coefficients(state, target, origin_s + float(spline.times_s[first]) - splice_s,
-                                      int(spline.orders[first]))
-        coefficients = np.concatenate([bridge[np.newaxis], coefficients[1 if first > 0 else 0:]])
+        bridge = segment_coefficients(
+            state, target, origin_s + float(spline.times_s[first]) - splice_s, int(spline.orders[first])
+        )
+        coefficients = np.concatenate([bridge[np.newaxis], coefficients[1 if first > 0 else 0 :]])
     knots_s = (origin_s + spline.times_s[first:]).tolist()
-    return Track(joints, [splice_s, *knots_s[:-1]], coefficients, knots_s[-1], spline.states[-1, POSITION] + offset,
-                 origin_s)
+    return Track(
+        joints, [splice_s, *knots_s[:-1]], coefficients, knots_s[-1], spline.states[-1, POSITION] + offset, origin_s
+    )
 
 
 def _whole_turns(position: Array, target: Array) -> Array:
@@ -223,5 +248,7 @@ def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Arr
     if abs(spline.times_s[point] - time_s) > 1e-9:
         return False
     velocity = spline.states[point, VELOCITY]
-    return bool(np.all(np.abs(spline.states[point, POSITION] + offset - state[POSITION]) < tolerance)
-                and np.all(np.abs(velocity - state[VELOCITY]) < tolerance))
+    return bool(
+        np.all(np.abs(spline.states[point, POSITION] + offset - state[POSITION]) < tolerance)
+        and np.all(np.abs(velocity - state[VELOCITY]) < tolerance)
+    )

@@ -4,6 +4,7 @@
 Between points the curve is sampled. A motion that is slightly too fast is accepted: the hardware enforces its limits,
 and the joint arrives a little late.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -59,10 +60,12 @@ class MotionLimits:
     @classmethod
     def of(cls, limits: Sequence[JointLimits]) -> MotionLimits:
         """The limits of joints, in their order."""
-        return cls(np.array([limit.min_position for limit in limits]),
-                   np.array([limit.max_position for limit in limits]),
-                   np.array([limit.max_velocity for limit in limits]),
-                   np.array([limit.max_acceleration for limit in limits]))
+        return cls(
+            np.array([limit.min_position for limit in limits]),
+            np.array([limit.max_position for limit in limits]),
+            np.array([limit.max_velocity for limit in limits]),
+            np.array([limit.max_acceleration for limit in limits]),
+        )
 
     def of_joints(self, joints: Sequence[int]) -> MotionLimits:
         """Those of some of the joints, by index."""
@@ -71,8 +74,9 @@ class MotionLimits:
 
     def with_positions(self, positions: Array) -> MotionLimits:
         """Returns the limits widened to these positions, shape (joints,), so that a joint outside may come back."""
-        return MotionLimits(np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest,
-                            self.braking)
+        return MotionLimits(
+            np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest, self.braking
+        )
 
 
 class LimitViolations:
@@ -105,12 +109,14 @@ class LimitViolations:
         """
         described: list[str] = []
         count = 0
-        for kind, indices, values in self._found:       # there may be very many, and the control loop calls this
+        for kind, indices, values in self._found:  # there may be very many, and the control loop calls this
             begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_segment
             counted = np.flatnonzero(indices[:, 0] >= begin)
             count += len(counted)
-            described += [self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
-                          for i in counted[:_MOST_FAULTS - len(described)]]
+            described += [
+                self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
+                for i in counted[: _MOST_FAULTS - len(described)]
+            ]
         more = count - len(described)
         return "; ".join(described) + (f"; and {more} more" if more else "")
 
@@ -118,17 +124,23 @@ class LimitViolations:
         name, allowed, fastest = self._names[joint], self._range(joint), self._limits.fastest[joint]
         match kind:
             case _Kind.POINT_POSITION:
-                return (f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within "
-                        "them")
+                return (
+                    f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within them"
+                )
             case _Kind.POINT_VELOCITY:
-                return (f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; "
-                        + ("give a lower velocity" if fastest > 0.0 else _NO_SPEED))
+                return f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; " + (
+                    "give a lower velocity" if fastest > 0.0 else _NO_SPEED
+                )
             case _Kind.CURVE_POSITION:
-                return (f"on the way to point {point} joint '{name}' comes to {value:.6g}; {allowed}; give the points "
-                        " other velocities, or points in between")
+                return (
+                    f"on the way to point {point} joint '{name}' comes to {value:.6g}; {allowed}; give the points "
+                    " other velocities, or points in between"
+                )
             case _Kind.CURVE_VELOCITY:
-                return (f"on the way to point {point} joint '{name}' reaches the velocity {value:.6g}; its limit is "
-                        f"{fastest:.6g}; " + ("give the point a later time_from_start" if fastest > 0.0 else _NO_SPEED))
+                return (
+                    f"on the way to point {point} joint '{name}' reaches the velocity {value:.6g}; its limit is "
+                    f"{fastest:.6g}; " + ("give the point a later time_from_start" if fastest > 0.0 else _NO_SPEED)
+                )
 
     def _range(self, joint: int) -> str:
         lowest, highest, measured = self._limits.lowest[joint], self._limits.highest[joint], self._measured[joint]
@@ -148,22 +160,31 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
     found = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
     positions, velocities = spline.states[:, POSITION], spline.states[:, VELOCITY]
-    found.add(_Kind.POINT_POSITION, positions,
-              (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN), 0)
+    found.add(
+        _Kind.POINT_POSITION,
+        positions,
+        (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN),
+        0,
+    )
     found.add(_Kind.POINT_VELOCITY, velocities, np.abs(velocities) > VELOCITY_SHARE * limits.fastest, 0)
     if np.isfinite(limits.fastest).any() or np.isfinite(limits.lowest).any() or np.isfinite(limits.highest).any():
         durations_s = np.diff(spline.times_s)
         for begin in range(0, len(durations_s), _SEGMENTS_AT_ONCE):
             chosen = slice(begin, begin + _SEGMENTS_AT_ONCE)
             ways = _SegmentExtremes(spline.coefficients[chosen], durations_s[chosen])
-            found.add(_Kind.CURVE_VELOCITY, ways.velocities, np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest,
-                      begin + 1)
+            found.add(
+                _Kind.CURVE_VELOCITY,
+                ways.velocities,
+                np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest,
+                begin + 1,
+            )
             _add_positions(found, ways, limits, begin + 1)
     return found
 
 
-def first_segment_violations(track: Track, names: Sequence[str], limits: MotionLimits, measured: Array,
-                             point: int) -> str:
+def first_segment_violations(
+    track: Track, names: Sequence[str], limits: MotionLimits, measured: Array, point: int
+) -> str:
     """Describes the violations in the segment from the present motion to the first point; "" if there are none.
 
     Args:
@@ -185,10 +206,15 @@ def first_segment_violations(track: Track, names: Sequence[str], limits: MotionL
 
 
 def _add_positions(found: LimitViolations, ways: _SegmentExtremes, limits: MotionLimits, first_point: int) -> None:
-    found.add(_Kind.CURVE_POSITION, ways.lowest, ways.overshoots & (ways.lowest < limits.lowest - CURVE_MARGIN),
-              first_point)
-    found.add(_Kind.CURVE_POSITION, ways.highest, ways.overshoots & (ways.highest > limits.highest + CURVE_MARGIN),
-              first_point)
+    found.add(
+        _Kind.CURVE_POSITION, ways.lowest, ways.overshoots & (ways.lowest < limits.lowest - CURVE_MARGIN), first_point
+    )
+    found.add(
+        _Kind.CURVE_POSITION,
+        ways.highest,
+        ways.overshoots & (ways.highest > limits.highest + CURVE_MARGIN),
+        first_point,
+    )
 
 
 class _SegmentExtremes:

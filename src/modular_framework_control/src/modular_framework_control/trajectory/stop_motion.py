@@ -3,6 +3,7 @@
 
 A stop begins at the measured state, not at the desired one, because the joints may not have followed the trajectory.
 """
+
 from __future__ import annotations
 
 import numpy as np
@@ -61,16 +62,25 @@ class StopMotion:
             return [Track.hold(list(joints), actual[POSITION], time_s)]
         follows = np.abs(desired[VELOCITY] - actual[VELOCITY]) <= FOLLOWING_SHARE * np.abs(desired[VELOCITY])
         velocity = np.clip(np.where(follows, desired[VELOCITY], actual[VELOCITY]), -limits.fastest, limits.fastest)
-        under_way = (FOLLOWING_LAG_S * np.minimum(np.abs(actual[VELOCITY]), limits.fastest)
-                     + COMMAND_S * np.minimum(np.abs(desired[VELOCITY]), limits.fastest))
+        under_way = FOLLOWING_LAG_S * np.minimum(np.abs(actual[VELOCITY]), limits.fastest) + COMMAND_S * np.minimum(
+            np.abs(desired[VELOCITY]), limits.fastest
+        )
         ahead = np.clip(desired[POSITION] - actual[POSITION], -under_way, under_way)
         limits = limits.with_positions(actual[POSITION])
         position = np.clip(actual[POSITION] + ahead, limits.lowest, limits.highest)
         with np.errstate(divide="ignore", invalid="ignore"):
             braking_s = np.where(limits.braking > 0.0, PEAK_OF_RAMP * np.abs(velocity) / limits.braking, 0.0)
         durations_s = rate * np.maximum(self._duration_s, braking_s)
-        return [_ramp(joint, (position[joint], velocity[joint] / rate), time_s, durations_s[joint],
-                      limits.highest[joint] if velocity[joint] > 0.0 else limits.lowest[joint]) for joint in joints]
+        return [
+            _ramp(
+                joint,
+                (position[joint], velocity[joint] / rate),
+                time_s,
+                durations_s[joint],
+                limits.highest[joint] if velocity[joint] > 0.0 else limits.lowest[joint],
+            )
+            for joint in joints
+        ]
 
 
 def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: float, bound: float) -> Track:

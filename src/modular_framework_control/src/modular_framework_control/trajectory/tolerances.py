@@ -4,6 +4,7 @@
 Defaults come from the parameters below `constraints`; a goal may replace or erase them. An infinite tolerance is one
 that is not checked.
 """
+
 from __future__ import annotations
 
 import math
@@ -71,9 +72,14 @@ def _bound(value: float) -> float:
     return value if value > 0.0 else math.inf
 
 
-def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints: Sequence[int],
-                       path: Mapping[str, JointTolerance], goal: Mapping[str, JointTolerance],
-                       goal_time_s: float) -> Tolerances:
+def tolerances_of_goal(
+    defaults: Tolerances,
+    joint_names: Sequence[str],
+    joints: Sequence[int],
+    path: Mapping[str, JointTolerance],
+    goal: Mapping[str, JointTolerance],
+    goal_time_s: float,
+) -> Tolerances:
     """The tolerances of one goal; joints it does not move are not checked, and those of other joints are not used.
 
     Args:
@@ -88,18 +94,23 @@ def tolerances_of_goal(defaults: Tolerances, joint_names: Sequence[str], joints:
         InvalidTrajectoryError: one that is not a number.
     """
     given = [(kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()]
-    faults = [f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
-               f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the parameter's) or less (not checked)"
-               for kind, name, tolerance in given if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)]
+    faults = [
+        f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
+        f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the parameter's) or less (not checked)"
+        for kind, name, tolerance in given
+        if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)
+    ]
     if faults:
         raise InvalidTrajectoryError("; ".join(faults))
     time_s = defaults.goal_time_s if goal_time_s == 0.0 else max(0.0, goal_time_s)
-    return Tolerances(_merged(defaults.path, joint_names, joints, path),
-                      _merged(defaults.goal, joint_names, joints, goal), time_s)
+    return Tolerances(
+        _merged(defaults.path, joint_names, joints, path), _merged(defaults.goal, joint_names, joints, goal), time_s
+    )
 
 
-def foreign_tolerances(joint_names: Sequence[str], path: Mapping[str, JointTolerance],
-                       goal: Mapping[str, JointTolerance]) -> str:
+def foreign_tolerances(
+    joint_names: Sequence[str], path: Mapping[str, JointTolerance], goal: Mapping[str, JointTolerance]
+) -> str:
     """Which tolerances of a goal are of joints that the controller does not have; "" when none is.
 
     Args:
@@ -107,14 +118,22 @@ def foreign_tolerances(joint_names: Sequence[str], path: Mapping[str, JointToler
         path: what the goal says for the way, by joint name.
         goal: what the goal says for the end, by joint name.
     """
-    foreign = [f"{kind}_tolerance of joint '{name}'" for kind, tolerances in (("path", path), ("goal", goal))
-               for name in tolerances if name not in joint_names]
-    return (f"not used: {', '.join(foreign)}, which the controller does not have; it has: {', '.join(joint_names)}"
-            if foreign else "")
+    foreign = [
+        f"{kind}_tolerance of joint '{name}'"
+        for kind, tolerances in (("path", path), ("goal", goal))
+        for name in tolerances
+        if name not in joint_names
+    ]
+    return (
+        f"not used: {', '.join(foreign)}, which the controller does not have; it has: {', '.join(joint_names)}"
+        if foreign
+        else ""
+    )
 
 
-def _merged(defaults: Array, joint_names: Sequence[str], joints: Sequence[int],
-            given: Mapping[str, JointTolerance]) -> Array:
+def _merged(
+    defaults: Array, joint_names: Sequence[str], joints: Sequence[int], given: Mapping[str, JointTolerance]
+) -> Array:
     merged = np.full_like(defaults, math.inf)
     for i in joints:
         tolerance = given.get(joint_names[i], JointTolerance())
@@ -136,5 +155,7 @@ def violations(error: Array, tolerance: Array, joint_names: Sequence[str]) -> st
         return ""
     outside = ~within & np.isfinite(tolerance)
     quantities = ("position", "velocity")
-    return "; ".join(f"joint '{joint_names[i]}': {quantities[row]} error {error[row, i]:.6g}, "
-                     f"tolerance {tolerance[row, i]:.6g}" for row, i in np.argwhere(outside))
+    return "; ".join(
+        f"joint '{joint_names[i]}': {quantities[row]} error {error[row, i]:.6g}, tolerance {tolerance[row, i]:.6g}"
+        for row, i in np.argwhere(outside)
+    )

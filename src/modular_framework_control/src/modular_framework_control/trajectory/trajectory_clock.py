@@ -5,6 +5,7 @@ A robot whose speed slider is at 10 %, or which is paused, cannot follow a traje
 of the trajectory runs at the robot's share of that speed. It slows down at once and speeds up gradually, so that a
 robot that resumes starts without a jerk.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence

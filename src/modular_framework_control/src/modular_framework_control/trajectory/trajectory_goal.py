@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Goal, result code and state snapshot of a trajectory controller."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping

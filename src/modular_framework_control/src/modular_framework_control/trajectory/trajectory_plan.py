@@ -5,6 +5,7 @@ later.
 A trajectory that starts in the future, or moves some of the joints only, leaves the rest of the motion as it is. So the
 plan is a row of stages, each with the tracks in force from its beginning on; every joint is in one track of a stage.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -65,8 +66,9 @@ class TrajectoryPlan:
         """Drops the stages that are over at `time_s` [s]."""
         stages = self._stages
         if len(stages) > 1 and time_s >= stages[1].from_s:
-            self._stages = tuple(stage for i, stage in enumerate(stages)
-                                 if i + 1 == len(stages) or stages[i + 1].from_s > time_s)
+            self._stages = tuple(
+                stage for i, stage in enumerate(stages) if i + 1 == len(stages) or stages[i + 1].from_s > time_s
+            )
 
     def sample(self, time_s: float) -> Array:
         """Position, velocity and acceleration at `time_s` [s], shape (3, joints)."""

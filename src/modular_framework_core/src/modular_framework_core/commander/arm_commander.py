@@ -3,6 +3,7 @@
 
 Every call carries its own start state and target; nothing is remembered between calls but the planner's settings.
 """
+
 from __future__ import annotations
 
 import threading
@@ -126,11 +127,16 @@ class ArmCommander:
             except (CallError, RobotModelError) as error:
                 raise CommanderError(f"Arm commander of group '{self.group_name}': {error}") from error
             topic = rospy.resolve_name("joint_states")
-            if not wait_for_start(lambda: not self._missing_joints(group), lambda: (
-                    f"the joints {list(self._missing_joints(group))} on topic '{topic}'"), limit_s):
-                raise CommanderError(f"Arm commander of group '{self.group_name}': topic '{topic}' did not deliver the "
-                                     f"joints {list(self._missing_joints(group))} within {limit_s:.1f} s; start the "
-                                     "joint state controller.")
+            if not wait_for_start(
+                lambda: not self._missing_joints(group),
+                lambda: f"the joints {list(self._missing_joints(group))} on topic '{topic}'",
+                limit_s,
+            ):
+                raise CommanderError(
+                    f"Arm commander of group '{self.group_name}': topic '{topic}' did not deliver the "
+                    f"joints {list(self._missing_joints(group))} within {limit_s:.1f} s; start the "
+                    "joint state controller."
+                )
             self._group = group
 
     @property
@@ -192,8 +198,12 @@ class ArmCommander:
             answer = call_service(proxy, QueryPlannerInterfacesRequest(), SERVICE_TIMEOUT_S)
         except CallError as error:
             raise CommanderError(str(error)) from error
-        names = {name for item in answer.planner_interfaces for planner in item.planner_ids
-                 for name in (planner, f"{item.pipeline_id}/{planner}")}
+        names = {
+            name
+            for item in answer.planner_interfaces
+            for planner in item.planner_ids
+            for name in (planner, f"{item.pipeline_id}/{planner}")
+        }
         return sorted(names)
 
     def set_num_planning_attempts(self, attempts: int) -> None:
@@ -241,8 +251,9 @@ class ArmCommander:
             return _no_plan(MoveItErrorCodes.INVALID_GROUP_NAME, self._no_tip())
         return self._plan(lambda name: pose_goal(pose, self.group.tip_link, name), custom_start_state)
 
-    def plan_to_joint_value_target(self, joints: Mapping[str, float] | JointState,
-                                   custom_start_state: StartState = None) -> PlanResult:
+    def plan_to_joint_value_target(
+        self, joints: Mapping[str, float] | JointState, custom_start_state: StartState = None
+    ) -> PlanResult:
         """Plans to joint positions.
 
         Args:
@@ -255,9 +266,11 @@ class ArmCommander:
         values = dict(zip(joints.name, joints.position, strict=False)) if isinstance(joints, JointState) else joints
         target = {name: values[name] for name in self.group.joint_names if name in values}
         if not target:
-            return _no_plan(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS,
-                            f"the target names the joints {sorted(values)}, group '{self.group_name}' has "
-                            f"{list(self.group.joint_names)}; none of them is the same")
+            return _no_plan(
+                MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS,
+                f"the target names the joints {sorted(values)}, group '{self.group_name}' has "
+                f"{list(self.group.joint_names)}; none of them is the same",
+            )
         return self._plan(lambda name: joint_goal(target, name), custom_start_state)
 
     def get_ik(self, pose: PoseStamped, seed: StartState = None) -> dict[str, float] | None:
@@ -313,8 +326,9 @@ class ArmCommander:
         pairs = sorted({f"'{contact.contact_body_1}' with '{contact.contact_body_2}'" for contact in response.contacts})
         return f"in collision there ({', '.join(pairs[:3]) or 'no contact was reported'})"
 
-    def execute_plan(self, plan: RobotTrajectory | PlanResult,
-                     stop_requested: Callable[[], bool] = stop_requested) -> ExecutionResult:
+    def execute_plan(
+        self, plan: RobotTrajectory | PlanResult, stop_requested: Callable[[], bool] = stop_requested
+    ) -> ExecutionResult:
         """Executes a plan and waits for its end.
 
         Args:
@@ -337,8 +351,9 @@ class ArmCommander:
             except CallError as error:
                 return ExecutionResult(False, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
             self._execute_client.send_goal(ExecuteTrajectoryGoal(trajectory=trajectory))
-            status = wait_for_result(self._execute_client, timeout_s,
-                                     lambda: self._stop_event.is_set() or stop_requested())
+            status = wait_for_result(
+                self._execute_client, timeout_s, lambda: self._stop_event.is_set() or stop_requested()
+            )
             return self._execution_result(status, timeout_s)
 
     def stop(self) -> None:
@@ -416,8 +431,14 @@ class ArmCommander:
 
     def _no_tip(self) -> str:
         """Says that the group has no tip link; nothing when it has one."""
-        return "" if self.group.tip_link else (f"group '{self.group_name}' is no chain, so no link of it can be "
-                                               "brought to a pose; choose a group that is, or a target of joints")
+        return (
+            ""
+            if self.group.tip_link
+            else (
+                f"group '{self.group_name}' is no chain, so no link of it can be "
+                "brought to a pose; choose a group that is, or a target of joints"
+            )
+        )
 
     def _missing_joints(self, group: Group) -> tuple[str, ...]:
         received = self._joints.positions(group.joint_names)

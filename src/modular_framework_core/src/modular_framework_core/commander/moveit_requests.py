@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Builds the messages move_group understands, and names its error codes."""
+
 from __future__ import annotations
 
 import copy
@@ -57,9 +58,16 @@ def robot_state(state: StartState) -> RobotState:
 
 def joint_goal(joints: Mapping[str, float], name: str = "") -> Constraints:
     """Makes a goal in joint space [rad or m]."""
-    constraints = [JointConstraint(joint_name=joint, position=position, tolerance_above=JOINT_TOLERANCE_RAD,
-                                   tolerance_below=JOINT_TOLERANCE_RAD, weight=1.0)
-                   for joint, position in joints.items()]
+    constraints = [
+        JointConstraint(
+            joint_name=joint,
+            position=position,
+            tolerance_above=JOINT_TOLERANCE_RAD,
+            tolerance_below=JOINT_TOLERANCE_RAD,
+            weight=1.0,
+        )
+        for joint, position in joints.items()
+    ]
     return Constraints(name=name, joint_constraints=constraints)
 
 
@@ -67,14 +75,20 @@ def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
     """Makes a goal for the pose of a link."""
     region = PositionConstraint(header=pose.header, link_name=link, weight=1.0)
     region.constraint_region.primitives = [
-        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[POSITION_TOLERANCE_M])]
+        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[POSITION_TOLERANCE_M])
+    ]
     centre = Pose(position=pose.pose.position)
     centre.orientation.w = 1.0
     region.constraint_region.primitive_poses = [centre]
     turn = OrientationConstraint(
-        header=pose.header, link_name=link, orientation=pose.pose.orientation, weight=1.0,
-        absolute_x_axis_tolerance=ORIENTATION_TOLERANCE_RAD, absolute_y_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
-        absolute_z_axis_tolerance=ORIENTATION_TOLERANCE_RAD)
+        header=pose.header,
+        link_name=link,
+        orientation=pose.pose.orientation,
+        weight=1.0,
+        absolute_x_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
+        absolute_y_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
+        absolute_z_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
+    )
     return Constraints(name=name, position_constraints=[region], orientation_constraints=[turn])
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of the arm commander: each is true only on success, and has the reason otherwise."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads which joints and which tip link a planning group has, from the robot's URDF and SRDF texts."""
+
 from __future__ import annotations
 
 import math
@@ -74,8 +75,9 @@ class Group:
         for joint in self.joints:
             if joint.name == name:
                 return joint
-        raise RobotModelError(f"Group '{self.name}' has no active joint '{name}'; it has "
-                              f"{[joint.name for joint in self.joints]}.")
+        raise RobotModelError(
+            f"Group '{self.name}' has no active joint '{name}'; it has {[joint.name for joint in self.joints]}."
+        )
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -103,12 +105,16 @@ def _joint(joint: UrdfJoint) -> Joint:
     limit = joint.limit
     bounded = limit is not None and joint.kind != "continuous"
     return Joint(
-        joint.name, joint.kind, joint.parent, joint.child,
+        joint.name,
+        joint.kind,
+        joint.parent,
+        joint.child,
         limit.lower if limit is not None and bounded else -math.inf,
         limit.upper if limit is not None and bounded else math.inf,
         math.inf if limit is None or limit.effort is None else limit.effort,
         joint.mimic.leader if joint.mimic is not None else "",
-        math.inf if limit is None or limit.velocity is None else limit.velocity)
+        math.inf if limit is None or limit.velocity is None else limit.velocity,
+    )
 
 
 def read_group(urdf: str, srdf: str, name: str) -> Group:
@@ -136,8 +142,9 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
     return Group(name, tuple(active), tip, states)
 
 
-def _collect(name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint],
-             above: tuple[str, ...]) -> tuple[list[str], str]:
+def _collect(
+    name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint], above: tuple[str, ...]
+) -> tuple[list[str], str]:
     if name not in groups:
         raise RobotModelError(f"There is no planning group '{name}'; the SRDF has {sorted(groups)}.")
     if name in above:
@@ -152,8 +159,9 @@ def _collect(name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint
                 names += _chain(member.base_link, tip, by_child)
             case "joint":
                 if member.name not in joints:
-                    raise RobotModelError(f"Planning group '{name}' names the joint '{member.name}', which the URDF "
-                                          "lacks.")
+                    raise RobotModelError(
+                        f"Planning group '{name}' names the joint '{member.name}', which the URDF lacks."
+                    )
                 names.append(member.name)
             case "link":
                 parent = by_child.get(member.name)

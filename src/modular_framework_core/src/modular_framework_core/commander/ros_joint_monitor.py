@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The latest positions and velocities of the robot's joints."""
+
 from __future__ import annotations
 
 import threading
@@ -60,8 +61,10 @@ class JointMonitor:
 
     def _at_rest_since(self, names: Iterable[str], begun_s: float) -> bool:
         with self._lock:
-            return all(self._received.get(name, 0.0) > begun_s and abs(self._velocities.get(name, 0.0)) < REST_SPEED
-                       for name in names)
+            return all(
+                self._received.get(name, 0.0) > begun_s and abs(self._velocities.get(name, 0.0)) < REST_SPEED
+                for name in names
+            )
 
     def _on_joint_states(self, message: JointState) -> None:
         with self._lock:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reasons for failed plans, which move_group publishes beside its error codes."""
+
 from __future__ import annotations
 
 import json

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where the framework's own states and templates are, in devel and install space, and where it writes."""
+
 from __future__ import annotations
 
 import importlib.util

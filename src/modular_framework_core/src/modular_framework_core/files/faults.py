@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Faults of a task file: collected while it is checked, raised together, each with its location and what to do."""
+
 from __future__ import annotations
 
 import difflib

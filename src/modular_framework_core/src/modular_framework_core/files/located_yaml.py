@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads YAML (1.2, safe types only) into a tree that remembers the line and column of every key and value."""
+
 from __future__ import annotations
 
 import re
@@ -106,8 +107,15 @@ def load(path: Path, faults: FaultList) -> Node:
         text = read_whole(path)
     except FileNotFoundError as error:
         there = sorted(file.name for file in path.parent.glob("*.yaml"))
-        raise TaskFault([Fault(start, f"there is no such file; {listing(there, 'no other .yaml is in its folder')}"
-                                      f"{nearest(path.name, there)}")]) from error
+        raise TaskFault(
+            [
+                Fault(
+                    start,
+                    f"there is no such file; {listing(there, 'no other .yaml is in its folder')}"
+                    f"{nearest(path.name, there)}",
+                )
+            ]
+        ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise TaskFault([Fault(start, f"the file cannot be read: {error}")]) from error
     return loads(text, str(path), faults)
@@ -120,8 +128,9 @@ def loads(text: str, file: str, faults: FaultList) -> Node:
     except yaml.MarkedYAMLError as error:
         raise TaskFault([_syntax_fault(error, text, file)]) from error
     except yaml.reader.ReaderError as error:
-        raise TaskFault([Fault(_location_of(text, file, error.position), f"this is not valid YAML: {error.reason}")]
-                        ) from error
+        raise TaskFault(
+            [Fault(_location_of(text, file, error.position), f"this is not valid YAML: {error.reason}")]
+        ) from error
     except (UnicodeEncodeError, yaml.YAMLError) as error:
         first_line = (str(error).splitlines() or [""])[0]
         raise TaskFault([Fault(SourceLocation(file, 1, 1), f"this is not valid YAML: {first_line}")]) from error
@@ -134,7 +143,7 @@ def _syntax_fault(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
     if begun and begun.line + 1 != location.line:
         context += f" that begins in line {begun.line + 1}"
     lines = text.splitlines()
-    rest = lines[location.line - 1][location.column - 1:] if location.line <= len(lines) else ""
+    rest = lines[location.line - 1][location.column - 1 :] if location.line <= len(lines) else ""
     hint = "; a tab is here: indent with spaces" if rest.startswith("\t") else ""
     return Fault(location, f"this is not valid YAML: {error.problem}{context}{hint}")
 
@@ -162,12 +171,24 @@ class _Reader:
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
                 if root is not None:
-                    raise TaskFault([Fault(self._location(event), "the file has a second document; a task is one "
-                                                                  "document, remove the '---'")])
+                    raise TaskFault(
+                        [
+                            Fault(
+                                self._location(event),
+                                "the file has a second document; a task is one document, remove the '---'",
+                            )
+                        ]
+                    )
                 root = self._node(next(self._events))
         if root is None:
-            raise TaskFault([Fault(SourceLocation(self._file, 1, 1),
-                                   "the file is empty; a task needs name, source, outcomes and states")])
+            raise TaskFault(
+                [
+                    Fault(
+                        SourceLocation(self._file, 1, 1),
+                        "the file is empty; a task needs name, source, outcomes and states",
+                    )
+                ]
+            )
         return root
 
     def _location(self, event: Any) -> SourceLocation:
@@ -247,8 +268,9 @@ class _Reader:
             if is_merge:
                 merged += self._merged(value)
             elif key in entries:
-                self._faults.add(key_location, f"the key '{key}' is given twice; first in line {keys[key].line}; "
-                                               "remove one of them")
+                self._faults.add(
+                    key_location, f"the key '{key}' is given twice; first in line {keys[key].line}; remove one of them"
+                )
             elif key is not None:
                 entries[key], keys[key] = value, key_location
         for other in merged:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads YAML that anyone may have written: what is nested too deeply is refused before it costs stack or time."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -26,8 +27,10 @@ def check_depth(text: str) -> None:
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > MAX_DEPTH:
-                raise TooDeepError(f"line {event.start_mark.line + 1} is nested more than {MAX_DEPTH} levels deep, "
-                                   "which no file of this kind needs; flatten it")
+                raise TooDeepError(
+                    f"line {event.start_mark.line + 1} is nested more than {MAX_DEPTH} levels deep, "
+                    "which no file of this kind needs; flatten it"
+                )
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
 

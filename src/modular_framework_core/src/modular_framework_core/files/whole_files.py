@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes files as a whole or not at all, and reads those that others name without waiting for what never comes."""
+
 from __future__ import annotations
 
 import contextlib

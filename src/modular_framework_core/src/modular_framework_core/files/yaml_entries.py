@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads YAML files entry by entry with line numbers, so that one bad entry is named and the others survive."""
+
 from __future__ import annotations
 
 import math
@@ -75,8 +76,10 @@ class Entry:
         """
         if not isinstance(self.node, yaml.SequenceNode):
             raise self.fault(f"got {describe(self.node)}, expected a list")
-        return [Entry(self.path, int(node.start_mark.line) + 1, f"{self.key}[{number}]", node)
-                for number, node in enumerate(self.node.value, start=1)]
+        return [
+            Entry(self.path, int(node.start_mark.line) + 1, f"{self.key}[{number}]", node)
+            for number, node in enumerate(self.node.value, start=1)
+        ]
 
     def number(self) -> float:
         """Reads the value as a finite number in double precision.

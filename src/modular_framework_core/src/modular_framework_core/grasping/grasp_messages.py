@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Builds the messages a grasp is made of, so that methods need not know their layout."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -12,8 +13,13 @@ from modular_framework_core.msg import ManipulatorState, StandardisedGrasp, Torq
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 
-def generate_joint_state_message(joint_names: Sequence[str], position: Sequence[float], velocity: Sequence[float] = (),
-                                 effort: Sequence[float] = (), reference_frame_name: str = "world") -> JointState:
+def generate_joint_state_message(
+    joint_names: Sequence[str],
+    position: Sequence[float],
+    velocity: Sequence[float] = (),
+    effort: Sequence[float] = (),
+    reference_frame_name: str = "world",
+) -> JointState:
     """Makes a joint state stamped now.
 
     Args:
@@ -31,8 +37,9 @@ def generate_joint_state_message(joint_names: Sequence[str], position: Sequence[
     return state
 
 
-def generate_pose_stamped_message(reference_frame_name: str, position: Sequence[float],
-                                  orientation: Sequence[float]) -> PoseStamped:
+def generate_pose_stamped_message(
+    reference_frame_name: str, position: Sequence[float], orientation: Sequence[float]
+) -> PoseStamped:
     """Makes a pose stamped now.
 
     Args:
@@ -47,8 +54,10 @@ def generate_pose_stamped_message(reference_frame_name: str, position: Sequence[
         ValueError: The position has not three values, or the orientation neither three nor four.
     """
     if len(position) != 3 or len(orientation) not in (3, 4):
-        raise ValueError("a pose needs 3 values of position and 3 (roll, pitch, yaw) or 4 (x, y, z, w) of "
-                         f"orientation, got {len(position)} and {len(orientation)}")
+        raise ValueError(
+            "a pose needs 3 values of position and 3 (roll, pitch, yaw) or 4 (x, y, z, w) of "
+            f"orientation, got {len(position)} and {len(orientation)}"
+        )
     quaternion = tuple(orientation) if len(orientation) == 4 else quaternion_from_rpy(*orientation)
     message = PoseStamped()
     message.header.stamp, message.header.frame_id = rospy.Time.now(), reference_frame_name
@@ -56,11 +65,20 @@ def generate_pose_stamped_message(reference_frame_name: str, position: Sequence[
     return message
 
 
-def get_standardised_grasp(manipulator_joint_names: Sequence[str], pregrasp_joint_values: Sequence[float],
-                           grasp_joint_values: Sequence[float], postgrasp_joint_values: Sequence[float],
-                           torque_intensity: Sequence[float], pregrasp_pose: PoseStamped, grasp_pose: PoseStamped,
-                           postgrasp_pose: PoseStamped, grasp_quality: float = 0.0, grasp_id: str = "",
-                           hand_id: str = "", object_id: str = "") -> StandardisedGrasp:
+def get_standardised_grasp(
+    manipulator_joint_names: Sequence[str],
+    pregrasp_joint_values: Sequence[float],
+    grasp_joint_values: Sequence[float],
+    postgrasp_joint_values: Sequence[float],
+    torque_intensity: Sequence[float],
+    pregrasp_pose: PoseStamped,
+    grasp_pose: PoseStamped,
+    postgrasp_pose: PoseStamped,
+    grasp_quality: float = 0.0,
+    grasp_id: str = "",
+    hand_id: str = "",
+    object_id: str = "",
+) -> StandardisedGrasp:
     """Makes a grasp message; the three postures are stamped now.
 
     Args:
@@ -80,8 +98,13 @@ def get_standardised_grasp(manipulator_joint_names: Sequence[str], pregrasp_join
     Returns:
         The message.
     """
-    stages = [ManipulatorState(generate_joint_state_message(manipulator_joint_names, values, (), (), ""), pose)
-              for values, pose in ((pregrasp_joint_values, pregrasp_pose), (grasp_joint_values, grasp_pose),
-                                   (postgrasp_joint_values, postgrasp_pose))]
+    stages = [
+        ManipulatorState(generate_joint_state_message(manipulator_joint_names, values, (), (), ""), pose)
+        for values, pose in (
+            (pregrasp_joint_values, pregrasp_pose),
+            (grasp_joint_values, grasp_pose),
+            (postgrasp_joint_values, postgrasp_pose),
+        )
+    ]
     torques = TorqueIntensity(list(manipulator_joint_names), list(torque_intensity))
     return StandardisedGrasp(grasp_id, hand_id, object_id, *stages, torques, float(grasp_quality))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks what a grasp command asks of the manipulator, and decides whether the manipulator reached it."""
+
 from __future__ import annotations
 
 import math
@@ -33,8 +34,9 @@ class Stage(IntEnum):
         try:
             return cls(number)
         except ValueError as error:
-            raise GraspCommandError(f"grasp_state is {number}, allowed are PRE_GRASP_STATE=0, GRASP_STATE=1, "
-                                    "POST_GRASP_STATE=2") from error
+            raise GraspCommandError(
+                f"grasp_state is {number}, allowed are PRE_GRASP_STATE=0, GRASP_STATE=1, POST_GRASP_STATE=2"
+            ) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,16 +85,18 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
     for name, position in targets.items():
         joint = group.joint(name)
         if not math.isfinite(position) or not joint.lower - 1e-6 <= position <= joint.upper + 1e-6:
-            raise GraspCommandError(f"joint '{name}' is to go to {position}, its limits are "
-                                    f"[{joint.lower}, {joint.upper}]")
+            raise GraspCommandError(
+                f"joint '{name}' is to go to {position}, its limits are [{joint.lower}, {joint.upper}]"
+            )
     return targets
 
 
 def _paired(what: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group) -> dict[str, float]:
     """Pairs joints of the group with their values; ``what`` and ``kind`` say in errors of what."""
     if len(names) != len(values):
-        raise GraspCommandError(f"{what} has {len(names)} joint names and {len(values)} {kind}; it needs as many of "
-                                "each")
+        raise GraspCommandError(
+            f"{what} has {len(names)} joint names and {len(values)} {kind}; it needs as many of each"
+        )
     if len(set(names)) != len(names):
         raise GraspCommandError(f"{what} names a joint twice: {list(names)}; name each once")
     for name in names:
@@ -114,8 +118,10 @@ def torque_share(max_torque: float, full_scale: float) -> float:
         GraspCommandError: The torque is no positive number.
     """
     if not 0.0 < max_torque < math.inf:
-        raise GraspCommandError(f"max_torque is {max_torque}, allowed are numbers of more than 0 ({full_scale:g} is "
-                                "the full torque); set how hard the fingers may press")
+        raise GraspCommandError(
+            f"max_torque is {max_torque}, allowed are numbers of more than 0 ({full_scale:g} is "
+            "the full torque); set how hard the fingers may press"
+        )
     return min(1.0, max_torque / full_scale)
 
 
@@ -143,8 +149,9 @@ def torque_intensities(names: Sequence[str], values: Sequence[float], group: Gro
     return intensities
 
 
-def effort_limits(targets: Mapping[str, float], intensities: Mapping[str, float], group: Group,
-                  share: float, stage: Stage) -> dict[str, float]:
+def effort_limits(
+    targets: Mapping[str, float], intensities: Mapping[str, float], group: Group, share: float, stage: Stage
+) -> dict[str, float]:
     """Computes the effort each joint may use.
 
     The effort is |torque intensity| x share of the greatest torque x the joint's effort limit in the URDF. A joint
@@ -180,8 +187,10 @@ def refuse_no_effort(name: str, effort: float) -> None:
         GraspCommandError: The effort is 0.
     """
     if effort == 0.0:
-        raise GraspCommandError(f"joint '{name}' is to move with no torque, allowed is more than 0 (max_torque x its "
-                                "torque intensity, which is 0 or too small); give the grasp more of either")
+        raise GraspCommandError(
+            f"joint '{name}' is to move with no torque, allowed is more than 0 (max_torque x its "
+            "torque intensity, which is 0 or too small); give the grasp more of either"
+        )
 
 
 def closed_positions(group: Group) -> dict[str, float]:
@@ -189,8 +198,9 @@ def closed_positions(group: Group) -> dict[str, float]:
     return group.states.get(CLOSED_STATE) or {joint.name: joint.upper for joint in group.joints}
 
 
-def judge(stage: Stage, targets: Mapping[str, float], outcome: Outcome, closed: Mapping[str, float],
-          tolerance: float) -> Verdict:
+def judge(
+    stage: Stage, targets: Mapping[str, float], outcome: Outcome, closed: Mapping[str, float], tolerance: float
+) -> Verdict:
     """Decides whether a stage was reached.
 
     pregrasp: every joint is at its target. grasp: something stopped the fingers, or they are at targets short of a
@@ -210,10 +220,13 @@ def judge(stage: Stage, targets: Mapping[str, float], outcome: Outcome, closed: 
     away = {name: abs(outcome.positions.get(name, math.inf) - target) for name, target in targets.items()}
     worst = max(away, key=away.__getitem__)
     reached = away[worst] <= tolerance
-    shut = all(abs(outcome.positions.get(name, math.inf) - closed[name]) <= tolerance
-               for name in targets if name in closed)
-    missed = (f"joint '{worst}' is {away[worst]:.4f} away from its target {targets[worst]:.4f}, allowed is {tolerance}"
-              f"{'; ' + outcome.text if outcome.text else ''}")
+    shut = all(
+        abs(outcome.positions.get(name, math.inf) - closed[name]) <= tolerance for name in targets if name in closed
+    )
+    missed = (
+        f"joint '{worst}' is {away[worst]:.4f} away from its target {targets[worst]:.4f}, allowed is {tolerance}"
+        f"{'; ' + outcome.text if outcome.text else ''}"
+    )
     match stage:
         case Stage.PREGRASP:
             return Verdict(reached, "posture reached" if reached else missed)

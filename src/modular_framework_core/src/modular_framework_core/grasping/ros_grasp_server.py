@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Serves the Grasp action: moves the manipulator to the stages of a grasp and reports where the fingers ended."""
+
 from __future__ import annotations
 
 import threading
@@ -28,8 +29,11 @@ from modular_framework_ros.calls import CallError
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 
 FEEDBACK_PERIOD_S = 0.1
-STAGE_FIELDS = {Stage.PREGRASP: ("pregrasp", "pregrasped"), Stage.GRASP: ("grasp", "grasped"),
-                Stage.POSTGRASP: ("postgrasp", "postgrasped")}
+STAGE_FIELDS = {
+    Stage.PREGRASP: ("pregrasp", "pregrasped"),
+    Stage.GRASP: ("grasp", "grasped"),
+    Stage.POSTGRASP: ("postgrasp", "postgrasped"),
+}
 
 
 class GraspServer:
@@ -129,7 +133,9 @@ class GraspServer:
 
         def publish() -> None:
             while not ended.wait(FEEDBACK_PERIOD_S):
-                handle.publish_feedback(GraspFeedback(current_joint_state=self._manipulator.joint_state(motion.targets)))
+                handle.publish_feedback(
+                    GraspFeedback(current_joint_state=self._manipulator.joint_state(motion.targets))
+                )
 
         threading.Thread(target=publish, daemon=True).start()
         try:
@@ -148,8 +154,10 @@ def read_manipulator() -> Group:
     wait_for_start(lambda: all(rospy.has_param(name) for name in names), f"the parameters {', '.join(names)}")
     missing = [rospy.resolve_name(name) for name in names if not rospy.has_param(name)]
     if missing:
-        raise RobotModelError(f"the parameters {missing} were not set within {start_timeout():g} s; "
-                              "load the robot and manipulator_controller_parameters.yaml first")
+        raise RobotModelError(
+            f"the parameters {missing} were not set within {start_timeout():g} s; "
+            "load the robot and manipulator_controller_parameters.yaml first"
+        )
     name, urdf, srdf = (str(rospy.get_param(parameter)) for parameter in names)
     group = read_group(urdf, srdf, name)
     if not group.joints:
@@ -168,8 +176,10 @@ def read_controllers() -> list[dict[str, Any]]:
     for name in names:
         if rospy.has_param(name):
             return list(rospy.get_param(name))
-    raise RobotModelError(f"none of the parameters {[rospy.resolve_name(name) for name in names]} was set within "
-                          f"{start_timeout():g} s; load the controllers.yaml of the MoveIt config package")
+    raise RobotModelError(
+        f"none of the parameters {[rospy.resolve_name(name) for name in names]} was set within "
+        f"{start_timeout():g} s; load the controllers.yaml of the MoveIt config package"
+    )
 
 
 def main() -> int:

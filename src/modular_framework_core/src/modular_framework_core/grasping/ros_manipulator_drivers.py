@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What moves the manipulator for the grasp server: its controller, whichever of the two kinds of action it offers, or a
 device's own driver."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -24,8 +25,10 @@ from modular_framework_core.grasping.grasp_server import GraspCommandError, Outc
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_for_action, wait_for_result
 
-STALL_ERROR_CODES = (FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
-                     FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED)
+STALL_ERROR_CODES = (
+    FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
+    FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
+)
 """How a trajectory ends whose joints are blocked; any other end is no stall."""
 
 
@@ -73,9 +76,10 @@ class GripperDriver:
                 target nor stalled.
         """
         if len(motion.targets) != 1:
-            raise GraspCommandError(f"controller action '{self._action}' moves one joint, the posture has "
-                                    f"{sorted(motion.targets)}")
-        (name, position), = motion.targets.items()
+            raise GraspCommandError(
+                f"controller action '{self._action}' moves one joint, the posture has {sorted(motion.targets)}"
+            )
+        ((name, position),) = motion.targets.items()
         if name in motion.efforts:
             refuse_no_effort(name, motion.efforts[name])
         wait_for_action(self._client, self._action, 10.0)
@@ -86,8 +90,10 @@ class GripperDriver:
         result = self._client.get_result()
         _refuse_unfinished(status, self._action, motion)
         if result is None or not (result.stalled or result.reached_goal):
-            raise GraspCommandError(f"controller action '{self._action}' gave up: "
-                                    f"{self._client.get_goal_status_text() or 'no reason given'}")
+            raise GraspCommandError(
+                f"controller action '{self._action}' gave up: "
+                f"{self._client.get_goal_status_text() or 'no reason given'}"
+            )
         rests = monitor.wait_for_rest(motion.targets, motion.stop_requested)
         positions = monitor.positions(motion.targets) if rests else {name: result.position}
         return Outcome(positions, bool(result.stalled), f"the controller stopped at {result.position:.4f}")
@@ -115,8 +121,11 @@ class TrajectoryDriver:
         wait_for_action(self._client, self._action, 10.0)
         goal = FollowJointTrajectoryGoal()
         goal.trajectory.joint_names = list(motion.targets)
-        goal.trajectory.points = [JointTrajectoryPoint(positions=list(motion.targets.values()),
-                                                       time_from_start=rospy.Duration.from_sec(self._duration_s))]
+        goal.trajectory.points = [
+            JointTrajectoryPoint(
+                positions=list(motion.targets.values()), time_from_start=rospy.Duration.from_sec(self._duration_s)
+            )
+        ]
         self._client.send_goal(goal)
         status = wait_for_result(self._client, motion.timeout_s, motion.stop_requested)
         result = self._client.get_result()
@@ -154,8 +163,10 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
                 case "FollowJointTrajectory":
                     return TrajectoryDriver(action, duration_s)
                 case other:
-                    raise GraspCommandError(f"controller '{entry.get('name')}' has the type '{other}', allowed are "
-                                            "GripperCommand and FollowJointTrajectory")
+                    raise GraspCommandError(
+                        f"controller '{entry.get('name')}' has the type '{other}', allowed are "
+                        "GripperCommand and FollowJointTrajectory"
+                    )
     raise GraspCommandError(f"no controller has all the joints {sorted(joints)}; controller_list has {known}")
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Distinguishes fingers that an object stopped from fingers that had too little torque to move."""
+
 from __future__ import annotations
 
 import math
@@ -62,26 +63,39 @@ class StallEvidence:
             The outcome; not stalled, and with the reason, when none of that holds.
         """
         judged = outcome
-        if outcome.stalled and not (outcome.pressing or self._still_holds(attempt) or
-                                    any(self._was_stopped(name, outcome, attempt) for name in attempt.targets)):
-            judged = replace(outcome, stalled=False, text="the fingers have not moved, so nothing shows that something "
-                             "stopped them; give them more torque, or begin farther open"
-                             f"{'; ' + outcome.text if outcome.text else ''}")
+        if outcome.stalled and not (
+            outcome.pressing
+            or self._still_holds(attempt)
+            or any(self._was_stopped(name, outcome, attempt) for name in attempt.targets)
+        ):
+            judged = replace(
+                outcome,
+                stalled=False,
+                text="the fingers have not moved, so nothing shows that something "
+                "stopped them; give them more torque, or begin farther open"
+                f"{'; ' + outcome.text if outcome.text else ''}",
+            )
         self._held = judged if judged.stalled else None
         self._remember(outcome, attempt)
         return judged
 
     def _still_holds(self, attempt: Attempt) -> bool:
         held = self._held
-        return held is not None and all(abs(held.positions.get(name, math.inf) - attempt.begun.get(name, math.inf)) <=
-                                        self._tolerance for name in attempt.targets)
+        return held is not None and all(
+            abs(held.positions.get(name, math.inf) - attempt.begun.get(name, math.inf)) <= self._tolerance
+            for name in attempt.targets
+        )
 
     def _was_stopped(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
-        if name not in attempt.begun or name not in outcome.positions or (
-                abs(attempt.targets[name] - outcome.positions[name]) <= self._tolerance):
+        if (
+            name not in attempt.begun
+            or name not in outcome.positions
+            or (abs(attempt.targets[name] - outcome.positions[name]) <= self._tolerance)
+        ):
             return False
         return self._moved(name, outcome, attempt) or attempt.effort(name) >= self._moving_efforts.get(
-            (name, attempt.direction(name)), math.nan)
+            (name, attempt.direction(name)), math.nan
+        )
 
     def _moved(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
         if name not in attempt.begun or name not in outcome.positions:

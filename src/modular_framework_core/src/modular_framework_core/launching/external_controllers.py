@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Decides from the parameters which node drives the manipulator."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -42,14 +43,18 @@ def controller_node(parameters: Mapping[str, object]) -> ControllerNode | None:
         ExternalControllerError: A parameter is not set or empty.
     """
     if PACKAGE_KEY not in parameters:
-        raise ExternalControllerError(f"parameter '{PACKAGE_KEY}' is not set; set it to the package of the "
-                                      "manipulator's action server, or to an empty text when a ros_control plug-in "
-                                      "drives it")
+        raise ExternalControllerError(
+            f"parameter '{PACKAGE_KEY}' is not set; set it to the package of the "
+            "manipulator's action server, or to an empty text when a ros_control plug-in "
+            "drives it"
+        )
     package = str(parameters[PACKAGE_KEY] or "")
     if not package:
         return None
     missing = [key for key in (TYPE_KEY, NAME_KEY) if not parameters.get(key)]
     if missing:
-        raise ExternalControllerError(f"the parameters {missing} are not set or empty; they name the executable and "
-                                      f"the node of package '{package}'")
+        raise ExternalControllerError(
+            f"the parameters {missing} are not set or empty; they name the executable and "
+            f"the node of package '{package}'"
+        )
     return ControllerNode(package, str(parameters[TYPE_KEY]), str(parameters[NAME_KEY]))

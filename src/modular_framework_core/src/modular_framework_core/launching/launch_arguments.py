@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the arguments of a launch file before anything is started; roslaunch ignores an unknown one silently."""
+
 from __future__ import annotations
 
 import difflib
@@ -25,8 +26,7 @@ def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
         arguments: What is given, `name:=value`.
     """
     loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False, args_only=True)
-    roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False,
-                                         assign_machines=False)
+    roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False, assign_machines=False)
     return {name: str(value) for name, value in loader.root_context.resolve_dict["arg"].items()}
 
 
@@ -70,13 +70,17 @@ def _method_fault(value: str) -> str:
     try:
         folder = Path(finder.get_path(package)) / "launch"
     except rospkg.ResourceNotFound:
-        return (f"{fault}and there is no package '{package}'{_hint(package, finder.list())}; allowed is {allowed}; "
-                "correct it, or build and source the workspace with the package")
+        return (
+            f"{fault}and there is no package '{package}'{_hint(package, finder.list())}; allowed is {allowed}; "
+            "correct it, or build and source the workspace with the package"
+        )
     if (folder / file).is_file():
         return ""
     files = sorted(f"{package}/{found.name}" for found in folder.glob("*.launch"))
-    return (f"{fault}and the package has no such file{_hint(value, files)}; allowed are "
-            f"{', '.join(files) or 'files in its folder launch, which is empty'}; correct it")
+    return (
+        f"{fault}and the package has no such file{_hint(value, files)}; allowed are "
+        f"{', '.join(files) or 'files in its folder launch, which is empty'}; correct it"
+    )
 
 
 def _folder_fault(values: dict[str, str]) -> str:
@@ -84,8 +88,10 @@ def _folder_fault(values: dict[str, str]) -> str:
     value = values.get(CONFIGURATION, "")
     if not value or Path(value).is_absolute() and Path(value).is_dir():
         return ""
-    return (f"argument '{CONFIGURATION}' is '{value}', allowed is the path of a folder from /, such as a copy of the "
-            f"folder config of modular_framework_api; correct it{_path_hint(Path(value))}")
+    return (
+        f"argument '{CONFIGURATION}' is '{value}', allowed is the path of a folder from /, such as a copy of the "
+        f"folder config of modular_framework_api; correct it{_path_hint(Path(value))}"
+    )
 
 
 def _path_hint(path: Path) -> str:

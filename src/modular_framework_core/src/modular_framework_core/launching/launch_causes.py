@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds in the log file of a node why it ended."""
+
 from __future__ import annotations
 
 import re
@@ -30,5 +31,5 @@ def cause_of_death(log_file: Path) -> str:
             if in_fatal:
                 message = []
         if in_fatal:
-            message.append(line[record.end():] if record is not None else line)
+            message.append(line[record.end() :] if record is not None else line)
     return "\n".join(message).strip()

@@ -4,6 +4,7 @@
 roslaunch always exits with 0. Whoever starts a task from a script needs the task's own exit code, and the name of the
 node when a node died instead.
 """
+
 from __future__ import annotations
 
 import sys

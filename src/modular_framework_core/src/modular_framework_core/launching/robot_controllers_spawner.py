@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a controller file asks for: which controllers, with which parameters, and what is still to do for them."""
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -56,16 +57,22 @@ def read_controller_file(path: Path) -> ControllerFile:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         present = ", ".join(sorted(file.name for file in path.parent.glob("*.yaml"))) or "none"
-        raise ControllerFileError(f"controller file {path}: {error.strerror}; controller files beside it: "
-                                  f"{present}") from error
+        raise ControllerFileError(
+            f"controller file {path}: {error.strerror}; controller files beside it: {present}"
+        ) from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ControllerFileError(f"controller file {path}: not valid YAML: {error}") from error
     if not isinstance(content, dict) or not content:
-        raise ControllerFileError(f"controller file {path}: got {type(content).__name__}; expected a mapping of "
-                                  "controller names to their parameters")
+        raise ControllerFileError(
+            f"controller file {path}: got {type(content).__name__}; expected a mapping of "
+            "controller names to their parameters"
+        )
     faults = [f"key {name!r} is not a name" for name in content if not isinstance(name, str)]
-    faults += [f"'{name}/type' is {entry['type']!r}; expected package/Class" for name, entry in content.items()
-               if isinstance(entry, dict) and "type" in entry and not _is_type(entry["type"])]
+    faults += [
+        f"'{name}/type' is {entry['type']!r}; expected package/Class"
+        for name, entry in content.items()
+        if isinstance(entry, dict) and "type" in entry and not _is_type(entry["type"])
+    ]
     names = tuple(name for name, entry in content.items() if isinstance(entry, dict) and "type" in entry)
     if not names:
         faults.append(f"none of its keys ({', '.join(map(str, content))}) has a 'type': there is no controller in it")
@@ -85,8 +92,9 @@ def with_joint_states(file: ControllerFile, running_types: Iterable[str]) -> Con
     if any(kind.rpartition("/")[2] == JOINT_STATES_TYPE.rpartition("/")[2] for kind in (*types, *running_types)):
         return file
     settings = {"type": JOINT_STATES_TYPE, "publish_rate": JOINT_STATES_RATE_HZ}
-    return ControllerFile(file.path, {**file.parameters, JOINT_STATES_NAME: settings},
-                          (JOINT_STATES_NAME, *file.controllers))
+    return ControllerFile(
+        file.path, {**file.parameters, JOINT_STATES_NAME: settings}, (JOINT_STATES_NAME, *file.controllers)
+    )
 
 
 def _is_type(value: object) -> bool:
@@ -100,8 +108,10 @@ def plan_spawn(wanted: Sequence[str], states: Mapping[str, str]) -> SpawnPlan:
         wanted: Controller names.
         states: State by name, as list_controllers reports them.
     """
-    return SpawnPlan(load=tuple(name for name in wanted if name not in states),
-                     start=tuple(name for name in wanted if states.get(name) != "running"))
+    return SpawnPlan(
+        load=tuple(name for name in wanted if name not in states),
+        start=tuple(name for name in wanted if states.get(name) != "running"),
+    )
 
 
 def ready_topics(robot_hardware: object, topic_of: Mapping[str, object]) -> dict[str, str]:

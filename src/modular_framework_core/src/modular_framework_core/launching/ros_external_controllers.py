@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Starts the node that drives the manipulator, and ends with an error when that node dies."""
+
 from __future__ import annotations
 
 import contextlib
@@ -62,8 +63,9 @@ def run_until_it_ends(node: ControllerNode) -> int:
     try:
         while not rospy.is_shutdown():
             if process.poll() is not None:
-                rospy.logfatal("%s ended with exit code %s; the manipulator cannot be driven any more.", what,
-                               process.returncode)
+                rospy.logfatal(
+                    "%s ended with exit code %s; the manipulator cannot be driven any more.", what, process.returncode
+                )
                 return 1
             rospy.rostime.wallsleep(POLL_PERIOD_S)
     finally:

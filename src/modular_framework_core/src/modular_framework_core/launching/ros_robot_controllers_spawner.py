@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loads and starts the controllers of a robot as soon as its hardware says that it is ready."""
+
 from __future__ import annotations
 
 import sys
@@ -81,13 +82,21 @@ class RobotControllersSpawner:
         plan = plan_spawn(self._file.controllers, self._states())
         self._carry_out(plan)
         states = self._states()
-        idle = [f"'{name}' is {states.get(name, 'not loaded')}" for name in self._file.controllers
-                if states.get(name) != "running"]
+        idle = [
+            f"'{name}' is {states.get(name, 'not loaded')}"
+            for name in self._file.controllers
+            if states.get(name) != "running"
+        ]
         if idle:
-            raise SpawnError(f"controllers of {self._file.path} do not run: {', '.join(idle)}; the log of the "
-                             "controller manager says why")
-        rospy.loginfo("controllers running: %s (loaded now: %s)", ", ".join(self._file.controllers),
-                      ", ".join(plan.load) or "none")
+            raise SpawnError(
+                f"controllers of {self._file.path} do not run: {', '.join(idle)}; the log of the "
+                "controller manager says why"
+            )
+        rospy.loginfo(
+            "controllers running: %s (loaded now: %s)",
+            ", ".join(self._file.controllers),
+            ", ".join(plan.load) or "none",
+        )
 
     def _add_joint_states(self) -> None:
         """Adds a joint state controller where there is none: without one the joint positions are not published."""
@@ -96,18 +105,32 @@ class RobotControllersSpawner:
         if completed is not self._file:
             self._file = completed
             rospy.set_param(f"/{JOINT_STATES_NAME}", completed.parameters[JOINT_STATES_NAME])
-            rospy.loginfo("%s lists no joint state controller; '%s' (%s, %.0f Hz) is started, so that the joints' "
-                          "positions are published", completed.path, JOINT_STATES_NAME, JOINT_STATES_TYPE,
-                          JOINT_STATES_RATE_HZ)
+            rospy.loginfo(
+                "%s lists no joint state controller; '%s' (%s, %.0f Hz) is started, so that the joints' "
+                "positions are published",
+                completed.path,
+                JOINT_STATES_NAME,
+                JOINT_STATES_TYPE,
+                JOINT_STATES_RATE_HZ,
+            )
 
     def _carry_out(self, plan: SpawnPlan) -> None:
         for name in plan.load:
             if not self._call("load_controller", LoadController, name).ok:
-                raise SpawnError(f"controller '{name}' of {self._file.path} could not be loaded; the log of the "
-                                 "controller manager says why")
+                raise SpawnError(
+                    f"controller '{name}' of {self._file.path} could not be loaded; the log of the "
+                    "controller manager says why"
+                )
         if plan.start:
-            self._call("switch_controller", SwitchController, list(plan.start), [],
-                       SwitchControllerRequest.BEST_EFFORT, False, 0.0)
+            self._call(
+                "switch_controller",
+                SwitchController,
+                list(plan.start),
+                [],
+                SwitchControllerRequest.BEST_EFFORT,
+                False,
+                0.0,
+            )
 
     def _states(self) -> dict[str, str]:
         return {entry.name: entry.state for entry in self._call("list_controllers", ListControllers).controller}
@@ -115,8 +138,11 @@ class RobotControllersSpawner:
     def _call(self, name: str, kind: Any, *arguments: Any) -> Any:
         service = rospy.resolve_name(f"controller_manager/{name}")
         proxy = rospy.ServiceProxy(service, kind)
-        self._wait(lambda: self._available(proxy), lambda: f"service {service}",
-                   "is the simulation or the node robot_hw running?")
+        self._wait(
+            lambda: self._available(proxy),
+            lambda: f"service {service}",
+            "is the simulation or the node robot_hw running?",
+        )
         try:
             return call_service(proxy, kind._request_class(*arguments), CALL_TIMEOUT_S)
         except CallError as error:
@@ -138,12 +164,16 @@ class RobotControllersSpawner:
         except ControllerFileError as error:
             raise SpawnError(str(error)) from error
         ready = {hardware: threading.Event() for hardware in topics}
-        subscribers = [rospy.Subscriber(topic, Bool, _set_when_true, ready[hardware])
-                       for hardware, topic in topics.items()]
+        subscribers = [
+            rospy.Subscriber(topic, Bool, _set_when_true, ready[hardware]) for hardware, topic in topics.items()
+        ]
 
         def missing() -> str:
-            return ", ".join(f"topic {rospy.resolve_name(topics[name])} of hardware '{name}' to say True"
-                             for name, event in ready.items() if not event.is_set())
+            return ", ".join(
+                f"topic {rospy.resolve_name(topics[name])} of hardware '{name}' to say True"
+                for name, event in ready.items()
+                if not event.is_set()
+            )
 
         self._wait(lambda: not missing(), missing, "is the hardware connected and its driver running?")
         for subscriber in subscribers:

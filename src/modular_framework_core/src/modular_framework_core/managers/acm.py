@@ -4,6 +4,7 @@
 The reference matrix comes from the planning scene. Objects that appear later are added to it; the manipulator may then
 be allowed to touch itself or some objects. Forbidding again restores the reference.
 """
+
 from __future__ import annotations
 
 import threading
@@ -43,8 +44,9 @@ class AcmManager:
     _manipulator_links: tuple[str, ...] = ()
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
-    def set_initial(self, matrix: CollisionMatrix, manipulator_indices: Sequence[int] = (),
-                    manipulator_prefix: str = "") -> bool:
+    def set_initial(
+        self, matrix: CollisionMatrix, manipulator_indices: Sequence[int] = (), manipulator_prefix: str = ""
+    ) -> bool:
         """Takes a new reference matrix and drops every permission given so far.
 
         Args:
@@ -60,8 +62,10 @@ class AcmManager:
         """
         outside = [index for index in manipulator_indices if not 0 <= index < len(matrix.names)]
         if outside:
-            raise AcmError(f"manipulator_links_indices holds {outside}, the matrix has {len(matrix.names)} entries "
-                           f"(0 to {len(matrix.names) - 1}); compute the indices from the matrix that is sent.")
+            raise AcmError(
+                f"manipulator_links_indices holds {outside}, the matrix has {len(matrix.names)} entries "
+                f"(0 to {len(matrix.names) - 1}); compute the indices from the matrix that is sent."
+            )
         links = [matrix.names[index] for index in manipulator_indices]
         if not links and manipulator_prefix:
             links = [name for name in matrix.names if manipulator_prefix in name]
@@ -158,7 +162,7 @@ class AcmManager:
             initial, table = self._require_initial()
             chosen = self._chosen(links)
             for position, first in enumerate(chosen):
-                for second in chosen[position + 1:]:
+                for second in chosen[position + 1 :]:
                     table.set(first, second, allow or bool(initial.allowed(first, second)))
             return AcmAnswer(self._matrix(), _link_warnings(chosen))
 
@@ -180,8 +184,9 @@ class AcmManager:
             initial, table = self._require_initial()
             chosen, wanted = self._chosen(links), list(objects)
             targets, unknown = _match(wanted, table, chosen) if wanted else (list(self._objects), [])
-            warnings = [f"No entry of the collision matrix belongs to the object '{name}'; add it first."
-                        for name in unknown]
+            warnings = [
+                f"No entry of the collision matrix belongs to the object '{name}'; add it first." for name in unknown
+            ]
             if not wanted and not targets:
                 warnings.append("No object was added to the collision matrix; the manipulator may touch none.")
             for target in targets:
@@ -196,15 +201,21 @@ class AcmManager:
             if self._initial is None or self._table is None:
                 return frozenset()
             names, reference = self._table.names, self._initial.rows  # its entries come first, objects after them
-            return frozenset(frozenset((names[i], names[j])) for i, row in enumerate(self._table.rows)
-                             for j in range(i) if row[j] and not (i < len(reference) and reference[i][j]))
+            return frozenset(
+                frozenset((names[i], names[j]))
+                for i, row in enumerate(self._table.rows)
+                for j in range(i)
+                if row[j] and not (i < len(reference) and reference[i][j])
+            )
 
     def _chosen(self, links: Sequence[str]) -> tuple[str, ...]:
         initial, _ = self._require_initial()
         for link in links:
             if link not in initial.names:
-                raise AcmError(f"The collision matrix has no link '{link}'; it has {', '.join(initial.names)}"
-                               f"{nearest(link, initial.names)}")
+                raise AcmError(
+                    f"The collision matrix has no link '{link}'; it has {', '.join(initial.names)}"
+                    f"{nearest(link, initial.names)}"
+                )
         return tuple(dict.fromkeys(links)) or self._manipulator_links
 
     def _require_initial(self) -> tuple[CollisionMatrix, MutableMatrix]:
@@ -222,8 +233,9 @@ class AcmManager:
 
     def _matrix(self) -> CollisionMatrix:
         initial, table = self._require_initial()
-        return CollisionMatrix(tuple(table.names), tuple(tuple(row) for row in table.rows), initial.default_names,
-                               initial.default_values)
+        return CollisionMatrix(
+            tuple(table.names), tuple(tuple(row) for row in table.rows), initial.default_names, initial.default_values
+        )
 
 
 def object_id(entry_name: str) -> str:
@@ -259,5 +271,7 @@ def _match(wanted: Sequence[str], table: MutableMatrix, links: Sequence[str]) ->
 def _link_warnings(links: Sequence[str]) -> tuple[str, ...]:
     if links:
         return ()
-    return ("No link of the manipulator is known; set manipulator_links_indices or manipulator_prefix "
-            "and send the reference matrix again.",)
+    return (
+        "No link of the manipulator is known; set manipulator_links_indices or manipulator_prefix "
+        "and send the reference matrix again.",
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The table of pairs of links and objects that may touch."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -30,13 +31,17 @@ class CollisionMatrix:
         size = len(self.names)
         widths = {len(row) for row in self.rows}
         if len(self.rows) != size or (size and widths != {size}):
-            raise AcmError(f"The collision matrix names {size} entries but has {len(self.rows)} rows of widths "
-                           f"{sorted(widths)}; it must be square.")
+            raise AcmError(
+                f"The collision matrix names {size} entries but has {len(self.rows)} rows of widths "
+                f"{sorted(widths)}; it must be square."
+            )
         if len(set(self.names)) != size:
             raise AcmError("The collision matrix names an entry twice; every name must be unique.")
         if len(self.default_names) != len(self.default_values):
-            raise AcmError(f"The collision matrix has {len(self.default_names)} default names but "
-                           f"{len(self.default_values)} default values.")
+            raise AcmError(
+                f"The collision matrix has {len(self.default_names)} default names but "
+                f"{len(self.default_values)} default values."
+            )
 
     def allowed(self, first: str, second: str) -> bool | None:
         """Returns whether a pair may touch, None when one of the two is not in the table."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the joints of the robot and their bounds, so that a named joint state is checked before it is used."""
+
 from __future__ import annotations
 
 import math

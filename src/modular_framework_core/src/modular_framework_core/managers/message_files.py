@@ -4,6 +4,7 @@
 A saved file is JSON, which is YAML too, one line a message: a parser of JSON reads a plan hundreds of times as fast as
 one of YAML, which is kept for files that were written or changed by hand.
 """
+
 from __future__ import annotations
 
 import io
@@ -49,8 +50,10 @@ def path_of(text: str, folder: Path, others: Iterable[Path] = ()) -> Path:
     if not text or path.suffix not in SUFFIXES:
         raise MessageFileError(f"path {text!r}: a file that ends in {' or '.join(SUFFIXES)} is needed, in {folder}")
     if not inside:
-        raise MessageFileError(f"path {text!r} is outside of the managers' folder {folder}; name a file in it, or "
-                               "start the managers with another one (parameter ~file_directory)")
+        raise MessageFileError(
+            f"path {text!r} is outside of the managers' folder {folder}; name a file in it, or "
+            "start the managers with another one (parameter ~file_directory)"
+        )
     return path
 
 
@@ -71,8 +74,18 @@ def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[An
     """
     by_name = [f" {json.dumps(name)}: {flow_text(message)}" for name, message in named.items()]
     waiting = [f" {flow_text(message)}" for message in anonymous]
-    text = "\n".join([f'{{"kind": {json.dumps(kind)},', '"named": {', ",\n".join(by_name), "},", '"anonymous": [',
-                      ",\n".join(waiting), "]}", ""])
+    text = "\n".join(
+        [
+            f'{{"kind": {json.dumps(kind)},',
+            '"named": {',
+            ",\n".join(by_name),
+            "},",
+            '"anonymous": [',
+            ",\n".join(waiting),
+            "]}",
+            "",
+        ]
+    )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text, mode=0o600)
@@ -102,15 +115,18 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:
         found = content.get("kind") if isinstance(content, dict) else None
-        raise MessageFileError(f"{path} holds messages of the kind '{found}'; a saved file of the kind '{kind}' is "
-                               "needed")
+        raise MessageFileError(
+            f"{path} holds messages of the kind '{found}'; a saved file of the kind '{kind}' is needed"
+        )
     given, waiting = content.get("named") or {}, content.get("anonymous") or []
     if not isinstance(given, dict) or not isinstance(waiting, list):
         raise MessageFileError(f"{path}: 'named' must be a mapping of names to messages and 'anonymous' a list")
     faults: list[str] = []
     named = {str(name): _filled(message_type, value, f"{path}: '{name}'", faults) for name, value in given.items()}
-    anonymous = [_filled(message_type, value, f"{path}: anonymous message {number}", faults)
-                 for number, value in enumerate(waiting, start=1)]
+    anonymous = [
+        _filled(message_type, value, f"{path}: anonymous message {number}", faults)
+        for number, value in enumerate(waiting, start=1)
+    ]
     if faults:
         raise MessageFileError("\n".join(faults))
     return named, anonymous
@@ -120,8 +136,9 @@ class _YamlLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignor
     """Reads numbers as JSON has them, too: YAML 1.1 reads 1e-07, NaN and Infinity as text."""
 
 
-_YamlLoader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+[eE][-+]?\d+|NaN|Infinity)$"),
-                                  [*"-+0123456789NI"])
+_YamlLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+[eE][-+]?\d+|NaN|Infinity)$"), [*"-+0123456789NI"]
+)
 
 
 def _parsed(text: str) -> Any:

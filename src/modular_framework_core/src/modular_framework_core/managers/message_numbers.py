@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds positions in a message that are no finite numbers: no robot can go there, and no planner takes them."""
+
 from __future__ import annotations
 
 import math
@@ -23,8 +24,10 @@ def unusable_position(message: Any, where: str = "") -> str:
         value = getattr(message, name)
         path = f"{where}.{name}".lstrip(".")
         if part is not None and is_list:
-            found = next((text for number, item in enumerate(value)
-                          if (text := unusable_position(item, f"{path}[{number}]"))), "")
+            found = next(
+                (text for number, item in enumerate(value) if (text := unusable_position(item, f"{path}[{number}]"))),
+                "",
+            )
         elif part is not None:
             found = unusable_position(value, path) if hasattr(value, "_type") else ""
         elif is_list and name in _LISTS:

@@ -4,6 +4,7 @@
 A message stored with a name stays until it is overwritten or removed. A message stored without a name joins a queue:
 the oldest is handed out first and leaves the queue for good.
 """
+
 from __future__ import annotations
 
 import threading
@@ -59,8 +60,10 @@ class MessageNotFoundError(LookupError):
         if name:
             text = f"No {kind} named '{name}' is stored. Stored names: {allowed}. Add it first or correct the name."
         else:
-            text = (f"No anonymous {kind} is waiting to be read: none was added, or all were handed out already. "
-                    f"Stored names: {allowed}. Add one, or ask by name.")
+            text = (
+                f"No anonymous {kind} is waiting to be read: none was added, or all were handed out already. "
+                f"Stored names: {allowed}. Add one, or ask by name."
+            )
         super().__init__(text)
 
 
@@ -73,8 +76,12 @@ class MessageStore(Generic[MessageT]):
         on_change: Called after each change, in the order of the changes; must not call the store.
     """
 
-    def __init__(self, kind: str, on_named: Callable[[MessageT, str], None] | None = None,
-                 on_change: Callable[[Change], None] | None = None) -> None:
+    def __init__(
+        self,
+        kind: str,
+        on_named: Callable[[MessageT, str], None] | None = None,
+        on_change: Callable[[Change], None] | None = None,
+    ) -> None:
         self.kind = kind
         self._on_named = on_named
         self._on_change = on_change

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads joint states a user has given names to, and keeps the good ones when some are wrong."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads poses a user has given names to: of one thing each, or of several end effectors of a robot at once."""
+
 from __future__ import annotations
 
 import math

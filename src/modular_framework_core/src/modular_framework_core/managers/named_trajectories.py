@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads trajectories written as lists of named joint states, and times them."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -93,13 +94,17 @@ def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -
     for waypoint in waypoints:
         joints = lookup(waypoint.joint_state_name)
         if not joints:
-            raise waypoint.entry.fault(f"no joint state named '{waypoint.joint_state_name}' is stored; "
-                                       "add it to the named joint states or correct the name")
+            raise waypoint.entry.fault(
+                f"no joint state named '{waypoint.joint_state_name}' is stored; "
+                "add it to the named joint states or correct the name"
+            )
         names = tuple(sorted(joints))
         joint_names = joint_names or names
         if names != joint_names:
-            raise waypoint.entry.fault(f"joint state '{waypoint.joint_state_name}' has the joints {list(names)}, "
-                                       f"the first waypoint has {list(joint_names)}; they must be the same")
+            raise waypoint.entry.fault(
+                f"joint state '{waypoint.joint_state_name}' has the joints {list(names)}, "
+                f"the first waypoint has {list(joint_names)}; they must be the same"
+            )
         positions = tuple(joints[joint] for joint in joint_names)
         time_s += waypoint.interpolate_time_s
         points.append((positions, time_s))

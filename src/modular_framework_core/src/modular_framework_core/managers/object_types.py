@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Remembers which model each simulated object was made from."""
+
 from __future__ import annotations
 
 import threading
@@ -26,8 +27,10 @@ class ObjectTypes:
             if not object_name:
                 raise ObjectTypeError("An object needs a name, got an empty one.")
             if object_name in self._types:
-                raise ObjectTypeError(f"An object named '{object_name}' exists already (type "
-                                      f"'{self._types[object_name]}'); delete it first or choose another name.")
+                raise ObjectTypeError(
+                    f"An object named '{object_name}' exists already (type "
+                    f"'{self._types[object_name]}'); delete it first or choose another name."
+                )
             self._types[object_name] = object_type
 
     def get(self, object_name: str) -> str:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Serves the allowed collision matrix of the manipulator on the wire."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -50,7 +51,8 @@ def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
         entry_names=list(matrix.names),
         entry_values=[AllowedCollisionEntry(enabled=list(row)) for row in matrix.rows],
         default_entry_names=list(matrix.default_names),
-        default_entry_values=list(matrix.default_values))
+        default_entry_values=list(matrix.default_values),
+    )
 
 
 def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
@@ -64,8 +66,10 @@ def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
     scene = PlanningScene(is_diff=True, allowed_collision_matrix=message)
     scene.robot_state.is_diff = True
     if not call_service(proxy, ApplyPlanningSceneRequest(scene=scene), timeout_s).success:
-        raise CallError(f"service '{proxy.resolved_name}' did not take the collision matrix of "
-                        f"{len(message.entry_names)} entries; its node logged the reason")
+        raise CallError(
+            f"service '{proxy.resolved_name}' did not take the collision matrix of "
+            f"{len(message.entry_names)} entries; its node logged the reason"
+        )
 
 
 class AcmServices:
@@ -93,10 +97,12 @@ class AcmServices:
     def connect(self) -> None:
         """Advertises the services."""
         entry_type = UpdateAndPublishACMEntry if rospy.get_param("~grip_interfaces", False) else UpdateACMEntry
-        self._services = [rospy.Service("set_init_acm", SetInitACM, self._set_init),
-                          rospy.Service("update_acm_entry", entry_type, self._update_entry),
-                          rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified),
-                          rospy.Service("modify_acm", ModifyACM, self._modify_links)]
+        self._services = [
+            rospy.Service("set_init_acm", SetInitACM, self._set_init),
+            rospy.Service("update_acm_entry", entry_type, self._update_entry),
+            rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified),
+            rospy.Service("modify_acm", ModifyACM, self._modify_links),
+        ]
 
     def close(self) -> None:
         """Withdraws the services; may be called twice."""
@@ -107,8 +113,10 @@ class AcmServices:
         try:
             indices = rospy.get_param(INDICES_PARAMETER, [])
             if not isinstance(indices, list) or not all(type(index) is int for index in indices):
-                raise AcmError(f"parameter '{rospy.resolve_name(INDICES_PARAMETER)}' is {indices!r}, "
-                               "expected a list of whole numbers")
+                raise AcmError(
+                    f"parameter '{rospy.resolve_name(INDICES_PARAMETER)}' is {indices!r}, "
+                    "expected a list of whole numbers"
+                )
             prefix = "" if indices else str(rospy.get_param(PREFIX_PARAMETER, ""))
             if self.manager.set_initial(matrix_from_message(request.acm), indices, prefix):
                 rospy.loginfo("set_init_acm: an earlier reference collision matrix was replaced.")
@@ -119,8 +127,9 @@ class AcmServices:
 
     def _update_entry(self, request: Any) -> Any:
         before, publish = self.manager.permissions(), bool(getattr(request, "publish", False))
-        response = UpdateACMEntryResponse if isinstance(request, UpdateACMEntryRequest) else (
-            UpdateAndPublishACMEntryResponse)
+        response = (
+            UpdateACMEntryResponse if isinstance(request, UpdateACMEntryRequest) else (UpdateAndPublishACMEntryResponse)
+        )
         try:
             warning = self._apply_update(request.action, request.entry_name)
             if publish or before - self.manager.permissions():
@@ -169,8 +178,10 @@ class AcmServices:
                 self._add_simulated_objects()
                 return self.manager.allow_object_collision(request.objects, request.allow_collision)
             case _:
-                raise AcmError(f"got modification {request.modification}, allowed are NOTHING=0, "
-                               "MANIPULATOR_SELF_COLLISION=1, MANIPULATOR_OBJECT_COLLISION=2")
+                raise AcmError(
+                    f"got modification {request.modification}, allowed are NOTHING=0, "
+                    "MANIPULATOR_SELF_COLLISION=1, MANIPULATOR_OBJECT_COLLISION=2"
+                )
 
     def _modify_links(self, request: Any) -> ModifyACMResponse:
         try:
@@ -190,11 +201,14 @@ class AcmServices:
                 return self.manager.allow_self_collision(request.allow_collision, request.robot_links)
             case ModifyACMRequest.ROBOT_OBJECT_COLLISION:
                 self._add_simulated_objects()
-                return self.manager.allow_object_collision(request.objects, request.allow_collision,
-                                                           request.robot_links)
+                return self.manager.allow_object_collision(
+                    request.objects, request.allow_collision, request.robot_links
+                )
             case _:
-                raise AcmError(f"got modification {request.modification}, allowed are ROBOT_SELF_COLLISION=0, "
-                               "ROBOT_OBJECT_COLLISION=1")
+                raise AcmError(
+                    f"got modification {request.modification}, allowed are ROBOT_SELF_COLLISION=0, "
+                    "ROBOT_OBJECT_COLLISION=1"
+                )
 
     def _add_simulated_objects(self) -> None:
         """Adds what a world file or another node has put into the simulation since the last request."""
@@ -202,5 +216,8 @@ class AcmServices:
             for name in new_movable_objects(self.manager.objects):
                 self.manager.add_object(name)
         except CallError as error:
-            rospy.logwarn("get_modified_acm: the objects of the simulation cannot be looked up, only those that were "
-                          "added are known: %s", error)
+            rospy.logwarn(
+                "get_modified_acm: the objects of the simulation cannot be looked up, only those that were "
+                "added are known: %s",
+                error,
+            )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Serves message stores on the wire: the services of each kind of message, and what changed."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -50,17 +51,34 @@ class MessageKind:
         return type(getattr(self.add_type._request_class(), self.message_field))
 
 
-JOINT_STATE = MessageKind("joint state", srv.AddJointState, srv.GetJointState, "joint_state", "joint_state_name",
-                          ("joint_state",), "joint_states")
-TRAJECTORY = MessageKind("trajectory", srv.AddJointTrajectory, srv.GetJointTrajectory, "joint_trajectory",
-                         "trajectory_name", ("trajectory",), "trajectories")
-POSE = MessageKind("pose", srv.AddPoseStamped, srv.GetPoseStamped, "pose_stamped", "pose_name",
-                   ("pose_stamped", "pose"), "poses")
-ROBOT_POSE = MessageKind("robot pose", srv.AddRobotPose, srv.GetRobotPose, "robot_pose", "robot_pose_name",
-                         ("robot_pose",), "robot_poses")
+JOINT_STATE = MessageKind(
+    "joint state",
+    srv.AddJointState,
+    srv.GetJointState,
+    "joint_state",
+    "joint_state_name",
+    ("joint_state",),
+    "joint_states",
+)
+TRAJECTORY = MessageKind(
+    "trajectory",
+    srv.AddJointTrajectory,
+    srv.GetJointTrajectory,
+    "joint_trajectory",
+    "trajectory_name",
+    ("trajectory",),
+    "trajectories",
+)
+POSE = MessageKind(
+    "pose", srv.AddPoseStamped, srv.GetPoseStamped, "pose_stamped", "pose_name", ("pose_stamped", "pose"), "poses"
+)
+ROBOT_POSE = MessageKind(
+    "robot pose", srv.AddRobotPose, srv.GetRobotPose, "robot_pose", "robot_pose_name", ("robot_pose",), "robot_poses"
+)
 PLAN = MessageKind("plan", srv.AddMoveitPlan, srv.GetMoveitPlan, "moveit_plan", "plan_name", ("plan",), "plans")
-GRASP = MessageKind("grasp", srv.AddStandardisedGrasp, srv.GetStandardisedGrasp, "grasp_message", "grasp_name",
-                    ("grasp",), "grasps")
+GRASP = MessageKind(
+    "grasp", srv.AddStandardisedGrasp, srv.GetStandardisedGrasp, "grasp_message", "grasp_name", ("grasp",), "grasps"
+)
 
 
 def complete_grasp_id(grasp: Any, name: str) -> None:
@@ -106,8 +124,9 @@ class MessageServices:
         """Reads the file of named messages, if there is one; nothing is advertised before :meth:`connect`."""
         self.kind = kind
         self._file = named_file
-        self.store: MessageStore[Any] = MessageStore(kind.noun, complete_grasp_id if kind is GRASP else None,
-                                                     self._publish_change)
+        self.store: MessageStore[Any] = MessageStore(
+            kind.noun, complete_grasp_id if kind is GRASP else None, self._publish_change
+        )
         self._services: list[rospy.Service] = []
         self._changes: rospy.Publisher | None = None
         if named_file is not None:
@@ -139,8 +158,11 @@ class MessageServices:
 
     def _publish_change(self, change: Change) -> None:
         if self._changes is not None:
-            self._changes.publish(ManagerChange(rospy.Time.now(), self.kind.noun, change.action.value, change.name,
-                                                change.named, change.anonymous))
+            self._changes.publish(
+                ManagerChange(
+                    rospy.Time.now(), self.kind.noun, change.action.value, change.name, change.named, change.anonymous
+                )
+            )
 
     def _add(self, request: Any) -> Any:
         name = getattr(request, self.kind.name_field)
@@ -195,10 +217,15 @@ class MessageServices:
             named, anonymous = message_files.load(path, self.kind.noun, self.kind.message_type)
         except message_files.MessageFileError as error:
             return self._refused(str(error))
-        messages = [*((f"'{name}'", item) for name, item in named.items()),
-                    *((f"anonymous message {number}", item) for number, item in enumerate(anonymous, start=1))]
-        wrong = [f"{path}: {what}: {found}; give finite positions" for what, item in messages
-                 if (found := unusable_position(item))]
+        messages = [
+            *((f"'{name}'", item) for name, item in named.items()),
+            *((f"anonymous message {number}", item) for number, item in enumerate(anonymous, start=1)),
+        ]
+        wrong = [
+            f"{path}: {what}: {found}; give finite positions"
+            for what, item in messages
+            if (found := unusable_position(item))
+        ]
         if wrong:
             return self._refused("\n".join(wrong))
         self.store.load(named, anonymous)
@@ -207,8 +234,10 @@ class MessageServices:
     def _reload(self, request: Any) -> Any:
         if self._file is None:
             if request.path:
-                return self._refused(f"no file of named messages is known for the kind '{self.kind.noun}'; "
-                                     f"load_{self.kind.plural} reads saved files")
+                return self._refused(
+                    f"no file of named messages is known for the kind '{self.kind.noun}'; "
+                    f"load_{self.kind.plural} reads saved files"
+                )
             self.store.clear()
             return srv.MessageFileResponse(success=True)
         file = self._file
@@ -233,8 +262,9 @@ class MessageServices:
         if faults and not named:
             return 0, faults
         self.store.load(named, clear=True)
-        rospy.loginfo("Loaded the %s of %s: %s.", self.kind.plural.replace("_", " "), file.path,
-                      ", ".join(named) or "none")
+        rospy.loginfo(
+            "Loaded the %s of %s: %s.", self.kind.plural.replace("_", " "), file.path, ", ".join(named) or "none"
+        )
         return len(named), faults
 
     def _refused(self, reason: str, count: int = 0) -> Any:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the messages of the files of named joint states, trajectories and poses."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -32,8 +33,10 @@ def joint_state_message(state: NamedJointState) -> JointState:
 
 def trajectory_message(trajectory: TimedTrajectory) -> JointTrajectory:
     """Converts a timed trajectory; only positions and times are filled."""
-    points = [JointTrajectoryPoint(positions=list(positions), time_from_start=rospy.Duration.from_sec(time_s))
-              for positions, time_s in trajectory.points]
+    points = [
+        JointTrajectoryPoint(positions=list(positions), time_from_start=rospy.Duration.from_sec(time_s))
+        for positions, time_s in trajectory.points
+    ]
     return JointTrajectory(joint_names=list(trajectory.joint_names), points=points)
 
 

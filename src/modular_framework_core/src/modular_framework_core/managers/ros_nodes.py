@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Starts the managers: all of them in one node, or one of them in a node of its own."""
+
 from __future__ import annotations
 
 import gc
@@ -75,8 +76,10 @@ def run_all() -> None:
     file of poses may be missing: older configurations have none.
     """
     arguments = [*start("managers"), "", "", ""]
-    files = [str(rospy.get_param(f"~named_{name}_file", argument)) for name, argument in
-             zip(("joint_states", "trajectories", "poses"), arguments, strict=False)]
+    files = [
+        str(rospy.get_param(f"~named_{name}_file", argument))
+        for name, argument in zip(("joint_states", "trajectories", "poses"), arguments, strict=False)
+    ]
 
     def named(path: str, read: Callable[[Path], NamedMessages]) -> NamedFile | None:
         return NamedFile(Path(path), read) if path else None
@@ -85,11 +88,14 @@ def run_all() -> None:
         rospy.loginfo("There is no file of named poses: %s", files[2])
         files[2] = ""
     joint_states = MessageServices(kinds.JOINT_STATE, named(files[0], read_joint_states))
-    services = [joint_states,
-                MessageServices(kinds.TRAJECTORY, named(files[1], trajectory_reader(joint_lookup(joint_states)))),
-                MessageServices(kinds.POSE, named(files[2], read_poses)),
-                MessageServices(kinds.ROBOT_POSE, named(files[2], read_robot_poses)),
-                MessageServices(kinds.PLAN), MessageServices(kinds.GRASP)]
+    services = [
+        joint_states,
+        MessageServices(kinds.TRAJECTORY, named(files[1], trajectory_reader(joint_lookup(joint_states)))),
+        MessageServices(kinds.POSE, named(files[2], read_poses)),
+        MessageServices(kinds.ROBOT_POSE, named(files[2], read_robot_poses)),
+        MessageServices(kinds.PLAN),
+        MessageServices(kinds.GRASP),
+    ]
     for service in (*services, AcmServices(), ObjectTypeServices()):
         service.connect()
     rospy.spin()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Serves the types of simulated objects on the wire."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -32,9 +33,11 @@ class ObjectTypeServices:
 
     def connect(self) -> None:
         """Advertises the services."""
-        self._services = [rospy.Service("add_gazebo_mapping", AddGazeboMapping, self._add),
-                          rospy.Service("get_object_type", GetGazeboType, self._get),
-                          rospy.Service("delete_gazebo_mapping", DeleteGazeboMapping, self._delete)]
+        self._services = [
+            rospy.Service("add_gazebo_mapping", AddGazeboMapping, self._add),
+            rospy.Service("get_object_type", GetGazeboType, self._get),
+            rospy.Service("delete_gazebo_mapping", DeleteGazeboMapping, self._delete),
+        ]
 
     def close(self) -> None:
         """Withdraws the services; may be called twice."""

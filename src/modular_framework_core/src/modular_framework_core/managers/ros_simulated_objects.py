@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the movable objects of a simulation, so that a world file's objects need not be added to the matrix by hand."""
+
 from __future__ import annotations
 
 from collections.abc import Collection

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parses the command line that adds an object to the simulation or removes it."""
+
 from __future__ import annotations
 
 import argparse
@@ -58,21 +59,37 @@ def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
     file = Path(options.file).expanduser() if options.file else None
     name = options.name or (options.type if not file else options.type or file.resolve().parent.name)
     if not name:
-        raise ObjectRequestError("neither a name (-n), a type (-t) nor a file (-f) is given; "
-                                 f"{'give the name of the object to delete' if delete else 'give a type or a file'}")
+        raise ObjectRequestError(
+            "neither a name (-n), a type (-t) nor a file (-f) is given; "
+            f"{'give the name of the object to delete' if delete else 'give a type or a file'}"
+        )
     sdf_file = None
     if not delete:
         sdf_file = file or _model_file(options.type, model_path)
         if not sdf_file.is_file():
-            raise ObjectRequestError(f"there is no file '{sdf_file}'; give the path of an SDF file (-f) or a type (-t) "
-                                     f"that is a folder of '{model_path or 'gazebo_model_path'}' with a {MODEL_FILE}")
-    return ObjectRequest(delete, name, str(file) if file else options.type or name, sdf_file,
-                         _triplet("position", options.position), _triplet("orientation", options.orientation),
-                         options.reference)
+            raise ObjectRequestError(
+                f"there is no file '{sdf_file}'; give the path of an SDF file (-f) or a type (-t) "
+                f"that is a folder of '{model_path or 'gazebo_model_path'}' with a {MODEL_FILE}"
+            )
+    return ObjectRequest(
+        delete,
+        name,
+        str(file) if file else options.type or name,
+        sdf_file,
+        _triplet("position", options.position),
+        _triplet("orientation", options.orientation),
+        options.reference,
+    )
 
 
-def request_to_spawn(name: str, object_type: str, position_m: Sequence[float], rpy_rad: Sequence[float],
-                     reference_frame: str, model_path: str) -> ObjectRequest:
+def request_to_spawn(
+    name: str,
+    object_type: str,
+    position_m: Sequence[float],
+    rpy_rad: Sequence[float],
+    reference_frame: str,
+    model_path: str,
+) -> ObjectRequest:
     """Makes a request to spawn an object by its type.
 
     Args:
@@ -88,10 +105,18 @@ def request_to_spawn(name: str, object_type: str, position_m: Sequence[float], r
     """
     file = _model_file(object_type, model_path)
     if not file.is_file():
-        raise ObjectRequestError(f"there is no file '{file}'; the type must be a folder of '{model_path}' with a "
-                                 f"{MODEL_FILE}")
-    return ObjectRequest(False, name, object_type, file, _triplet("position", position_m),
-                         _triplet("orientation", rpy_rad), reference_frame)
+        raise ObjectRequestError(
+            f"there is no file '{file}'; the type must be a folder of '{model_path}' with a {MODEL_FILE}"
+        )
+    return ObjectRequest(
+        False,
+        name,
+        object_type,
+        file,
+        _triplet("position", position_m),
+        _triplet("orientation", rpy_rad),
+        reference_frame,
+    )
 
 
 def request_to_delete(name: str) -> ObjectRequest:
@@ -103,8 +128,10 @@ def _model_file(object_type: str, model_path: str) -> Path:
     if not object_type:
         raise ObjectRequestError("neither a type (-t) nor a file (-f) is given; one of them says what to spawn")
     if not model_path:
-        raise ObjectRequestError("parameter 'gazebo_model_path' is not set, so the type cannot be found; set it to the "
-                                 "folder of the models, or give a file (-f)")
+        raise ObjectRequestError(
+            "parameter 'gazebo_model_path' is not set, so the type cannot be found; set it to the "
+            "folder of the models, or give a file (-f)"
+        )
     return Path(model_path) / object_type / MODEL_FILE
 
 
@@ -125,15 +152,23 @@ def _triplet(what: str, values: Sequence[str] | Sequence[float]) -> tuple[float,
     except ValueError as error:
         raise ObjectRequestError(f"the {what} is {list(values)}, expected three numbers: {error}") from error
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise ObjectRequestError(f"the {what} has the values {numbers}, expected three finite numbers separated by "
-                                 "spaces or commas")
+        raise ObjectRequestError(
+            f"the {what} has the values {numbers}, expected three finite numbers separated by spaces or commas"
+        )
     return (numbers[0], numbers[1], numbers[2])
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="manage_object", description="Spawns or deletes an object of the simulation.")
-    parser.add_argument("-d", "--delete", nargs="?", const="true", default="false",
-                        choices=["False", "false", "True", "true"], help="delete the object instead of spawning it")
+    parser.add_argument(
+        "-d",
+        "--delete",
+        nargs="?",
+        const="true",
+        default="false",
+        choices=["False", "false", "True", "true"],
+        help="delete the object instead of spawning it",
+    )
     parser.add_argument("-n", "--name", nargs="?", const="", default="", help="name; default: the type")
     parser.add_argument("-t", "--type", nargs="?", const="", default="", help="folder of the model")
     parser.add_argument("-p", "--position", nargs="*", default=["0", "0", "0"], help="x y z [m]")

@@ -4,6 +4,7 @@
 The simulation, the map of object types and the collision matrix must agree on which objects exist. When one of them
 refuses, what was done before is undone, and the exit code says so.
 """
+
 from __future__ import annotations
 
 import sys
@@ -74,21 +75,29 @@ def spawn(request: ObjectRequest) -> None:
     except (OSError, UnicodeDecodeError) as error:
         raise RefusedError(f"'{request.sdf_file}' cannot be read: {error}") from error
     pose = Pose(Point(*request.position_m), Quaternion(*quaternion_from_rpy(*request.rpy_rad)))
-    call("add_gazebo_mapping", srv.AddGazeboMapping,
-         srv.AddGazeboMappingRequest(object_name=request.name, object_type=request.object_type),
-         f"there is an object '{request.name}' already; choose another name (-n), or delete that one first")
+    call(
+        "add_gazebo_mapping",
+        srv.AddGazeboMapping,
+        srv.AddGazeboMappingRequest(object_name=request.name, object_type=request.object_type),
+        f"there is an object '{request.name}' already; choose another name (-n), or delete that one first",
+    )
     try:
-        call("gazebo/spawn_sdf_model", SpawnModel,
-             SpawnModelRequest(model_name=request.name, model_xml=xml, initial_pose=pose,
-                               reference_frame=request.reference_frame))
+        call(
+            "gazebo/spawn_sdf_model",
+            SpawnModel,
+            SpawnModelRequest(
+                model_name=request.name, model_xml=xml, initial_pose=pose, reference_frame=request.reference_frame
+            ),
+        )
         try:
             call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.ADD_ENTRY, request.name))
         except RefusedError:
             _undo("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
             raise
     except RefusedError:
-        _undo("delete_gazebo_mapping", srv.DeleteGazeboMapping,
-              srv.DeleteGazeboMappingRequest(object_name=request.name))
+        _undo(
+            "delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name)
+        )
         raise
 
 

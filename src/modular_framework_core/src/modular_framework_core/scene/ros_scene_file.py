@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Puts the objects of a text scene into the planning scene, and writes those it has to a file."""
+
 from __future__ import annotations
 
 import argparse
@@ -33,8 +34,12 @@ from modular_framework_ros.calls import CallError, call_service, wait_for_servic
 from modular_framework_ros.start_up import start_timeout
 
 SERVICE_TIMEOUT_S = 10.0
-PRIMITIVES = {"box": SolidPrimitive.BOX, "sphere": SolidPrimitive.SPHERE, "cylinder": SolidPrimitive.CYLINDER,
-              "cone": SolidPrimitive.CONE}
+PRIMITIVES = {
+    "box": SolidPrimitive.BOX,
+    "sphere": SolidPrimitive.SPHERE,
+    "cylinder": SolidPrimitive.CYLINDER,
+    "cone": SolidPrimitive.CONE,
+}
 
 
 def collision_object(thing: SceneObject) -> CollisionObject:
@@ -50,8 +55,12 @@ def collision_object(thing: SceneObject) -> CollisionObject:
                 message.planes.append(Plane(coef=list(shape.size)))
                 message.plane_poses.append(pose)
             case "mesh":
-                message.meshes.append(Mesh([MeshTriangle(list(indices)) for indices in shape.triangles],
-                                           [Point(*vertex) for vertex in shape.vertices]))
+                message.meshes.append(
+                    Mesh(
+                        [MeshTriangle(list(indices)) for indices in shape.triangles],
+                        [Point(*vertex) for vertex in shape.vertices],
+                    )
+                )
                 message.mesh_poses.append(pose)
             case "cylinder" | "cone":
                 radius, length = shape.size
@@ -70,23 +79,51 @@ def _pose(position: Vector, quaternion_xyzw: Vector) -> Pose:
 def scene_of(message: PlanningScene) -> Scene:
     """Converts the world of a planning scene; the octomap and attached objects have no place in a file."""
     colors = {item.id: (item.color.r, item.color.g, item.color.b, item.color.a) for item in message.object_colors}
-    return Scene(message.name or "(noname)", tuple(
-        SceneObject(item.id, *_vectors(item.pose), _shapes(item, colors.get(item.id, NO_COLOR)),
-                    tuple((name, *_vectors(pose)) for name, pose in
-                          zip(item.subframe_names, item.subframe_poses, strict=True)))
-        for item in message.world.collision_objects))
+    return Scene(
+        message.name or "(noname)",
+        tuple(
+            SceneObject(
+                item.id,
+                *_vectors(item.pose),
+                _shapes(item, colors.get(item.id, NO_COLOR)),
+                tuple(
+                    (name, *_vectors(pose)) for name, pose in zip(item.subframe_names, item.subframe_poses, strict=True)
+                ),
+            )
+            for item in message.world.collision_objects
+        ),
+    )
 
 
 def _shapes(message: CollisionObject, color: Vector) -> tuple[SceneShape, ...]:
     kinds = {number: kind for kind, number in PRIMITIVES.items()}
-    shapes = [SceneShape(kinds[solid.type], tuple(solid.dimensions[::-1] if kinds[solid.type] in ("cylinder", "cone")
-                                                  else solid.dimensions), *_vectors(pose), color=color)
-              for solid, pose in zip(message.primitives, message.primitive_poses, strict=True)]
-    shapes += [SceneShape("mesh", (), *_vectors(pose), tuple((p.x, p.y, p.z) for p in mesh.vertices),
-                          tuple(tuple(item.vertex_indices) for item in mesh.triangles), color)
-               for mesh, pose in zip(message.meshes, message.mesh_poses, strict=True)]
-    return (*shapes, *(SceneShape("plane", tuple(plane.coef), *_vectors(pose), color=color)
-                       for plane, pose in zip(message.planes, message.plane_poses, strict=True)))
+    shapes = [
+        SceneShape(
+            kinds[solid.type],
+            tuple(solid.dimensions[::-1] if kinds[solid.type] in ("cylinder", "cone") else solid.dimensions),
+            *_vectors(pose),
+            color=color,
+        )
+        for solid, pose in zip(message.primitives, message.primitive_poses, strict=True)
+    ]
+    shapes += [
+        SceneShape(
+            "mesh",
+            (),
+            *_vectors(pose),
+            tuple((p.x, p.y, p.z) for p in mesh.vertices),
+            tuple(tuple(item.vertex_indices) for item in mesh.triangles),
+            color,
+        )
+        for mesh, pose in zip(message.meshes, message.mesh_poses, strict=True)
+    ]
+    return (
+        *shapes,
+        *(
+            SceneShape("plane", tuple(plane.coef), *_vectors(pose), color=color)
+            for plane, pose in zip(message.planes, message.plane_poses, strict=True)
+        ),
+    )
 
 
 def _vectors(pose: Pose) -> tuple[Vector, Vector]:
@@ -150,8 +187,11 @@ def main() -> int:
         rospy.logfatal("moveit_publish_scene_from_text: %s", error)
         return 1
     if not applied:
-        rospy.logfatal("moveit_publish_scene_from_text: service '%s' refused the objects of %s; its node logged the "
-                       "reason", rospy.resolve_name("apply_planning_scene"), arguments.file)
+        rospy.logfatal(
+            "moveit_publish_scene_from_text: service '%s' refused the objects of %s; its node logged the reason",
+            rospy.resolve_name("apply_planning_scene"),
+            arguments.file,
+        )
         return 1
     rospy.loginfo("The planning scene has the %d objects of %s.", len(scene.objects), arguments.file)
     return 0

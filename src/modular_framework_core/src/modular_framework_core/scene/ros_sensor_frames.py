@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes where the sensors stand, so that TF knows their frames."""
+
 from __future__ import annotations
 
 import sys
@@ -74,8 +75,9 @@ class SensorFrames:
             rospy.loginfo("Sensor frames: %s.", ", ".join(f"{frame.frame} in {frame.parent_frame}" for frame in frames))
         gone = sorted(self._published - {frame.frame for frame in frames})
         self._published |= {frame.frame for frame in frames}
-        stay = [f"frame '{name}' is not in the file any more; TF keeps it until this node is started again"
-                for name in gone]
+        stay = [
+            f"frame '{name}' is not in the file any more; TF keeps it until this node is started again" for name in gone
+        ]
         return [*map(str, faults), *stay]
 
     def _reload(self, request: object) -> TriggerResponse:
@@ -92,8 +94,10 @@ def main() -> int:
     rospy.init_node("sensors_tf2_broadcaster")
     arguments = rospy.myargv(sys.argv)[1:]
     if len(arguments) != 1:
-        rospy.logfatal("sensors_tf2_broadcaster: got %d arguments, expected one: the path of the sensors' YAML file.",
-                       len(arguments))
+        rospy.logfatal(
+            "sensors_tf2_broadcaster: got %d arguments, expected one: the path of the sensors' YAML file.",
+            len(arguments),
+        )
         return 2
     SensorFrames(Path(arguments[0])).connect()
     rospy.spin()

@@ -4,6 +4,7 @@
 A scene is a name, then objects, then a line with a single dot. Two layouts are in use: the older one begins an object
 with the number of its shapes, the newer one with the pose of the object, and ends it with named subframes.
 """
+
 from __future__ import annotations
 
 import math
@@ -160,14 +161,19 @@ def _read_object(name: str, lines: _Lines) -> SceneObject:
     if has_pose:
         position = lines.numbers(3, f"the position of object '{name}'")
         quaternion = lines.quaternion(f"the orientation of object '{name}'")
-    count, = lines.counts(1, f"the number of shapes of object '{name}'")
+    (count,) = lines.counts(1, f"the number of shapes of object '{name}'")
     shapes = tuple(_read_shape(lines) for _ in range(count))
     subframes: list[tuple[str, Vector, Vector]] = []
     if has_pose:
-        places, = lines.counts(1, f"the number of subframes of object '{name}'")
+        (places,) = lines.counts(1, f"the number of subframes of object '{name}'")
         for _ in range(places):
-            subframes.append((lines.next_line("the name of a subframe"), lines.numbers(3, "the position of a subframe"),
-                              lines.quaternion("the orientation of a subframe")))
+            subframes.append(
+                (
+                    lines.next_line("the name of a subframe"),
+                    lines.numbers(3, "the position of a subframe"),
+                    lines.quaternion("the orientation of a subframe"),
+                )
+            )
     return SceneObject(name, position, quaternion, shapes, tuple(subframes))
 
 
@@ -218,8 +224,10 @@ def scene_text(scene: Scene, old_layout: bool = False) -> str:
     for thing in scene.objects:
         lines.append(f"* {_name(thing.name, 'object')}")
         if old_layout and thing.subframes:
-            raise SceneFileError(f"object '{thing.name}': got {len(thing.subframes)} subframes, the older layout has "
-                                 "none; write the newer layout")
+            raise SceneFileError(
+                f"object '{thing.name}': got {len(thing.subframes)} subframes, the older layout has "
+                "none; write the newer layout"
+            )
         if not old_layout:
             lines += _pose_lines(thing.position, thing.quaternion_xyzw)
         lines.append(str(len(thing.shapes)))
@@ -247,8 +255,11 @@ def _shape_lines(shape: SceneShape, thing: SceneObject | None) -> list[str]:
         quaternion = multiply_quaternions(thing.quaternion_xyzw, quaternion)
     sizes = [_numbers(shape.size)]
     if shape.kind == "mesh":
-        sizes = [f"{len(shape.vertices)} {len(shape.triangles)}", *map(_numbers, shape.vertices),
-                 *(" ".join(map(str, indices)) for indices in shape.triangles)]
+        sizes = [
+            f"{len(shape.vertices)} {len(shape.triangles)}",
+            *map(_numbers, shape.vertices),
+            *(" ".join(map(str, indices)) for indices in shape.triangles),
+        ]
     return [shape.kind, *sizes, *_pose_lines(position, quaternion), _numbers(shape.color)]
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads where the sensors stand, as fixed transforms between frames."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -58,8 +59,13 @@ def parse_sensor(entry: Entry, lookup: PoseLookup) -> SensorFrame:
     if missing:
         raise entry.fault(f"the keys {missing} are missing; a sensor needs {list(FRAME_KEYS)}")
     x, y, z, roll, pitch, yaw = (fields[key].number() for key in FRAME_KEYS[2:])
-    return SensorFrame(entry.key, frame_name(fields["origin_frame_id"]), frame_name(fields["frame_id"]), (x, y, z),
-                       quaternion_from_rpy(roll, pitch, yaw))
+    return SensorFrame(
+        entry.key,
+        frame_name(fields["origin_frame_id"]),
+        frame_name(fields["frame_id"]),
+        (x, y, z),
+        quaternion_from_rpy(roll, pitch, yaw),
+    )
 
 
 def _from_initial_pose(entry: Entry, fields: dict[str, Entry], lookup: PoseLookup) -> SensorFrame:
@@ -70,11 +76,13 @@ def _from_initial_pose(entry: Entry, fields: dict[str, Entry], lookup: PoseLooku
     if pose is None:
         raise given.fault(f"no pose named '{given.text()}' is stored; add it to the named poses or correct the name")
     if pose.is_robot_pose:
-        raise fields["initial_pose"].fault("the keys ['position', 'orientation'] are missing; "
-                                           "a pose needs reference_frame, position, orientation")
+        raise fields["initial_pose"].fault(
+            "the keys ['position', 'orientation'] are missing; a pose needs reference_frame, position, orientation"
+        )
     placement = pose.placements[""]
-    return SensorFrame(entry.key, pose.reference_frame, frame_name(fields["frame_id"]), placement.position_m,
-                       placement.quaternion_xyzw)
+    return SensorFrame(
+        entry.key, pose.reference_frame, frame_name(fields["frame_id"]), placement.position_m, placement.quaternion_xyzw
+    )
 
 
 def load_sensor_frames(

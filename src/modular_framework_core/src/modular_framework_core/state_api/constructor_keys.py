@@ -7,6 +7,7 @@ them on as they are. The usual smach state declares its own::
     def __init__(self):
         smach.State.__init__(self, outcomes=["opened", "stuck"], input_keys=["door"])
 """
+
 from __future__ import annotations
 
 import ast
@@ -33,8 +34,11 @@ def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str,
         By key of ``STATE_KEYS``: the names; None when they cannot be known. A key is left out when the option of that
         name decides.
     """
-    calls = [item for item in ast.walk(constructor) if isinstance(item, ast.Call)
-             and isinstance(item.func, ast.Attribute) and item.func.attr == "__init__"]
+    calls = [
+        item
+        for item in ast.walk(constructor)
+        if isinstance(item, ast.Call) and isinstance(item.func, ast.Attribute) and item.func.attr == "__init__"
+    ]
     options = {argument.arg for argument in (*constructor.args.args, *constructor.args.kwonlyargs)}
     found: dict[str, Names] = {}
     if len(calls) > 1:

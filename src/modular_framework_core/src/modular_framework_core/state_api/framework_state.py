@@ -17,6 +17,7 @@ written as::
                 return self.fail(f"door '{self._door_name}' did not open within {self._timeout} s")
             return self.succeed()
 """
+
 from __future__ import annotations
 
 import functools

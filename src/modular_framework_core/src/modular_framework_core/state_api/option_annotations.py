@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads what values an option may have from its annotation: as source that is not run, or as the type itself."""
+
 from __future__ import annotations
 
 import ast
@@ -61,8 +62,10 @@ def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], seen: froze
                 yield from _uses(item, aliases, seen)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords) if name in KINDS:
             try:
-                yield KINDS[name](*(_value(item, aliases) for item in arguments),
-                                  **{str(item.arg): _value(item.value, aliases) for item in keywords})
+                yield KINDS[name](
+                    *(_value(item, aliases) for item in arguments),
+                    **{str(item.arg): _value(item.value, aliases) for item in keywords},
+                )
             except (TypeError, ValueError):
                 return
 
@@ -149,8 +152,10 @@ class _Reader:
             case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=arguments, keywords=keywords):
                 kinds: dict[str, type[Limits | Length]] = {"Limits": Limits, "Length": Length}
                 try:
-                    return kinds[name](*[self._number(item) for item in arguments],
-                                       **{str(item.arg): self._number(item.value) for item in keywords})
+                    return kinds[name](
+                        *[self._number(item) for item in arguments],
+                        **{str(item.arg): self._number(item.value) for item in keywords},
+                    )
                 except (KeyError, TypeError, ValueError):
                     return None
         return None

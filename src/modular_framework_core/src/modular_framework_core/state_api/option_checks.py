@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the options of a state against their annotations where it is made, by the rules that tasks are checked by."""
+
 from __future__ import annotations
 
 import functools
@@ -49,10 +50,16 @@ def checks_options(constructor: Callable[..., None], without: Iterable[str] = ()
             given = signature.bind(state, *arguments, **options).arguments
         except TypeError:
             given = {}  # the constructor's own error is clearer
-        judged = {name: value for name, value in given.items()
-                  if name not in unchecked and value is not signature.parameters[name].default}
-        wrong = [f"option '{name}' {found}" for name, value in judged.items()
-                 if (found := _complaint(declared.get(name, Anything()), value))]
+        judged = {
+            name: value
+            for name, value in given.items()
+            if name not in unchecked and value is not signature.parameters[name].default
+        }
+        wrong = [
+            f"option '{name}' {found}"
+            for name, value in judged.items()
+            if (found := _complaint(declared.get(name, Anything()), value))
+        ]
         if wrong:
             raise ValueError(f"{type(state).__name__}: {'; '.join(wrong)}")
         constructor(state, *arguments, **options)

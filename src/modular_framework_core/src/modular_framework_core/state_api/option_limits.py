@@ -6,6 +6,7 @@ holds to it where the state is made::
 
     def __init__(self, offset: Vector, speed: Share = 1.0, steps: Annotated[int, Limits(at_least=1)] = 3): ...
 """
+
 from __future__ import annotations
 
 import math

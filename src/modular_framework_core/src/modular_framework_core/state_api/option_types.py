@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What values an option of a state may have, and what is wrong with a value that does not fit."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -79,7 +80,8 @@ class Choice:
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
         """See ``Anything.mismatch``."""
         fits = isinstance(node, Scalar) and any(
-            node.value == value and isinstance(node.value, bool) == isinstance(value, bool) for value in self.values)
+            node.value == value and isinstance(node.value, bool) == isinstance(value, bool) for value in self.values
+        )
         return None if fits else (node, self)
 
     def schema(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ It is declared once, in the annotation of the state's constructor; ``--check`` r
 
     def __init__(self, pose_name: Annotated[str, Named("pose")], request: Annotated[Mapping[str, Any], Fields()]): ...
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -3,6 +3,7 @@
 
 Their folder is looked up by name, like any folder of states: this package imports none.
 """
+
 from modular_framework_core.files.default_folders import states_folder
 
 __path__ = [str(states_folder())]

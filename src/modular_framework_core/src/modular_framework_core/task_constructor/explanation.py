@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Explains what a state does and takes, from its signature and docstring, and what a machine with a template takes."""
+
 from __future__ import annotations
 
 import inspect
@@ -21,7 +22,7 @@ def explain(source: StateSource) -> str:
     """Returns a page about a state: what it does, its options with types and defaults, its outcomes and userdata."""
     doc = inspect.cleandoc(source.doc)
     section = _SECTION.search(doc)
-    summary = (doc[:section.start()] if section else doc).strip() or "(its class has no docstring)"
+    summary = (doc[: section.start()] if section else doc).strip() or "(its class has no docstring)"
     meanings = option_meanings(doc)
     lines = [f"{source.name}: {source.class_name}, {source.file}", "", summary, "", "Options:"]
     for option in source.options.values():
@@ -36,8 +37,13 @@ def explain(source: StateSource) -> str:
 
 def explain_template(template: TemplateSource) -> str:
     """Returns a page about a template: what its machines do, the keys of their header, the userdata they provide."""
-    lines = [f"{template.name}: template, {template.file}", "", template.doc or "(its class has no docstring)", "",
-             "Keys of the task, or of a nested machine:"]
+    lines = [
+        f"{template.name}: template, {template.file}",
+        "",
+        template.doc or "(its class has no docstring)",
+        "",
+        "Keys of the task, or of a nested machine:",
+    ]
     for key in machine_keys(template):
         lines += [f"  {key.name}: {key.form}, {_use(key)}", *_indented(key.meaning)]
     userdata = "the template does not say" if template.userdata is None else ", ".join(sorted(template.userdata))

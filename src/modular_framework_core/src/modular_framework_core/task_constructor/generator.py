@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes the Python module of a checked task: one class for each machine, out of its template, and a main block."""
+
 from __future__ import annotations
 
 import hashlib
@@ -153,9 +154,12 @@ def _compiled(environment: jinja2.Environment, file: Path) -> jinja2.Template:
 def _section(template: jinja2.Template, machine: MachineSpec, task: TaskSpec) -> str:
     file = machine.template.file
     try:
-        return template.render(
-            state_machine=machine, options=machine.options, task=task, is_root=machine is task.root
-        ).strip("\n") + "\n"
+        return (
+            template.render(
+                state_machine=machine, options=machine.options, task=task, is_root=machine is task.root
+            ).strip("\n")
+            + "\n"
+        )
     except jinja2.TemplateSyntaxError as error:
         raise GenerationError(f"{error.filename or file}:{error.lineno}: {error.message}") from error
     except (jinja2.TemplateError, GenerationError, TypeError, ValueError) as error:

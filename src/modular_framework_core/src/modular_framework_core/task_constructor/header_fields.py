@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads single fields of a machine or state: each function returns the value, or notes a fault and returns None."""
+
 from __future__ import annotations
 
 import keyword

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Describes the language of tasks as a JSON Schema, so that editors complete and checks task scripts while typing."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -23,16 +24,29 @@ def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[st
     usable = [source for name in states.names() if (source := _readable(states, name)) is not None]
     found = [template for name in templates.names() if (template := templates.get(name)) is not None]
     definitions = {
-        "state": {"oneOf": [{"$ref": f"#/definitions/state_{source.name}"} for source in usable]
-                  + [{"$ref": f"#/definitions/machine_{template.name}"} for template in found]},
-        "states": {"type": "array", "minItems": 1, "items": {
-            "type": "object", "minProperties": 1, "maxProperties": 1,
-            "additionalProperties": {"$ref": "#/definitions/state"}}},
+        "state": {
+            "oneOf": [{"$ref": f"#/definitions/state_{source.name}"} for source in usable]
+            + [{"$ref": f"#/definitions/machine_{template.name}"} for template in found]
+        },
+        "states": {
+            "type": "array",
+            "minItems": 1,
+            "items": {
+                "type": "object",
+                "minProperties": 1,
+                "maxProperties": 1,
+                "additionalProperties": {"$ref": "#/definitions/state"},
+            },
+        },
         **{f"state_{source.name}": _state(source) for source in usable},
         **{f"machine_{template.name}": _machine(template, is_root=False) for template in found},
     }
-    return {"$schema": DRAFT, "title": "Task of the task constructor", "definitions": definitions,
-            "oneOf": [_machine(template, is_root=True) for template in found]}
+    return {
+        "$schema": DRAFT,
+        "title": "Task of the task constructor",
+        "definitions": definitions,
+        "oneOf": [_machine(template, is_root=True) for template in found],
+    }
 
 
 def _readable(states: StateCatalogue, name: str) -> StateSource | None:
@@ -43,17 +57,25 @@ def _readable(states: StateCatalogue, name: str) -> StateSource | None:
 
 
 def _state(source: StateSource) -> dict[str, Any]:
-    properties: dict[str, Any] = {"source": {"enum": [source.name, f"state_{source.name}"]},
-                                  "transitions": or_reference(NAME_MAP), "remapping": or_reference(NAME_MAP),
-                                  "params": {"type": "object"}}
+    properties: dict[str, Any] = {
+        "source": {"enum": [source.name, f"state_{source.name}"]},
+        "transitions": or_reference(NAME_MAP),
+        "remapping": or_reference(NAME_MAP),
+        "params": {"type": "object"},
+    }
     meanings = option_meanings(source.doc)
     for option in source.options.values():
         kind = OUTCOMES if option.name == "outcomes" else NAMES if option.name in STATE_KEYS else option.type.schema()
         properties[option.name] = {**or_reference(kind), "description": meanings.get(option.name, "")}
         if option.default_known:
             properties[option.name]["default"] = option.default
-    return {"type": "object", "description": source.doc.split("\n\n")[0], "properties": properties,
-            "required": ["source"], "additionalProperties": source.takes_any_option}
+    return {
+        "type": "object",
+        "description": source.doc.split("\n\n")[0],
+        "properties": properties,
+        "required": ["source"],
+        "additionalProperties": source.takes_any_option,
+    }
 
 
 def _machine(template: TemplateSource, *, is_root: bool) -> dict[str, Any]:
@@ -61,5 +83,10 @@ def _machine(template: TemplateSource, *, is_root: bool) -> dict[str, Any]:
     uses = {key.name: key.at_root if is_root else key.nested for key in keys}
     properties = {key.name: {**key.schema, "description": key.meaning} for key in keys if uses[key.name]}
     properties["source"] = {"const": template.name}
-    return {"type": "object", "description": template.doc.split("\n\n")[0], "properties": properties,
-            "required": [name for name, use in uses.items() if use == "required"], "additionalProperties": False}
+    return {
+        "type": "object",
+        "description": template.doc.split("\n\n")[0],
+        "properties": properties,
+        "required": [name for name, use in uses.items() if use == "required"],
+        "additionalProperties": False,
+    }

@@ -4,6 +4,7 @@
 One mistake is one fault: once ``sorce`` is noted, its value is read as that of ``source``, so that no missing key is
 reported as well, and all other faults are found too.
 """
+
 from __future__ import annotations
 
 import difflib

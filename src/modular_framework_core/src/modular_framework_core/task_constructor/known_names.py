@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which messages, postures and planning groups a task may name: those of configuration files and of the robot."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -35,8 +36,11 @@ class KnownNames:
     def with_names(self, more: Mapping[str, frozenset[str]]) -> KnownNames:
         """Returns these names with more of them; kinds that are not known stay so."""
         merged = {kind: names | more.get(kind, frozenset()) for kind, names in self.names.items()}
-        return KnownNames(merged | {"plan": merged.get("plan", frozenset()) | more.get("plan", frozenset())},
-                          self.origins, self.manipulator_group)
+        return KnownNames(
+            merged | {"plan": merged.get("plan", frozenset()) | more.get("plan", frozenset())},
+            self.origins,
+            self.manipulator_group,
+        )
 
     def with_robot(self, srdf: str, origin: str) -> KnownNames:
         """Returns these names with the planning groups and postures of a robot.
@@ -94,8 +98,10 @@ def names_of_installation(config: Path | None, moveit_package: str = "") -> Know
     names = KnownNames() if folder is None else names_of_config(folder)
     srdf = default_folders.srdf_file(moveit_package)
     if srdf is None and moveit_package:
-        raise ValueError(f"package '{moveit_package}' is not found, or has not exactly one SRDF in config/; name the "
-                         "robot's MoveIt configuration package, one that is on ROS_PACKAGE_PATH")
+        raise ValueError(
+            f"package '{moveit_package}' is not found, or has not exactly one SRDF in config/; name the "
+            "robot's MoveIt configuration package, one that is on ROS_PACKAGE_PATH"
+        )
     return names if srdf is None else names.with_robot(srdf.read_text(encoding="utf-8"), str(srdf))
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loads Python files by path: states that are in no importable package, and state machine modules."""
+
 from __future__ import annotations
 
 import hashlib

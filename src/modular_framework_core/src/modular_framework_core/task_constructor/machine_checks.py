@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks how the states of a machine are linked: transitions, outcome maps, reachability, userdata."""
+
 from __future__ import annotations
 
 from collections.abc import Container, Iterable
@@ -30,8 +31,12 @@ class ChildLinks:
 
 
 def check_sequential(
-    children: list[ChildLinks], labels: list[str], first: list[str], outcomes: tuple[str, ...] | None,
-    location: SourceLocation, faults: FaultList
+    children: list[ChildLinks],
+    labels: list[str],
+    first: list[str],
+    outcomes: tuple[str, ...] | None,
+    location: SourceLocation,
+    faults: FaultList,
 ) -> None:
     """Checks the transitions of the children of a state machine.
 
@@ -48,8 +53,9 @@ def check_sequential(
         transitions = child.transitions or {}
         for outcome, target in transitions.items():
             if child.outcomes is not None and outcome not in child.outcomes:
-                faults.add_unknown(child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes,
-                                   given=transitions)
+                faults.add_unknown(
+                    child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes, given=transitions
+                )
             if outcomes is not None and target.value not in targets:
                 what = f"state '{child.label}': transition target"
                 faults.add_unknown(target.location, what, str(target.value), targets)
@@ -67,8 +73,12 @@ def check_sequential(
 
 
 def _check_reachability(
-    children: list[ChildLinks], labels: list[str], first: list[str], outcomes: tuple[str, ...],
-    location: SourceLocation, faults: FaultList
+    children: list[ChildLinks],
+    labels: list[str],
+    first: list[str],
+    outcomes: tuple[str, ...],
+    location: SourceLocation,
+    faults: FaultList,
 ) -> None:
     """Notes states no transition leads to, states that lead to no outcome, and outcomes nothing leads to.
 
@@ -88,12 +98,17 @@ def _check_reachability(
     can_end = _closure(backwards, outcomes)
     for child in children:
         if child.label not in reached:
-            faults.add(child.location, f"state '{child.label}' is never reached: no transition leads to it; lead one "
-                                       "to it, or remove it")
+            faults.add(
+                child.location,
+                f"state '{child.label}' is never reached: no transition leads to it; lead one to it, or remove it",
+            )
         elif child.label not in can_end:
             circle = ", ".join(sorted(_closure(leads_to, [child.label])))
-            faults.add(child.location, f"state '{child.label}' has no way out: from it the machine only gets to "
-                                       f"{circle}, never to an outcome; lead one of them to: {', '.join(outcomes)}")
+            faults.add(
+                child.location,
+                f"state '{child.label}' has no way out: from it the machine only gets to "
+                f"{circle}, never to an outcome; lead one of them to: {', '.join(outcomes)}",
+            )
     check_outcomes_produced(outcomes, set().union(*leads_to.values()), location, faults)
 
 
@@ -132,8 +147,11 @@ def check_outcomes_produced(
     """Notes outcomes nothing leads to; ``preempted`` is what a machine ends with when it is stopped."""
     for outcome in outcomes:
         if outcome not in produced and outcome != "preempted":
-            faults.add(location, f"the outcome '{outcome}' is never produced: nothing leads to it; remove it, or let a "
-                                 "transition (in a concurrent machine: an entry of outcome_map) lead to it")
+            faults.add(
+                location,
+                f"the outcome '{outcome}' is never produced: nothing leads to it; remove it, or let a "
+                "transition (in a concurrent machine: an entry of outcome_map) lead to it",
+            )
 
 
 def check_concurrent(children: list[ChildLinks], faults: FaultList) -> None:
@@ -171,11 +189,13 @@ def check_outcome_map(
             value = wanted.plain()
             child = by_label.get(label)
             if child is None:
-                faults.add_unknown(conditions.keys[label], "outcome_map: state", label, by_label,
-                                   given=conditions.entries)
+                faults.add_unknown(
+                    conditions.keys[label], "outcome_map: state", label, by_label, given=conditions.entries
+                )
             elif not isinstance(value, str):
-                faults.add(wanted.location,
-                           f"outcome_map: outcome of '{label}' must be a name, found {kind_of(wanted)}")
+                faults.add(
+                    wanted.location, f"outcome_map: outcome of '{label}' must be a name, found {kind_of(wanted)}"
+                )
             elif child.outcomes is not None and value not in child.outcomes:
                 faults.add_unknown(wanted.location, f"outcome_map: outcome of '{label}'", value, child.outcomes)
             result[outcome][label] = str(value)

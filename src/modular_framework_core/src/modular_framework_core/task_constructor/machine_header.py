@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the fields of a machine's header; notes what is wrong with them."""
+
 from __future__ import annotations
 
 from modular_framework_core.files.faults import FaultList, SourceLocation, listing
@@ -28,8 +29,11 @@ class HeaderReader:
         """Returns a header with known keys only; notes the unknown ones, and those that are missing."""
         template = self.template_named(value_of(header, "source"))
         templates = self._all_templates() if template is None else [template]
-        known = list(dict.fromkeys(key.name for item in templates for key in machine_keys(item)
-                                   if (key.at_root if is_root else key.nested)))
+        known = list(
+            dict.fromkeys(
+                key.name for item in templates for key in machine_keys(item) if (key.at_root if is_root else key.nested)
+            )
+        )
         who = f"'{label}' (template {template.name})" if template else f"'{label}'"
         spelt = spelt_as_meant(header, known, f"{who}: key", self._faults)
         for key in required_keys(is_root=is_root):
@@ -50,8 +54,10 @@ class HeaderReader:
             return None
         template = self._templates.get(name)
         if template is None and self._states.resolve(name) is not None:
-            self._faults.add(node.location, f"'{label}' contains states, but its source '{name}' is a state; "
-                                            f"{listing(self._templates.names())}")
+            self._faults.add(
+                node.location,
+                f"'{label}' contains states, but its source '{name}' is a state; {listing(self._templates.names())}",
+            )
         elif template is None:
             self._faults.add_unknown(node.location, "template", name, self._templates.names())
         elif template.fault:
@@ -118,13 +124,17 @@ class HeaderReader:
         if node is None:
             return {}
         if not isinstance(node, Mapping):
-            self._faults.add(node.location, f"external_names must be a mapping such as {{plan: [homing]}}, found "
-                                            f"{kind_of(node)}")
+            self._faults.add(
+                node.location, f"external_names must be a mapping such as {{plan: [homing]}}, found {kind_of(node)}"
+            )
             return {}
         spelt = spelt_as_meant(node, MANAGER_KINDS, "external_names: kind", self._faults)
-        found = {kind: header_fields.names(value, f"external_names: {kind}", self._faults, may_be_empty=True,
-                                           example="[homing]")
-                 for kind, value in spelt.entries.items()}
+        found = {
+            kind: header_fields.names(
+                value, f"external_names: {kind}", self._faults, may_be_empty=True, example="[homing]"
+            )
+            for kind, value in spelt.entries.items()
+        }
         return {kind: frozenset(names or ()) for kind, names in found.items()}
 
     def location_of(self, header: Mapping, key: str) -> SourceLocation:

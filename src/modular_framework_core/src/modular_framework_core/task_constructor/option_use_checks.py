@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks what the options of states stand for: names that must exist, and userdata the states must declare."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -111,8 +112,10 @@ class _Checker:
 
     def _unknown(self, option: str, kind: str, name: str, names: frozenset[str]) -> str:
         word = _WORDS.get(kind, kind.replace("_", " "))
-        text = (f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
-                f"unknown; {listing(sorted(names), 'there is none')}")
+        text = (
+            f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
+            f"unknown; {listing(sorted(names), 'there is none')}"
+        )
         origin = self._known.origins.get(kind, "the manager's file")
         meant = nearest(name, sorted(names))
         if kind in _WORDS:
@@ -132,17 +135,24 @@ class _Checker:
         does, listed = "takes" if direction == "input" else "writes", listed or f"{direction}_keys"
         source = self._state.source
         where = f"{listed} in {source.file.name}" if listed in source.own_keys else listed
-        self._faults.add(location, f"state '{self._state.label}' ({source.name}): {what} {does} the userdata key "
-                                   f"'{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
-                                   f"add it to {where}")
+        self._faults.add(
+            location,
+            f"state '{self._state.label}' ({source.name}): {what} {does} the userdata key "
+            f"'{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
+            f"add it to {where}",
+        )
 
     def _check_reads(self) -> None:
         """Notes keys that the source reads and the task's own lists of keys leave out."""
         source, inputs = self._state.source, self._inputs
         if inputs is None:
             return
-        by_default = {key for option in ("input_keys", "io_keys") if option in self._state.nodes
-                      for key in source.default_names(option) or ()}
+        by_default = {
+            key
+            for option in ("input_keys", "io_keys")
+            if option in self._state.nodes
+            for key in source.default_names(option) or ()
+        }
         for key in sorted((by_default & source.userdata.anywhere) | source.userdata.always):
             if key in inputs:
                 continue
@@ -210,7 +220,10 @@ def _may_make(state: StateSpec, kind: str) -> bool:
         return True
     services = (f"add_{kind}", f"load_{plural}", f"reload_{plural}", f"store_{kind}(")
     words = [str(value) for value in state.options.values() if isinstance(value, str)]
-    declares_names = any(isinstance(use, Named) and use.made and use.kind == kind
-                         for option in state.source.options.values() for use in option.uses)
+    declares_names = any(
+        isinstance(use, Named) and use.made and use.kind == kind
+        for option in state.source.options.values()
+        for use in option.uses
+    )
     texts = words if declares_names else [*words, state.source.text]
     return any(service in text for service in services for text in texts)

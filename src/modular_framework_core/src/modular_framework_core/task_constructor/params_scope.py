@@ -5,6 +5,7 @@ The params of a machine are seen by everything inside it, at any depth. A ``para
 one key by key. A reference is a text that is exactly ``params.<key>``; it may stand wherever a value may: as an
 option, in a list, in a mapping, in the header of a nested machine.
 """
+
 from __future__ import annotations
 
 import difflib

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The task constructor as one call, and its command line."""
+
 from __future__ import annotations
 
 import argparse
@@ -23,7 +24,9 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateC
 
 
 def check_task(
-    script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path],
+    script: Path,
+    states_directories: Sequence[Path],
+    templates_directories: Sequence[Path],
     known: KnownNames | None = None,
 ) -> TaskSpec:
     """Reads and checks a task; nothing is run or written.
@@ -42,7 +45,10 @@ def check_task(
 
 
 def construct_task(
-    script: Path, states_directories: Sequence[Path], templates_directories: Sequence[Path], output: Path,
+    script: Path,
+    states_directories: Sequence[Path],
+    templates_directories: Sequence[Path],
+    output: Path,
     known: KnownNames | None = None,
 ) -> tuple[TaskSpec, Path]:
     """Checks a task and writes its module into the directory ``output``; returns the task and the path of the module.
@@ -102,8 +108,10 @@ def main(arguments: Sequence[str]) -> int:
 
 def no_states_in(folder: Path) -> str:
     """Says that a folder of states has none."""
-    return (f"states directory {folder} has no state: no .py file but those that begin with '_'; name the folder that "
-            "has your states, or leave it out (the framework's own states are found without it)")
+    return (
+        f"states directory {folder} has no state: no .py file but those that begin with '_'; name the folder that "
+        "has your states, or leave it out (the framework's own states are found without it)"
+    )
 
 
 class UnknownNameError(Exception):
@@ -123,10 +131,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--check", action="store_true", help="only check; write nothing")
     formats = ", ".join(f".{name}" for name in FORMATS)
     parser.add_argument("--graph", type=Path, metavar="FILE", help=f"check, and draw the task into a file ({formats})")
-    parser.add_argument("--config", type=Path, metavar="FOLDER",
-                        help="folder whose named_*.yaml have the names a task may use (default: the API package's)")
-    parser.add_argument("--moveit-config", metavar="PACKAGE", default="",
-                        help="MoveIt configuration package of the robot (default: the API package's launch file's)")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FOLDER",
+        help="folder whose named_*.yaml have the names a task may use (default: the API package's)",
+    )
+    parser.add_argument(
+        "--moveit-config",
+        metavar="PACKAGE",
+        default="",
+        help="MoveIt configuration package of the robot (default: the API package's launch file's)",
+    )
     parser.add_argument("--explain", metavar="NAME", help="say what a state or template does and takes")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of tasks, for editors")
     return parser
@@ -148,6 +164,7 @@ def _about_language(given: argparse.Namespace, states: StateCatalogue, templates
     if state is None and template is None:
         raise UnknownNameError(
             f"'{given.explain}' is no state and no template; states: {', '.join(states.names())}; templates: "
-            f"{', '.join(templates.names())}{nearest(given.explain, [*states.names(), *templates.names()])}")
+            f"{', '.join(templates.names())}{nearest(given.explain, [*states.names(), *templates.names()])}"
+        )
     pages = [] if state is None else [explain(states.get(state))]
     return "\n\n".join([*pages, *([] if template is None else [explain_template(template)])])

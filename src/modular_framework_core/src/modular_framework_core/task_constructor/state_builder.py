@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks one state of a task: its source, its options, its outcomes."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -38,8 +39,9 @@ class StateBuilder:
             what = f"state '{label}' ({source.name}): key"
             body = spelt_as_meant(body, [*_RESERVED, *source.options, *free], what, self._faults)
         if "source" not in body.entries:
-            self._faults.add(body.location, f"state '{label}' has no 'source'; add it: the name of a state's file, or "
-                                            "of a template")
+            self._faults.add(
+                body.location, f"state '{label}' has no 'source'; add it: the name of a state's file, or of a template"
+            )
         return body
 
     def _source_without_faults(self, node: Node | None) -> StateSource | None:
@@ -86,12 +88,24 @@ class StateBuilder:
                 header_fields.names(options[key], f"state '{label}': {key}", self._faults, may_be_empty=may_be_empty)
         outcomes = self._state_outcomes(options, source)
         if "outcomes" in options and outcomes is not None and len(outcomes) < 2 and source.is_framework_state:
-            self._faults.add(options["outcomes"].location, f"state '{label}': outcomes has only '{outcomes[0]}'; it "
-                             "needs at least two, the first for success and the last for failure, as [success, fail]")
+            self._faults.add(
+                options["outcomes"].location,
+                f"state '{label}': outcomes has only '{outcomes[0]}'; it "
+                "needs at least two, the first for success and the last for failure, as [success, fail]",
+            )
         values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
         return (
-            StateSpec(label, source, source.class_name, values, outcomes or (), plain_transitions(body), location,
-                      plain_remapping(body), options),
+            StateSpec(
+                label,
+                source,
+                source.class_name,
+                values,
+                outcomes or (),
+                plain_transitions(body),
+                location,
+                plain_remapping(body),
+                options,
+            ),
             outcomes,
         )
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the states a task may use and reads their options from their source, without running any of it."""
+
 from __future__ import annotations
 
 import ast
@@ -168,9 +169,19 @@ def _read_state(name: str, file: Path) -> StateSource:
     options, takes_any = _constructor_options(classes[wanted], classes, aliases)
     is_ours = _is_framework_state(classes[wanted], classes)
     doc = ast.get_docstring(classes[wanted]) or ""
-    return StateSource(name, file, wanted, options, takes_any, is_ours, doc, missing_imports(tree, file),
-                       reads_of(classes[wanted]), file.read_text(encoding="utf-8"),
-                       _own_keys(classes[wanted], classes, aliases))
+    return StateSource(
+        name,
+        file,
+        wanted,
+        options,
+        takes_any,
+        is_ours,
+        doc,
+        missing_imports(tree, file),
+        reads_of(classes[wanted]),
+        file.read_text(encoding="utf-8"),
+        _own_keys(classes[wanted], classes, aliases),
+    )
 
 
 def _parsed(file: Path) -> ast.Module:
@@ -184,7 +195,8 @@ def _is_framework_state(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) ->
     others = {name: found for name, found in classes.items() if name != node.name}
     names = [_base_name(base) for base in node.bases]
     return "FrameworkState" in names or any(
-        _is_framework_state(others[name], others) for name in names if name in others)
+        _is_framework_state(others[name], others) for name in names if name in others
+    )
 
 
 def _base_name(base: ast.expr) -> str:
@@ -193,8 +205,11 @@ def _base_name(base: ast.expr) -> str:
 
 def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
     """Returns the plain assignments of a module: the names a type may have been given."""
-    return {node.targets[0].id: node.value for node in tree.body
-            if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)}
+    return {
+        node.targets[0].id: node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)
+    }
 
 
 @functools.lru_cache(maxsize=1000)
@@ -245,9 +260,7 @@ def _own_keys(
     return {} if inner is None else _own_keys(classes[inner], classes, aliases)
 
 
-def _arguments(
-    arguments: ast.arguments, aliases: dict[str, ast.expr]
-) -> tuple[dict[str, StateOption], bool]:
+def _arguments(arguments: ast.arguments, aliases: dict[str, ast.expr]) -> tuple[dict[str, StateOption], bool]:
     positional = [*arguments.posonlyargs, *arguments.args]
     padding: list[ast.expr | None] = [None] * (len(positional) - len(arguments.defaults))
     pairs = list(zip(positional, [*padding, *arguments.defaults], strict=True))[1:]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds out whether Python finds the modules that a state's file imports, without importing or running any of them."""
+
 from __future__ import annotations
 
 import ast
@@ -47,8 +48,12 @@ def _top_imports(tree: ast.Module, file: Path) -> Iterator[tuple[int, str]]:
             yield from ((node.lineno, item.name) for item in node.names)
         elif isinstance(node, ast.ImportFrom):
             relative = "." * node.level + (node.module or "")
-            yield node.lineno, importlib.util.resolve_name(relative, package) if node.level and package and (
-                node.level <= package.count(".") + 1) else relative
+            yield (
+                node.lineno,
+                importlib.util.resolve_name(relative, package)
+                if node.level and package and (node.level <= package.count(".") + 1)
+                else relative,
+            )
 
 
 def _package_of(file: Path) -> str:

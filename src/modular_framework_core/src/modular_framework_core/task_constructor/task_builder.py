@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns the YAML of a task into a ``TaskSpec``; finds everything that is wrong with it before anything is generated."""
+
 from __future__ import annotations
 
 import builtins
@@ -58,8 +59,10 @@ class TaskBuilder:
     def build(self, document: Node, script: str) -> TaskSpec:
         """Returns the task; raises ``TaskFault`` with everything that is wrong."""
         if not isinstance(document, Mapping):
-            self._faults.add(document.location, f"a task must be a mapping, found {kind_of(document)}; its keys: "
-                                                f"{', '.join(root_keys())}")
+            self._faults.add(
+                document.location,
+                f"a task must be a mapping, found {kind_of(document)}; its keys: {', '.join(root_keys())}",
+            )
             self._faults.raise_if_any()
         assert isinstance(document, Mapping)
         self._faults.harmless = len(self._faults)
@@ -85,9 +88,7 @@ class TaskBuilder:
         return TaskSpec(name, node, script, root)
 
     # ---- machines ------------------------------------------------------------------------------------------
-    def _machine(
-        self, label: str, header: Mapping, scope: ParamsScope, parent: str | None
-    ) -> MachineSpec | None:
+    def _machine(self, label: str, header: Mapping, scope: ParamsScope, parent: str | None) -> MachineSpec | None:
         """Builds a machine from its header, whose references are resolved; ``parent`` is the class name around it."""
         read = self._headers
         template = read.template(header, label)
@@ -110,8 +111,9 @@ class TaskBuilder:
         default_outcome = read.default_outcome(header, template, outcomes)
         outcome_map = read.outcome_map(header, template, outcomes, links)
         if template.concurrent and known_outcomes and links and len(self._faults) == before_map:
-            machine_checks.check_outcomes_produced(outcomes, {*outcome_map, default_outcome}, outcomes_location,
-                                                   self._faults)
+            machine_checks.check_outcomes_produced(
+                outcomes, {*outcome_map, default_outcome}, outcomes_location, self._faults
+            )
         self._faults.harmless += len(self._faults) - before
         return MachineSpec(
             label=label,
@@ -134,8 +136,9 @@ class TaskBuilder:
     def _resolved(self, node: Mapping, scope: ParamsScope, *, is_machine: bool) -> Mapping:
         """Resolves the references of a header or state, except those that are read later or not at all."""
         unread = {key for key in node.entries if key in UNREAD or (is_machine and meant_key(key, UNREAD))}
-        entries = {key: value if key in unread else scope.resolve(value, self._faults)
-                   for key, value in node.entries.items()}
+        entries = {
+            key: value if key in unread else scope.resolve(value, self._faults) for key, value in node.entries.items()
+        }
         return Mapping(entries, node.keys, node.location)
 
     def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
@@ -156,8 +159,11 @@ class TaskBuilder:
 
     # ---- children ------------------------------------------------------------------------------------------
     def _children(
-        self, entries: list[tuple[str, SourceLocation, Mapping]], scope: ParamsScope, parent_type: str,
-        outcomes: tuple[str, ...]
+        self,
+        entries: list[tuple[str, SourceLocation, Mapping]],
+        scope: ParamsScope,
+        parent_type: str,
+        outcomes: tuple[str, ...],
     ) -> tuple[list[ChildSpec], list[ChildLinks]]:
         specs: list[ChildSpec] = []
         links: list[ChildLinks] = []

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Draws a checked task with Graphviz: machines as frames inside each other, states, transitions and outcomes."""
+
 from __future__ import annotations
 
 import subprocess
@@ -24,9 +25,12 @@ def draw(task: TaskSpec) -> graphviz.Digraph:
     A machine is a frame: solid for one state after the other, dashed for states that run at the same time. Its
     outcomes are the ovals in it, green for the first one and red for the last one.
     """
-    graph = graphviz.Digraph(task.name, graph_attr={"compound": "true", "fontname": "sans-serif", "rankdir": "TB"},
-                             node_attr={"fontname": "sans-serif", "fontsize": "11"},
-                             edge_attr={"fontname": "sans-serif", "fontsize": "9"})
+    graph = graphviz.Digraph(
+        task.name,
+        graph_attr={"compound": "true", "fontname": "sans-serif", "rankdir": "TB"},
+        node_attr={"fontname": "sans-serif", "fontsize": "11"},
+        edge_attr={"fontname": "sans-serif", "fontsize": "9"},
+    )
     _machine(graph, task.root, task.root.label, None)
     return graph
 
@@ -39,16 +43,19 @@ def write(task: TaskSpec, file: Path) -> None:
     """
     kind = file.suffix.removeprefix(".").lower()
     if kind not in FORMATS:
-        raise GraphError(f"{file}: the format '{kind}' is unknown; allowed suffixes: "
-                         + ", ".join(f".{name}" for name in FORMATS))
+        raise GraphError(
+            f"{file}: the format '{kind}' is unknown; allowed suffixes: " + ", ".join(f".{name}" for name in FORMATS)
+        )
     source = draw(task).source
     if kind != "dot":
         try:
-            done = subprocess.run(["dot", f"-T{kind}"], input=source.encode(), capture_output=True, check=True,
-                                  timeout=RENDER_TIMEOUT_S)
+            done = subprocess.run(
+                ["dot", f"-T{kind}"], input=source.encode(), capture_output=True, check=True, timeout=RENDER_TIMEOUT_S
+            )
         except FileNotFoundError as error:
-            raise GraphError(f"{file}: the program 'dot' is not installed; install Debian's package graphviz, or write "
-                             "a .dot file") from error
+            raise GraphError(
+                f"{file}: the program 'dot' is not installed; install Debian's package graphviz, or write a .dot file"
+            ) from error
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             raise GraphError(f"{file}: Graphviz failed: {error}") from error
         content = done.stdout
@@ -77,8 +84,14 @@ def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: s
             if isinstance(child, MachineSpec):
                 _machine(frame, child, inner, path)
             else:
-                frame.node(inner, _text(child.label), shape="box", style="rounded,filled", fillcolor="#eceff1",
-                           tooltip=f"{child.source.name}, {child.location}")
+                frame.node(
+                    inner,
+                    _text(child.label),
+                    shape="box",
+                    style="rounded,filled",
+                    fillcolor="#eceff1",
+                    tooltip=f"{child.source.name}, {child.location}",
+                )
         if parent is None:
             for child in machine.first_states():
                 _edge(frame, f"{path}|start", "", child, f"{path}/{child.label}")

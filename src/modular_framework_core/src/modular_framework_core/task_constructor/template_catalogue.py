@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the templates state machines are written with, and what each of them expects of a machine."""
+
 from __future__ import annotations
 
 import inspect
@@ -16,7 +17,7 @@ _RENAMED = {
     "states_source": "nothing: the imports of states are written above all classes",
     "components": "state_machine.states, which children.add writes",
     "parameters": "fields of state_machine (outcomes, default_outcome, outcome_map, shares_userdata), and "
-                  "options.<key>",
+    "options.<key>",
 }
 """What templates of the original framework read of ``state_machine``, and what stands for it here."""
 _OLD_NAME = re.compile(rf"\bstate_machine\.({'|'.join(_RENAMED)})\b")
@@ -84,8 +85,16 @@ def _read_template(name: str, file: Path) -> TemplateSource:
     provided = None if declared is None else frozenset(re.findall(r"\w+", declared.group(1)))
     concurrent, takes_keys = re.search(r"\bConcurrence\b", text), _TAKES_KEYS.search(text)
     doc = _DOC.search(text)
-    return TemplateSource(name, file, concurrent is not None, options, takes_keys is not None, provided,
-                          "" if doc is None else inspect.cleandoc(doc.group(1)), _original_names(text, file))
+    return TemplateSource(
+        name,
+        file,
+        concurrent is not None,
+        options,
+        takes_keys is not None,
+        provided,
+        "" if doc is None else inspect.cleandoc(doc.group(1)),
+        _original_names(text, file),
+    )
 
 
 def _original_names(text: str, file: Path) -> str:
@@ -96,7 +105,9 @@ def _original_names(text: str, file: Path) -> str:
             lines.setdefault(name, number)
     if not lines:
         return ""
-    renamed = "; ".join(f"{file}:{number}: state_machine.{name} is now {_RENAMED[name]}"
-                        for name, number in lines.items())
-    return (f"it is written for the original framework: {renamed}; 'Templates' in modular_framework_core's README "
-            "shows one")
+    renamed = "; ".join(
+        f"{file}:{number}: state_machine.{name} is now {_RENAMED[name]}" for name, number in lines.items()
+    )
+    return (
+        f"it is written for the original framework: {renamed}; 'Templates' in modular_framework_core's README shows one"
+    )

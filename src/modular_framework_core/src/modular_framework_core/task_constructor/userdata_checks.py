@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks of a task's userdata: every key that a state needs is there, and every remapping names a key."""
+
 from __future__ import annotations
 
 import difflib
@@ -71,7 +72,8 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
             available.add(key)
     needed: list[tuple[ChildSpec, list[str]]] = [
         (state, [*(_keys_around(state, "input_keys") or ()), *(_keys_around(state, "io_keys") or ())])
-        for state in members]
+        for state in members
+    ]
     needed += [(inner, [inner.remapping.get(key, key) for key in inner.input_keys]) for inner in nested]
     for child, keys in needed:
         for key in dict.fromkeys(keys):
@@ -80,7 +82,11 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
 
 
 def _missing_key(
-    machine: MachineSpec, is_root: bool, child: ChildSpec, key: str, available: Iterable[str],
+    machine: MachineSpec,
+    is_root: bool,
+    child: ChildSpec,
+    key: str,
+    available: Iterable[str],
     provided_by: dict[str, str],
 ) -> str:
     text = (

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds which userdata keys a state's class reads, from its source, without running it."""
+
 from __future__ import annotations
 
 import ast
@@ -34,8 +35,9 @@ def reads_of(node: ast.ClassDef) -> UserdataReads:
     for statement in execute.body:
         if not isinstance(statement, ast.Assign | ast.AnnAssign | ast.AugAssign | ast.Expr | ast.Return):
             break
-        if any(isinstance(item, ast.IfExp | ast.BoolOp | ast.Lambda | ast.comprehension)
-               for item in ast.walk(statement)):
+        if any(
+            isinstance(item, ast.IfExp | ast.BoolOp | ast.Lambda | ast.comprehension) for item in ast.walk(statement)
+        ):
             break
         always.update(_keys(statement))
     return UserdataReads(anywhere, frozenset(always) - _written(execute))
@@ -52,8 +54,14 @@ def _keys(node: ast.AST) -> Iterator[str]:
 
 def _written(node: ast.AST) -> set[str]:
     """Returns the keys a function writes: what it reads of them may be its own."""
-    return {item.attr for item in ast.walk(node) if isinstance(item, ast.Attribute) and isinstance(item.ctx, ast.Store)
-            and isinstance(item.value, ast.Name) and item.value.id == "userdata"}
+    return {
+        item.attr
+        for item in ast.walk(node)
+        if isinstance(item, ast.Attribute)
+        and isinstance(item.ctx, ast.Store)
+        and isinstance(item.value, ast.Name)
+        and item.value.id == "userdata"
+    }
 
 
 def _asked_for(node: ast.AST) -> Iterator[str]:

@@ -3,6 +3,7 @@
 
 The recorder observes any smach state, so a user's own states are recorded like the framework's.
 """
+
 from __future__ import annotations
 
 import json
@@ -175,8 +176,10 @@ class TaskRecorder:
         """Returns what the states that run now say about themselves."""
         now = self.elapsed_s()
         with self._lock:
-            return tuple(RunningState(path, now - self._records[number].started_s, str(getattr(state, "feedback", "")))
-                         for number, (path, state) in self._active.items())
+            return tuple(
+                RunningState(path, now - self._records[number].started_s, str(getattr(state, "feedback", "")))
+                for number, (path, state) in self._active.items()
+            )
 
     def failures(self) -> tuple[FailureSummary, ...]:
         """Returns one summary for each state that failed, in the order they failed first."""
@@ -213,7 +216,13 @@ def write_record(
     folder.mkdir(parents=True, exist_ok=True)
     stamp = time.strftime("%Y%m%d_%H%M%S", time.gmtime(begun))
     path = folder / f"{task.replace('/', '_')}_{stamp}_{os.getpid()}.json"
-    content = {"task": task, "begun": begun, "outcome": outcome, "succeeded": succeeded, "error": error,
-               "states": [asdict(record) for record in records]}
+    content = {
+        "task": task,
+        "begun": begun,
+        "outcome": outcome,
+        "succeeded": succeeded,
+        "error": error,
+        "states": [asdict(record) for record in records],
+    }
     write_whole(path, json.dumps(content, indent=1))
     return path

@@ -11,6 +11,7 @@ Parameters: ``manipulator_prefix``; from motion_planner_config.yaml ``planner_na
 ``manipulator_controller_action_server_name``, ``max_torque``. Written: ``manipulator_links_indices``.
 Services called: ``get_planning_scene``, ``set_init_acm``.
 """
+
 from __future__ import annotations
 
 from typing import Any
@@ -54,9 +55,7 @@ def initialise_userdata(userdata: Any) -> None:
     userdata.manipulator_controller_client = None
     userdata.max_torque = parameters.max_torque
     if parameters.manipulator_action:
-        userdata.manipulator_controller_client = SteadyActionClient(
-            parameters.manipulator_action, GraspAction
-        )
+        userdata.manipulator_controller_client = SteadyActionClient(parameters.manipulator_action, GraspAction)
 
 
 def initialise_acm(manipulator_prefix: str) -> None:

@@ -4,6 +4,7 @@
 Publishers: ``<node>/smach/container_structure``, ``<node>/smach/container_status`` (smach_msgs). Viewers can watch, but
 not change the task: there is no subscriber.
 """
+
 from __future__ import annotations
 
 import threading

@@ -19,6 +19,7 @@ Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_ms
     and end of a state, and twice a second while states run), for viewers those of ``ros_introspection``.
 Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
 """
+
 from __future__ import annotations
 
 import json
@@ -147,7 +148,8 @@ class TaskReporter:
         if not result.succeeded:  # for run_framework, which prints it last; not on the screen twice
             reasons = "; ".join([*map(str, result.failures), *([result.error] if result.error else [])])
             logging.getLogger("modular_framework_core.task").critical(
-                "outcome '%s'%s", result.outcome, f": {reasons}" if reasons else "")
+                "outcome '%s'%s", result.outcome, f": {reasons}" if reasons else ""
+            )
 
 
 def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:

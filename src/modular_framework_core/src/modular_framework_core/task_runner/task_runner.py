@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs the state machine of a task in a thread, stops it when asked, and reports how it ended."""
+
 from __future__ import annotations
 
 import threading

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters a framework state machine starts from: read together, checked together, reported together."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -4,6 +4,7 @@
 Text lines over TCP, on the loopback interface if no other is given: `command key=value ...`; one line is the answer to
 each, `ok ...` or `error ...`. `help` lists the commands. From a shell: `echo unplug | nc 127.0.0.1 29900`.
 """
+
 from __future__ import annotations
 
 import inspect
@@ -50,8 +51,10 @@ def run_command(commands: Mapping[str, Command], line: str) -> str:
     line = line.strip()
     name, *words = line.split()
     if name == "help":
-        return "; ".join(f"{known}{inspect.signature(function)}: {_first_line(function)}"
-                         for known, function in sorted(commands.items()))
+        return "; ".join(
+            f"{known}{inspect.signature(function)}: {_first_line(function)}"
+            for known, function in sorted(commands.items())
+        )
     if name not in commands:
         raise CommandError(f"unknown command '{name}'; known: help, {', '.join(sorted(commands))}")
     pairs = [word.partition("=") for word in words]
@@ -112,8 +115,9 @@ class CommandPort:
             self._server = Server(self._wanted, Handler)
         except OSError as error:
             address, port = self._wanted
-            raise OSError(error.errno,
-                          f"command port {address}:{port}: {error.strerror}; choose another port") from error
+            raise OSError(
+                error.errno, f"command port {address}:{port}: {error.strerror}; choose another port"
+            ) from error
         threading.Thread(target=self._server.serve_forever, args=(0.05,), name="command_port", daemon=True).start()
 
     def close(self) -> None:
@@ -151,8 +155,10 @@ def send_command(port: int, command: str, address: str = LOOPBACK, timeout_s: fl
         CommandError: it refused.
         OSError: nobody listens, or no answer in time.
     """
-    words = [command, *(f"{key}={str(value).lower() if isinstance(value, bool) else value}"
-                        for key, value in arguments.items())]
+    words = [
+        command,
+        *(f"{key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in arguments.items()),
+    ]
     with socket.create_connection((address, port), timeout_s) as connection:
         connection.sendall((" ".join(words) + "\n").encode())
         with connection.makefile() as lines:

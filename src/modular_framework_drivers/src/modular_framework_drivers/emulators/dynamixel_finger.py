@@ -4,6 +4,7 @@
 A simple model, enough for what a driver sees: speed follows the motor's duty with one time constant, friction eats a
 share of the duty, and whatever the fingers press on pushes back like a spring.
 """
+
 from __future__ import annotations
 
 import math
@@ -134,7 +135,7 @@ class Finger:
     def _heat(self, period_s: float) -> None:
         model = self.model
         excess = self.temperature - model.room_temperature
-        self.temperature += (model.heating * self._duty ** 2 - model.cooling * excess) * period_s
+        self.temperature += (model.heating * self._duty**2 - model.cooling * excess) * period_s
         pressing = abs(self._duty) > model.overload_share and abs(self.speed) < 0.05 * model.top_speed
         in_torque_mode = bool(self.servo.get(mx64.TORQUE_CONTROL_MODE))
         self._overloaded_s = self._overloaded_s + period_s if pressing and not in_torque_mode else 0.0

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A serial line with emulated servos at its end: a pseudo-terminal under a name that stays, and faults on command."""
+
 from __future__ import annotations
 
 import heapq
@@ -87,11 +88,24 @@ class DynamixelLine:
     @property
     def commands(self) -> Mapping[str, Command]:
         """What the command port offers."""
-        return {"plug": self.plug, "unplug": self.unplug, "power_on": self.power_on, "power_off": self.power_off,
-                "overload": self.overload, "heat": self.heat, "garbage": self.garbage, "delay": self.delay,
-                "lose": self.lose, "corrupt": self.corrupt, "id": self.change_id, "object": self.place_object,
-                "offer_object": self.offer_object, "no_object": self.remove_object, "clear": self.clear,
-                "state": self.state}
+        return {
+            "plug": self.plug,
+            "unplug": self.unplug,
+            "power_on": self.power_on,
+            "power_off": self.power_off,
+            "overload": self.overload,
+            "heat": self.heat,
+            "garbage": self.garbage,
+            "delay": self.delay,
+            "lose": self.lose,
+            "corrupt": self.corrupt,
+            "id": self.change_id,
+            "object": self.place_object,
+            "offer_object": self.offer_object,
+            "no_object": self.remove_object,
+            "clear": self.clear,
+            "state": self.state,
+        }
 
     # ---- commands ----
 
@@ -231,8 +245,9 @@ class DynamixelLine:
 
     def _same_speed(self) -> bool:
         speed = SPEED_NAMES.get(termios.tcgetattr(self._slave)[5], 0)
-        return all(abs(speed - finger.servo.baudrate) <= BAUDRATE_MARGIN * finger.servo.baudrate
-                   for finger in self.fingers)
+        return all(
+            abs(speed - finger.servo.baudrate) <= BAUDRATE_MARGIN * finger.servo.baudrate for finger in self.fingers
+        )
 
     def _schedule(self, instruction: Instruction, answer: bytes) -> None:
         """Put an answer on the line, with its faults and after the time it takes on the wire."""
@@ -242,10 +257,11 @@ class DynamixelLine:
             return
         if faults.corrupt_every and self._answered % faults.corrupt_every == 0:
             place = self._random.randrange(2, len(answer))
-            answer = answer[:place] + bytes([answer[place] ^ 1 << self._random.randrange(7)]) + answer[place + 1:]
+            answer = answer[:place] + bytes([answer[place] ^ 1 << self._random.randrange(7)]) + answer[place + 1 :]
         answer = self._random.randbytes(faults.garbage) + answer
-        servo = next(finger.servo for finger in self.fingers
-                     if instruction.servo_id in (finger.servo.servo_id, BROADCAST))
+        servo = next(
+            finger.servo for finger in self.fingers if instruction.servo_id in (finger.servo.servo_id, BROADCAST)
+        )
         wire_s = 10.0 * (len(instruction.parameters) + 6 + len(answer)) / servo.baudrate
         due_s = time.monotonic() + wire_s + servo.get(mx64.RETURN_DELAY_TIME) * 2e-6 + faults.delay_s
         heapq.heappush(self._answers, (due_s, self._answered, answer))
@@ -264,8 +280,10 @@ def _at_least_0(name: str, value: float) -> float:
 
 def _describe(finger: Finger) -> str:
     servo = finger.servo
-    return (f"id={servo.servo_id} opening={finger.opening:.0f} speed={finger.speed:.0f} "
-            f"torque_limit={servo.get(mx64.TORQUE_LIMIT)} torque_enable={servo.get(mx64.TORQUE_ENABLE)} "
-            f"torque_mode={servo.get(mx64.TORQUE_CONTROL_MODE)} "
-            f"goal_torque={mx64.directed(servo.get(mx64.GOAL_TORQUE))} "
-            f"temperature={finger.temperature:.1f} errors={int(servo.errors)}")
+    return (
+        f"id={servo.servo_id} opening={finger.opening:.0f} speed={finger.speed:.0f} "
+        f"torque_limit={servo.get(mx64.TORQUE_LIMIT)} torque_enable={servo.get(mx64.TORQUE_ENABLE)} "
+        f"torque_mode={servo.get(mx64.TORQUE_CONTROL_MODE)} "
+        f"goal_torque={mx64.directed(servo.get(mx64.GOAL_TORQUE))} "
+        f"temperature={finger.temperature:.1f} errors={int(servo.errors)}"
+    )

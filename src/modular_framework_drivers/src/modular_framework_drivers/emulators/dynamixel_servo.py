@@ -3,6 +3,7 @@
 
 The motor is elsewhere (`dynamixel_finger`): it reads the goals of the servo and gives it the measured values.
 """
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
@@ -17,19 +18,46 @@ HEADER = b"\xff\xff"
 TABLE_SIZE = 74
 POSITION_RANGE = 28672
 FACTORY = {
-    mx64.MODEL_NUMBER: mx64.MODEL_NUMBER_MX64, mx64.FIRMWARE_VERSION: 41, mx64.SERVO_ID: 1, mx64.BAUD_RATE: 34,
-    mx64.RETURN_DELAY_TIME: 250, mx64.CCW_ANGLE_LIMIT: 4095, mx64.TEMPERATURE_LIMIT: 80, mx64.MIN_VOLTAGE_LIMIT: 60,
-    mx64.MAX_VOLTAGE_LIMIT: 240, mx64.MAX_TORQUE: 1023, mx64.STATUS_RETURN_LEVEL: 2, mx64.ALARM_LED: 36,
-    mx64.SHUTDOWN: 36, mx64.RESOLUTION_DIVIDER: 1, mx64.P_GAIN: 32, mx64.TORQUE_LIMIT: 1023,
-    mx64.PRESENT_VOLTAGE: 120, mx64.PRESENT_TEMPERATURE: 30, mx64.CURRENT: 2048,
+    mx64.MODEL_NUMBER: mx64.MODEL_NUMBER_MX64,
+    mx64.FIRMWARE_VERSION: 41,
+    mx64.SERVO_ID: 1,
+    mx64.BAUD_RATE: 34,
+    mx64.RETURN_DELAY_TIME: 250,
+    mx64.CCW_ANGLE_LIMIT: 4095,
+    mx64.TEMPERATURE_LIMIT: 80,
+    mx64.MIN_VOLTAGE_LIMIT: 60,
+    mx64.MAX_VOLTAGE_LIMIT: 240,
+    mx64.MAX_TORQUE: 1023,
+    mx64.STATUS_RETURN_LEVEL: 2,
+    mx64.ALARM_LED: 36,
+    mx64.SHUTDOWN: 36,
+    mx64.RESOLUTION_DIVIDER: 1,
+    mx64.P_GAIN: 32,
+    mx64.TORQUE_LIMIT: 1023,
+    mx64.PRESENT_VOLTAGE: 120,
+    mx64.PRESENT_TEMPERATURE: 30,
+    mx64.CURRENT: 2048,
 }
 EEPROM_END = 24
 READ_ONLY = {0, 1, 2, *range(36, 47), 50, 51}
 LARGEST = {
-    mx64.SERVO_ID: 252, mx64.BAUD_RATE: 252, mx64.RETURN_DELAY_TIME: 254, mx64.CW_ANGLE_LIMIT: 4095,
-    mx64.CCW_ANGLE_LIMIT: 4095, mx64.MAX_TORQUE: 1023, mx64.STATUS_RETURN_LEVEL: 2, mx64.ALARM_LED: 127,
-    mx64.SHUTDOWN: 127, mx64.RESOLUTION_DIVIDER: 4, mx64.TORQUE_ENABLE: 1, mx64.P_GAIN: 254, mx64.MOVING_SPEED: 2047,
-    mx64.TORQUE_LIMIT: 1023, mx64.LOCK: 1, mx64.TORQUE_CONTROL_MODE: 1, mx64.GOAL_TORQUE: 2047,
+    mx64.SERVO_ID: 252,
+    mx64.BAUD_RATE: 252,
+    mx64.RETURN_DELAY_TIME: 254,
+    mx64.CW_ANGLE_LIMIT: 4095,
+    mx64.CCW_ANGLE_LIMIT: 4095,
+    mx64.MAX_TORQUE: 1023,
+    mx64.STATUS_RETURN_LEVEL: 2,
+    mx64.ALARM_LED: 127,
+    mx64.SHUTDOWN: 127,
+    mx64.RESOLUTION_DIVIDER: 4,
+    mx64.TORQUE_ENABLE: 1,
+    mx64.P_GAIN: 254,
+    mx64.MOVING_SPEED: 2047,
+    mx64.TORQUE_LIMIT: 1023,
+    mx64.LOCK: 1,
+    mx64.TORQUE_CONTROL_MODE: 1,
+    mx64.GOAL_TORQUE: 2047,
     mx64.GOAL_ACCELERATION: 254,
 }
 
@@ -71,7 +99,7 @@ class PacketReader:
         while True:
             start = self._buffer.find(HEADER)
             if start < 0:
-                del self._buffer[:max(0, len(self._buffer) - 1)]
+                del self._buffer[: max(0, len(self._buffer) - 1)]
                 return
             del self._buffer[:start]
             if len(self._buffer) < 4:
@@ -82,8 +110,8 @@ class PacketReader:
                 continue
             if len(self._buffer) < length + 4:
                 return
-            body, check = bytes(self._buffer[2:length + 3]), self._buffer[length + 3]
-            del self._buffer[:length + 4]
+            body, check = bytes(self._buffer[2 : length + 3]), self._buffer[length + 3]
+            del self._buffer[: length + 4]
             yield Instruction(servo_id, body[2], body[3:], checksum(body) == check)
 
 
@@ -126,12 +154,12 @@ class DynamixelServo:
 
     def get(self, register: Register) -> int:
         """Word of a register, unsigned."""
-        return from_bytes(self._table[register.address:register.address + register.size])
+        return from_bytes(self._table[register.address : register.address + register.size])
 
     def set(self, register: Register, value: int) -> None:
         """Sets a register from inside; no rule applies."""
         data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
-        self._table[register.address:register.address + register.size] = data
+        self._table[register.address : register.address + register.size] = data
 
     def power_cycle(self) -> None:
         """Sets everything that is not in the EEPROM to its initial value, as a loss of power does."""
@@ -162,7 +190,7 @@ class DynamixelServo:
         if kind == READ:
             if len(data) != 2 or sum(data) > TABLE_SIZE:
                 return b"", ServoErrors.RANGE
-            return bytes(self._table[data[0]:data[0] + data[1]]), ServoErrors.NONE
+            return bytes(self._table[data[0] : data[0] + data[1]]), ServoErrors.NONE
         if kind == WRITE:
             return b"", self._write(data) if len(data) > 1 else ServoErrors.RANGE
         if kind == REG_WRITE:
@@ -183,7 +211,7 @@ class DynamixelServo:
         address, size = parameters[0], parameters[1]
         for start in range(2, len(parameters) - size, size + 1):
             if parameters[start] == self.servo_id:
-                self._write(bytes([address]) + parameters[start + 1:start + 1 + size])
+                self._write(bytes([address]) + parameters[start + 1 : start + 1 + size])
 
     def _answers(self, kind: int) -> bool:
         level = self.get(mx64.STATUS_RETURN_LEVEL)
@@ -201,7 +229,7 @@ class DynamixelServo:
         if places.start < EEPROM_END and self.get(mx64.LOCK):
             return ServoErrors.RANGE
         before = bytes(self._table)
-        self._table[places.start:places.stop] = data
+        self._table[places.start : places.stop] = data
         errors = self._faults(frozenset(places))
         if errors:
             self._table[:] = before
@@ -247,7 +275,7 @@ def answer_bus(servos: Iterable[DynamixelServo], instruction: Instruction) -> by
 def _bulk_answers(servos: list[DynamixelServo], instruction: Instruction) -> Iterator[bytes]:
     wanted = instruction.parameters[1:]
     for start in range(0, len(wanted) - 2, 3):
-        size, servo_id, address = wanted[start:start + 3]
+        size, servo_id, address = wanted[start : start + 3]
         for servo in servos:
             if servo.servo_id == servo_id:
                 yield servo.handle(Instruction(servo_id, READ, bytes([address, size]), instruction.intact))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Offers the commands of an emulator as ROS services too."""
+
 from __future__ import annotations
 
 import inspect
@@ -14,8 +15,11 @@ from modular_framework_drivers.emulators.command_port import Command
 
 def offer_commands(commands: Mapping[str, Command]) -> list[rospy.Service]:
     """Advertises `~<command>` (std_srvs/Trigger) for every command that needs no argument."""
-    return [rospy.Service(f"~{name}", Trigger, _CommandService(command)) for name, command in commands.items()
-            if all(one.default is not one.empty for one in inspect.signature(command).parameters.values())]
+    return [
+        rospy.Service(f"~{name}", Trigger, _CommandService(command))
+        for name, command in commands.items()
+        if all(one.default is not one.empty for one in inspect.signature(command).parameters.values())
+    ]
 
 
 class _CommandService:

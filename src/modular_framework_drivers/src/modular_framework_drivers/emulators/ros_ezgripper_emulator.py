@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An emulated EZGripper on a pseudo-terminal, as a ROS node."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -52,8 +53,9 @@ class EzGripperEmulatorNode:
         self._commands.connect()
         self._line.connect()
         self._services = offer_commands(self._line.commands)
-        rospy.loginfo("emulated gripper at %s; orders at TCP port %d (`help` lists them)", self._line.link,
-                      self._commands.port)
+        rospy.loginfo(
+            "emulated gripper at %s; orders at TCP port %d (`help` lists them)", self._line.link, self._commands.port
+        )
 
     def close(self) -> None:
         """Pull the plug."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The emulated controller of a UR arm as a ROS node."""
+
 from __future__ import annotations
 
 import rospy
@@ -21,11 +22,13 @@ class UrEmulatorNode:
     """
 
     def __init__(self) -> None:
-        self._emulator = UrEmulator(str(rospy.get_param("~address", "127.0.0.1")),
-                                    str(rospy.get_param("~model", "UR5")),
-                                    [float(value) for value in rospy.get_param("~positions", list(HOME))],
-                                    float(rospy.get_param("~unlock_delay", 5.0)),
-                                    int(rospy.get_param("~command_port", COMMAND_PORT)))
+        self._emulator = UrEmulator(
+            str(rospy.get_param("~address", "127.0.0.1")),
+            str(rospy.get_param("~model", "UR5")),
+            [float(value) for value in rospy.get_param("~positions", list(HOME))],
+            float(rospy.get_param("~unlock_delay", 5.0)),
+            int(rospy.get_param("~command_port", COMMAND_PORT)),
+        )
 
     def connect(self) -> None:
         """Listen, and offer the services.

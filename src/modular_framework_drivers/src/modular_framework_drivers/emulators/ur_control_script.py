@@ -6,6 +6,7 @@ cycle. Streamed commands are carried out at once. Any other is carried out when 
 the script then reports that in its state register and waits until the command is cleared. The numbers of the commands
 and the registers are those of ur-rtde 1.6.
 """
+
 from __future__ import annotations
 
 import logging
@@ -111,7 +112,7 @@ class ControlScript:
 
     def _doubles(self, first: int, count: int) -> tuple[float, ...]:
         start = self._offset + first
-        return tuple(self._controller.inputs.doubles[start:start + count])
+        return tuple(self._controller.inputs.doubles[start : start + count])
 
     def _stream(self, command: int) -> None:
         motion = self._controller.motion
@@ -133,7 +134,8 @@ class ControlScript:
             case Command.MOVEJ:
                 velocity, acceleration = self._doubles(6, 2)
                 controller.motion.set_command(
-                    MotionCommand(Drive.MOVE, self._doubles(0, JOINTS), velocity, acceleration))
+                    MotionCommand(Drive.MOVE, self._doubles(0, JOINTS), velocity, acceleration)
+                )
                 self._moving = True
                 return True
             case Command.SPEED_STOP | Command.SERVO_STOP | Command.STOPL | Command.STOPJ:
@@ -186,7 +188,7 @@ class ProgramReceiver:
             end = self._text.find("\nend\n")
             if end < 0:
                 return
-            program, self._text = self._text[:end + 5], self._text[end + 5:]
+            program, self._text = self._text[: end + 5], self._text[end + 5 :]
             self._start(program)
 
     def _start(self, text: str) -> None:

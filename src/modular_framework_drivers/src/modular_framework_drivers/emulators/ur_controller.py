@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The state of an emulated UR controller: arm, modes, registers, and the program that runs on it."""
+
 from __future__ import annotations
 
 import logging
@@ -12,7 +13,7 @@ from modular_framework_drivers.emulators.ur_motion import MAX_SERVO_ERROR, ArmMo
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 REGISTERS = 48
-PROTECTIVE_STOP_DECELERATION = 20.0   # [rad/s^2]
+PROTECTIVE_STOP_DECELERATION = 20.0  # [rad/s^2]
 
 
 class RobotMode(IntEnum):
@@ -40,8 +41,11 @@ class RuntimeState(IntEnum):
     PAUSED = 4
 
 
-_SAFETY_BITS = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
-                SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10}
+_SAFETY_BITS = {
+    SafetyMode.NORMAL: 1 << 0,
+    SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
+    SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
+}
 
 
 class Program(Protocol):
@@ -146,8 +150,11 @@ class UrController:
             self.stop_program()
         self.motion.step(self.period_s, self.speed_slider * self.speed_scaling)
         if self.motion.servo_error > MAX_SERVO_ERROR:
-            LOGGER.warning("the arm is %.3f rad behind its servo target, %.1f rad are allowed: protective stop",
-                           self.motion.servo_error, MAX_SERVO_ERROR)
+            LOGGER.warning(
+                "the arm is %.3f rad behind its servo target, %.1f rad are allowed: protective stop",
+                self.motion.servo_error,
+                MAX_SERVO_ERROR,
+            )
             self.protective_stop()
         if self.on_cycle is not None:
             self.on_cycle()
@@ -155,8 +162,12 @@ class UrController:
     def start_program(self, program: Program) -> bool:
         """Runs a program in place of what runs, whose motion ends; False when the arm is not ready for one."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety_mode is not SafetyMode.NORMAL:
-            LOGGER.warning("program %s not started: robot mode %s, safety mode %s", program.name,
-                           self.robot_mode.name, self.safety_mode.name)
+            LOGGER.warning(
+                "program %s not started: robot mode %s, safety mode %s",
+                program.name,
+                self.robot_mode.name,
+                self.safety_mode.name,
+            )
             return False
         self.stop_program()
         self.program = program

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the emulated dashboard server answers; texts as the real one's, which clients compare."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -57,8 +58,12 @@ class DashboardReceiver:
         lowered = line.lower()
         if lowered in self._answers:
             return self._answers[lowered]()
-        for beginning, answer in (("popup ", "showing popup"), ("addtolog ", "Added log message"),
-                                  ("load ", f"File not found: {line[5:]}"), ("setuserrole ", "Setting user role")):
+        for beginning, answer in (
+            ("popup ", "showing popup"),
+            ("addtolog ", "Added log message"),
+            ("load ", f"File not found: {line[5:]}"),
+            ("setuserrole ", "Setting user role"),
+        ):
             if lowered.startswith(beginning):
                 return answer
         return f"could not understand: '{line}'"
@@ -84,8 +89,10 @@ class DashboardReceiver:
     def _unlock(self) -> str:
         if self._controller.unlock():
             return "Protective stop releasing"
-        return ("Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop "
-                "before unlocking")
+        return (
+            "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop "
+            "before unlocking"
+        )
 
     def _restart_safety(self) -> str:
         if self._controller.safety_mode is SafetyMode.NORMAL and self._controller.robot_mode is RobotMode.RUNNING:

@@ -6,6 +6,7 @@ ur-rtde uploads is recognised and its effect carried out (ur_control_script.py).
 (command_port.py) injects faults and logs the commanded path: methods `inject_<name>` and `command_<name>` are its
 commands, which `help` lists.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -30,8 +31,8 @@ from modular_framework_drivers.emulators.ur_rtde_server import RtdeServer, RtdeS
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 RTDE_PORT, SCRIPT_PORTS, DASHBOARD_PORT, COMMAND_PORT = 30004, (30001, 30002, 30003), 29999, 29901
-_PRIORITY = 30       # below the control loop and its helpers, above everything else
-_MAX_CATCH_UP = 25   # cycles; after a longer hold-up the clock of the controller is set to now
+_PRIORITY = 30  # below the control loop and its helpers, above everything else
+_MAX_CATCH_UP = 25  # cycles; after a longer hold-up the clock of the controller is set to now
 
 
 class UrEmulator:
@@ -45,11 +46,19 @@ class UrEmulator:
         command_port: TCP port of the commands; 0 for any.
     """
 
-    def __init__(self, address: str = "127.0.0.1", model: str = "UR5", positions: Sequence[float] = HOME,
-                 unlock_delay_s: float = 5.0, command_port: int = COMMAND_PORT) -> None:
+    def __init__(
+        self,
+        address: str = "127.0.0.1",
+        model: str = "UR5",
+        positions: Sequence[float] = HOME,
+        unlock_delay_s: float = 5.0,
+        command_port: int = COMMAND_PORT,
+    ) -> None:
         if model not in MODELS or len(positions) != JOINTS:
-            raise ValueError(f"emulator of a UR arm: got model {model!r} and {len(positions)} joint positions; "
-                             f"expected one of {', '.join(MODELS)} and {JOINTS} positions")
+            raise ValueError(
+                f"emulator of a UR arm: got model {model!r} and {len(positions)} joint positions; "
+                f"expected one of {', '.join(MODELS)} and {JOINTS} positions"
+            )
         self.controller = UrController(MODELS[model], positions, unlock_delay_s)
         self._rtde = RtdeServer(self.controller)
         ports: dict[int, Callable[[], Session]] = {RTDE_PORT: self._rtde_session, DASHBOARD_PORT: self._dashboard}
@@ -59,8 +68,10 @@ class UrEmulator:
         self._stopping = threading.Event()
         self._log: IO[str] | None = None
         self.commands: dict[str, Callable[..., str | None]] = {
-            name.partition("_")[2]: self._locked(getattr(self, name)) for name in dir(self)
-            if name.startswith(("inject_", "command_"))}
+            name.partition("_")[2]: self._locked(getattr(self, name))
+            for name in dir(self)
+            if name.startswith(("inject_", "command_"))
+        }
         self._port = CommandPort(self.commands, command_port, address)
 
     def connect(self) -> None:
@@ -88,7 +99,7 @@ class UrEmulator:
                     next_s += period_s
                     if now_s - next_s > _MAX_CATCH_UP * period_s:
                         next_s = now_s + period_s
-            if ready and self._links.faults.frozen:   # what is ready stays unread: do not spin on it
+            if ready and self._links.faults.frozen:  # what is ready stays unread: do not spin on it
                 time.sleep(max(0.0, next_s - time.monotonic()))
 
     def stop(self) -> None:
@@ -198,25 +209,31 @@ class UrEmulator:
         """End the program, as a person at the robot does."""
         self.controller.stop_program()
 
-    def command_wrench(self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0,
-                     tz: float = 0.0) -> None:
+    def command_wrench(
+        self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0, tz: float = 0.0
+    ) -> None:
         """Set the measured wrench [N, Nm]."""
         self.controller.wrench = (float(fx), float(fy), float(fz), float(tx), float(ty), float(tz))
 
     def command_state(self) -> str:
         """Modes, slider, connections, payload and joint positions."""
         controller = self.controller
-        return (f"robot_mode={controller.robot_mode.name} safety_mode={controller.safety_mode.name} "
-                f"runtime_state={controller.runtime_state.name} slider={controller.speed_slider:g} "
-                f"connections={self._links.connections} payload_kg={controller.payload_kg:g} "
-                f"q={','.join(f'{position:.6f}' for position in controller.motion.positions)}")
+        return (
+            f"robot_mode={controller.robot_mode.name} safety_mode={controller.safety_mode.name} "
+            f"runtime_state={controller.runtime_state.name} slider={controller.speed_slider:g} "
+            f"connections={self._links.connections} payload_kg={controller.payload_kg:g} "
+            f"q={','.join(f'{position:.6f}' for position in controller.motion.positions)}"
+        )
 
     def command_log(self, path: str, always: bool = False) -> None:
         """Write streamed positions, `always` every cycle, to a file: wall, controller time [s], commanded, actual q."""
         self._end_log()
         self._log = open(path, "w", encoding="utf-8")  # noqa: SIM115  closed by _end_log
-        self._log.write("wall_s,controller_s," + ",".join(f"{kind}_{joint}" for kind in ("command", "actual")
-                                                           for joint in range(JOINTS)) + "\n")
+        self._log.write(
+            "wall_s,controller_s,"
+            + ",".join(f"{kind}_{joint}" for kind in ("command", "actual") for joint in range(JOINTS))
+            + "\n"
+        )
         self.controller.on_cycle = partial(self._write_log, self._log, always)
 
     def command_end_log(self) -> None:
@@ -247,8 +264,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--quiet", action="store_true", help="say only what is wrong")
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.WARNING if options.quiet else logging.INFO)
-    emulator = UrEmulator(options.address, options.model, options.positions, options.unlock_delay,
-                          options.command_port)
+    emulator = UrEmulator(options.address, options.model, options.positions, options.unlock_delay, options.command_port)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: emulator.stop())
     try:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs an emulated UR controller for tests and measurements: a process of its own at a loopback address of its own."""
+
 from __future__ import annotations
 
 import atexit
@@ -29,14 +30,27 @@ class EmulatedArm:
         address: where it listens.
     """
 
-    def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0,
-                 positions: Sequence[float] = HOME) -> None:
-        draw = random.Random(os.urandom(8))    # 127.x.y.z is this machine; tests that run at the same time draw others
+    def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0, positions: Sequence[float] = HOME) -> None:
+        draw = random.Random(os.urandom(8))  # 127.x.y.z is this machine; tests that run at the same time draw others
         self.address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
         self._process = subprocess.Popen(
-            [sys.executable, "-m", _MODULE, "--quiet", "--address", self.address, "--model", model,
-             "--unlock-delay", str(unlock_delay_s), "--positions", *map(str, positions)],
-            stdout=subprocess.PIPE, text=True)
+            [
+                sys.executable,
+                "-m",
+                _MODULE,
+                "--quiet",
+                "--address",
+                self.address,
+                "--model",
+                model,
+                "--unlock-delay",
+                str(unlock_delay_s),
+                "--positions",
+                *map(str, positions),
+            ],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         atexit.register(self.close)
         if self._process.stdout is None or self._process.stdout.readline() != "ready\n":
             raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")

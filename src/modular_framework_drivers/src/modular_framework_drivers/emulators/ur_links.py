@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The network side of the emulated controller: ports, connections, and what can go wrong with them."""
+
 from __future__ import annotations
 
 import logging
@@ -10,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
-_MAX_WAITING = 2_000   # packages that may wait for a client that does not read
+_MAX_WAITING = 2_000  # packages that may wait for a client that does not read
 
 
 @dataclass(slots=True)
@@ -38,8 +39,13 @@ class Session:
         greeting: sent at once.
     """
 
-    def __init__(self, receive: Callable[[bytes], bytes], cycle: Callable[[], bytes] | None = None,
-                 close: Callable[[], None] | None = None, greeting: bytes = b"") -> None:
+    def __init__(
+        self,
+        receive: Callable[[bytes], bytes],
+        cycle: Callable[[], bytes] | None = None,
+        close: Callable[[], None] | None = None,
+        greeting: bytes = b"",
+    ) -> None:
         self.receive = receive
         self.cycle = cycle
         self.close = close
@@ -91,8 +97,11 @@ class Links:
                 listener.bind((self._address, port))
             except OSError as error:
                 self.close()
-                raise OSError(error.errno, f"port {self._address}:{port}: {error.strerror}; does another emulator run "
-                                           "there? Choose another address, for example 127.0.0.2") from error
+                raise OSError(
+                    error.errno,
+                    f"port {self._address}:{port}: {error.strerror}; does another emulator run "
+                    "there? Choose another address, for example 127.0.0.2",
+                ) from error
             listener.listen()
             self._selector.register(listener, selectors.EVENT_READ, make_session)
 

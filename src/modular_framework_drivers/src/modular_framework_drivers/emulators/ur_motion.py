@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How the joints of the emulated arm move: they follow what the program wants within a UR5's speed and acceleration."""
+
 from __future__ import annotations
 
 import math
@@ -10,14 +11,20 @@ from enum import Enum
 from scipy.spatial.transform import Rotation
 
 JOINTS = 6
-MAX_VELOCITY = math.pi         # of every joint of a UR5 [rad/s]
-MAX_ACCELERATION = 40.0        # what URScript allows of a joint [rad/s^2]
-MAX_SERVO_ERROR = 0.5          # further behind its servo target the controller stops the arm [rad]
-_ARRIVED = 1e-5                # a move ends this near its target [rad], as slow as this [rad/s]
+MAX_VELOCITY = math.pi  # of every joint of a UR5 [rad/s]
+MAX_ACCELERATION = 40.0  # what URScript allows of a joint [rad/s^2]
+MAX_SERVO_ERROR = 0.5  # further behind its servo target the controller stops the arm [rad]
+_ARRIVED = 1e-5  # a move ends this near its target [rad], as slow as this [rad/s]
 
 # Denavit-Hartenberg parameters of the UR5 as its maker publishes them: (a [m], d [m], alpha [rad]) per joint.
-_UR5_LINKS = ((0.0, 0.089159, math.pi / 2), (-0.425, 0.0, 0.0), (-0.39225, 0.0, 0.0),
-              (0.0, 0.10915, math.pi / 2), (0.0, 0.09465, -math.pi / 2), (0.0, 0.0823, 0.0))
+_UR5_LINKS = (
+    (0.0, 0.089159, math.pi / 2),
+    (-0.425, 0.0, 0.0),
+    (-0.39225, 0.0, 0.0),
+    (0.0, 0.10915, math.pi / 2),
+    (0.0, 0.09465, -math.pi / 2),
+    (0.0, 0.0823, 0.0),
+)
 
 
 class Drive(Enum):
@@ -77,8 +84,10 @@ class ArmMotion:
         """Whether a MOVE has arrived or a STOP has come to rest."""
         at_rest = max(map(abs, self.velocities)) <= _ARRIVED
         if self.command.drive is Drive.MOVE:
-            return at_rest and all(abs(goal - position) <= _ARRIVED
-                                   for goal, position in zip(self.command.target, self.positions, strict=True))
+            return at_rest and all(
+                abs(goal - position) <= _ARRIVED
+                for goal, position in zip(self.command.target, self.positions, strict=True)
+            )
         return at_rest
 
     def step(self, dt_s: float, speed_fraction: float) -> None:
@@ -108,8 +117,9 @@ class ArmMotion:
                 tops = [command.velocity * error / longest for error in errors]
                 return self._towards(command.target, dt_s, command.acceleration, tops)
 
-    def _towards(self, target: Sequence[float], time_constant_s: float, acceleration: float,
-                 tops: Sequence[float]) -> list[float]:
+    def _towards(
+        self, target: Sequence[float], time_constant_s: float, acceleration: float, tops: Sequence[float]
+    ) -> list[float]:
         """Velocities that bring the joints to the target without running past it."""
         velocities = []
         for goal, position, top in zip(target, self.positions, tops, strict=True):
@@ -128,6 +138,7 @@ def flange_pose(positions: Sequence[float]) -> tuple[float, ...]:
         offset = (a * ct, a * st, d)
         link = ((ct, -st * ca, st * sa), (st, ct * ca, -ct * sa), (0.0, sa, ca))
         origin = [origin[row] + sum(rotation[row][k] * offset[k] for k in range(3)) for row in range(3)]
-        rotation = [[sum(rotation[row][k] * link[k][column] for k in range(3)) for column in range(3)]
-                    for row in range(3)]
+        rotation = [
+            [sum(rotation[row][k] * link[k][column] for k in range(3)) for column in range(3)] for row in range(3)
+        ]
     return (*origin, *Rotation.from_matrix(rotation).as_rotvec().tolist())

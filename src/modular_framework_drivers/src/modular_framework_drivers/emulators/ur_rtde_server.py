@@ -4,6 +4,7 @@
 Packages are a length of two bytes, a type of one and a payload, big-endian; a client sets up recipes (lists of
 variables), and data packages hold the values of a recipe after its number.
 """
+
 from __future__ import annotations
 
 import struct
@@ -17,8 +18,17 @@ from modular_framework_drivers.emulators.ur_motion import flange_pose
 _PROTOCOL, _VERSION, _DATA = ord("V"), ord("v"), ord("U")
 _OUTPUTS, _INPUTS, _START, _PAUSE = ord("O"), ord("I"), ord("S"), ord("P")
 _HEADER = struct.Struct(">HB")
-_FORMATS = {"DOUBLE": "d", "INT32": "i", "UINT32": "I", "UINT64": "Q", "UINT8": "B", "BOOL": "?",
-            "VECTOR3D": "3d", "VECTOR6D": "6d", "VECTOR6INT32": "6i"}
+_FORMATS = {
+    "DOUBLE": "d",
+    "INT32": "i",
+    "UINT32": "I",
+    "UINT64": "Q",
+    "UINT8": "B",
+    "BOOL": "?",
+    "VECTOR3D": "3d",
+    "VECTOR6D": "6d",
+    "VECTOR6INT32": "6i",
+}
 Value = float | Sequence[float]
 
 
@@ -79,11 +89,26 @@ def output_variables(controller: UrController) -> dict[str, Variable]:
         "elbow_position": ("VECTOR3D", lambda: zeros3),
         "elbow_velocity": ("VECTOR3D", lambda: zeros3),
     }
-    for name in ("target_qdd", "target_current", "target_moment", "actual_current", "joint_control_output",
-                 "actual_TCP_speed", "target_TCP_speed", "payload_inertia", "actual_current_as_torque"):
+    for name in (
+        "target_qdd",
+        "target_current",
+        "target_moment",
+        "actual_current",
+        "joint_control_output",
+        "actual_TCP_speed",
+        "target_TCP_speed",
+        "payload_inertia",
+        "actual_current_as_torque",
+    ):
         values[name] = ("VECTOR6D", lambda: zeros6)
-    for name in ("actual_momentum", "actual_robot_current", "standard_analog_input0", "standard_analog_input1",
-                 "standard_analog_output0", "standard_analog_output1"):
+    for name in (
+        "actual_momentum",
+        "actual_robot_current",
+        "standard_analog_input0",
+        "standard_analog_input1",
+        "standard_analog_output0",
+        "standard_analog_output1",
+    ):
         values[name] = ("DOUBLE", lambda: 0.0)
     for index in range(REGISTERS):
         values[f"output_int_register_{index}"] = ("INT32", _getter(controller.outputs.ints, index))
@@ -100,9 +125,11 @@ def input_variables(controller: UrController) -> dict[str, Variable]:
     def ignore(value: Value) -> None:
         del value
 
-    variables = {"speed_slider_fraction": Variable("DOUBLE", set=set_slider),
-                 "speed_slider_mask": Variable("UINT32", set=ignore),
-                 "external_force_torque": Variable("VECTOR6D", set=ignore)}
+    variables = {
+        "speed_slider_fraction": Variable("DOUBLE", set=set_slider),
+        "speed_slider_mask": Variable("UINT32", set=ignore),
+        "external_force_torque": Variable("VECTOR6D", set=ignore),
+    }
     for kind in ("standard", "configurable", "tool"):
         for suffix in ("_digital_output_mask", "_digital_output"):
             variables[kind + suffix] = Variable("UINT8", set=ignore)
@@ -110,8 +137,7 @@ def input_variables(controller: UrController) -> dict[str, Variable]:
         variables[f"standard_analog_output_{suffix}"] = Variable(type_name, set=ignore)
     for index in range(REGISTERS):
         variables[f"input_int_register_{index}"] = Variable("INT32", set=_setter(controller.inputs.ints, index))
-        variables[f"input_double_register_{index}"] = Variable("DOUBLE",
-                                                               set=_setter(controller.inputs.doubles, index))
+        variables[f"input_double_register_{index}"] = Variable("DOUBLE", set=_setter(controller.inputs.doubles, index))
     return variables
 
 
@@ -163,7 +189,7 @@ class Recipe:
         for variable in self._variables:
             count = int(_FORMATS[variable.type_name][:-1] or 1)
             if variable.set is not None:
-                variable.set(values[start] if count == 1 else values[start:start + count])
+                variable.set(values[start] if count == 1 else values[start : start + count])
             start += count
 
 
@@ -219,7 +245,7 @@ class RtdeSession:
                 raise RtdeProtocolError(f"package of type {kind} and length {size}")
             if len(self._buffer) < size:
                 break
-            payload, self._buffer = self._buffer[_HEADER.size:size], self._buffer[size:]
+            payload, self._buffer = self._buffer[_HEADER.size : size], self._buffer[size:]
             if kind == _DATA:
                 self._take(payload)
                 continue

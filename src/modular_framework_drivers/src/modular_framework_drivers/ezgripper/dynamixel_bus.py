@@ -4,6 +4,7 @@
 It adds to the SDK: waits that do not use the processor, retries of lost or damaged packets, a check of the length of
 answers, and exceptions that say what to check.
 """
+
 from __future__ import annotations
 
 import errno
@@ -90,8 +91,10 @@ class DynamixelBus:
         try:
             port.setBaudRate(self._baudrate)
         except (OSError, termios.error) as error:
-            raise PortLostError(f"port {self._name} cannot be opened: {_reason(error)}; check the cable, the name and "
-                                "the right to use it, and that no other program has it") from error
+            raise PortLostError(
+                f"port {self._name} cannot be opened: {_reason(error)}; check the cable, the name and "
+                "the right to use it, and that no other program has it"
+            ) from error
         self._port = port
 
     def close(self) -> None:
@@ -133,8 +136,9 @@ class DynamixelBus:
         what = f"{register.name} := {value}"
         return self._transact(servo_id, WRITE, [register.address, *data], 0, what)[1]
 
-    def _transact(self, servo_id: int, instruction: int, parameters: list[int], size: int,
-                  what: str) -> tuple[bytes, ServoErrors]:
+    def _transact(
+        self, servo_id: int, instruction: int, parameters: list[int], size: int, what: str
+    ) -> tuple[bytes, ServoErrors]:
         """Sends an instruction until it is answered; the answer has `size` bytes."""
         if self._port is None:
             raise PortLostError(f"port {self._name} is not open")
@@ -156,7 +160,7 @@ class DynamixelBus:
             errors = ServoErrors(bits)
             if result == COMM_SUCCESS and len(answer) == size + 6 and not errors & ServoErrors.CHECKSUM:
                 self._check(servo_id, errors, what)
-                return bytes(answer[5:5 + size]), errors
+                return bytes(answer[5 : 5 + size]), errors
             damaged |= result in (COMM_RX_CORRUPT, COMM_SUCCESS)
         raise NoAnswerError(self._silence(servo_id, damaged, tries))
 
@@ -168,15 +172,19 @@ class DynamixelBus:
 
     def _check(self, servo_id: int, errors: ServoErrors, what: str) -> None:
         if errors & BUS_ERRORS:
-            raise RefusedError(f"servo {servo_id} on {self._name} refused '{what}': {(errors & BUS_ERRORS)!r}; "
-                               "check that it is an MX-64 with protocol 1.0")
+            raise RefusedError(
+                f"servo {servo_id} on {self._name} refused '{what}': {(errors & BUS_ERRORS)!r}; "
+                "check that it is an MX-64 with protocol 1.0"
+            )
 
     def _silence(self, servo_id: int, damaged: bool, tries: int) -> str:
         how = "answers with damaged packets" if damaged else "does not answer"
-        where = ("the wiring and its termination, and that no two servos have one id" if damaged
-                 else "its power, its cable, its id and the baud rate")
-        return (f"servo {servo_id} on {self._name} at {self._baudrate} baud {how} ({tries} tries); "
-                f"check {where}")
+        where = (
+            "the wiring and its termination, and that no two servos have one id"
+            if damaged
+            else "its power, its cable, its id and the baud rate"
+        )
+        return f"servo {servo_id} on {self._name} at {self._baudrate} baud {how} ({tries} tries); check {where}"
 
 
 def _reason(error: OSError | termios.error) -> str:

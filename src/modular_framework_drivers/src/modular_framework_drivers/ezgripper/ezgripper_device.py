@@ -5,6 +5,7 @@ One thread communicates with the servos: it connects, calibrates and follows goa
 and connects again by itself. Other threads read the last state and write the next request. Each of the two is a single
 attribute, so there is no lock that the control loop might have to wait for.
 """
+
 from __future__ import annotations
 
 import itertools
@@ -95,8 +96,9 @@ class EzGripper:
         self._bus = DynamixelBus(settings.port_name, settings.baudrate, settings.link_timeout_s)
         self._servos = GripperServos(self._bus, settings.servo_ids, self._wait)
         nothing = GripperReading(CLOSED_POSITION, 0.0, 0.0, 0.0, 0.0, ServoErrors.NONE)
-        self._state = GripperState(-math.inf, nothing, Motion.MOVING, first, False,
-                                   f"{settings.name}: not connected yet")
+        self._state = GripperState(
+            -math.inf, nothing, Motion.MOVING, first, False, f"{settings.name}: not connected yet"
+        )
         self._ready = False
         self._warm = False
         self._off_since_s: float | None = None
@@ -262,14 +264,24 @@ class EzGripper:
 
     def _warn_of_heat(self, temperature: float) -> None:
         if temperature >= WARM and not self._warm:
-            LOGGER.warning("%s: the motor is at %.0f degrees C, it switches itself off at 80; hold with less torque",
-                           self.settings.name, temperature)
+            LOGGER.warning(
+                "%s: the motor is at %.0f degrees C, it switches itself off at 80; hold with less torque",
+                self.settings.name,
+                temperature,
+            )
         self._warm = temperature >= WARM
 
     def _publish(self, reading: GripperReading, now_s: float, fault: str) -> None:
         recovered = self._state.fault and not fault
-        state = replace(self._state, stamp_s=now_s, reading=reading, motion=self._grip.motion, goal=self._grip.goal,
-                        ready=self._ready, fault="")
+        state = replace(
+            self._state,
+            stamp_s=now_s,
+            reading=reading,
+            motion=self._grip.motion,
+            goal=self._grip.goal,
+            ready=self._ready,
+            fault="",
+        )
         if fault:
             self._set_fault(state, fault)
         else:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An EZGripper as hardware for controllers, alone or beside an arm in a combination."""
+
 from __future__ import annotations
 
 import logging
@@ -59,8 +60,13 @@ class EzGripperRobotHW(RobotHW):
         self._gripper = EzGripper(settings)
         self._gripper.start()
         if not self._wait_until_ready(self._gripper, timeout_s):
-            LOGGER.error("%s in %s: not ready within %g s: %s", type(self).__name__, where, timeout_s,
-                         self._gripper.state().fault or "it has not come to its start position")
+            LOGGER.error(
+                "%s in %s: not ready within %g s: %s",
+                type(self).__name__,
+                where,
+                timeout_s,
+                self._gripper.state().fault or "it has not come to its start position",
+            )
             self.close()
             return False
         self._faults = self._gripper.state().faults

@@ -6,6 +6,7 @@ an overload, and it lets go when the object gives way. So, when the fingers have
 their goal (a stall), the motor is switched to a constant torque towards the goal. It can sustain that torque, and the
 fingers follow the object.
 """
+
 from __future__ import annotations
 
 import math

@@ -5,6 +5,7 @@ From the maker's public library: the motor closes the fingers clockwise. Calibra
 until they stand still and takes that position as zero. From there to fully open the motor turns 2500 ticks, and the
 knuckle joint moves from 1.94 rad to 0.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -102,8 +103,9 @@ class GripperServos:
             model = self._bus.model_number(servo.servo_id)
             if model not in mx64.MODELS:
                 known = ", ".join(f"{number} ({name})" for number, name in mx64.MODELS.items())
-                raise GripperError(f"servo {servo.servo_id} is model {model}; expected {known} with protocol 1.0; "
-                                   "check servo_ids")
+                raise GripperError(
+                    f"servo {servo.servo_id} is model {model}; expected {known} with protocol 1.0; check servo_ids"
+                )
             for register in LIMIT_REGISTERS:
                 self._ensure(servo, register, mx64.MULTI_TURN_LIMIT)
             self._ensure(servo, mx64.MULTI_TURN_OFFSET, 0)
@@ -140,8 +142,10 @@ class GripperServos:
             standstill_s = standstill_s + 0.1 if stands else 0.0
             last = now
             if passed_s > CALIBRATION_TIMEOUT_S:
-                raise GripperError(f"calibration: the fingers still moved after {CALIBRATION_TIMEOUT_S:.0f} s of "
-                                   "closing; check that the tendon is in place and the fingers meet")
+                raise GripperError(
+                    f"calibration: the fingers still moved after {CALIBRATION_TIMEOUT_S:.0f} s of "
+                    "closing; check that the tendon is in place and the fingers meet"
+                )
             self._wait(0.1)
             passed_s += 0.1
 
@@ -169,8 +173,10 @@ class GripperServos:
             position = self._reading(servo).position
             ticks = (position - servo.zero + SLACK_TICKS) % mx64.TICKS_PER_TURN - SLACK_TICKS
             if ticks > TRAVEL_TICKS + SLACK_TICKS:
-                raise GripperError(f"servo {servo.servo_id}: its shaft is not where the fingers can be; free them and "
-                                   "check the tendon, or start the node again to calibrate them anew")
+                raise GripperError(
+                    f"servo {servo.servo_id}: its shaft is not where the fingers can be; free them and "
+                    "check the tendon, or start the node again to calibrate them anew"
+                )
             servo.zero = position - ticks
             servo.written.clear()
         return faithful
@@ -178,7 +184,8 @@ class GripperServos:
     def _remembers(self, servo: _Servo) -> bool:
         return mx64.TORQUE_ENABLE in servo.written and all(
             mx64.from_bytes(self._bus.read(servo.servo_id, register)[0]) == value % (1 << 8 * register.size)
-            for register, value in servo.written.items())
+            for register, value in servo.written.items()
+        )
 
     def forget(self) -> None:
         """Makes the next `drive` write every value; a motor that shut down has lost its torque limit."""
@@ -192,16 +199,21 @@ class GripperServos:
             BusError: a servo does not answer.
         """
         readings = [self._reading(servo) for servo in self._servos]
-        ticks = fmean(reading.position - (servo.zero or 0)
-                      for servo, reading in zip(self._servos, readings, strict=True))
+        ticks = fmean(
+            reading.position - (servo.zero or 0) for servo, reading in zip(self._servos, readings, strict=True)
+        )
         speed = fmean(reading.speed for reading in readings)
         errors = ServoErrors.NONE
         for reading in readings:
             errors |= reading.errors
-        return GripperReading(joint_from_ticks(ticks), -speed * CLOSED_POSITION / TRAVEL_TICKS,
-                              -fmean(reading.load for reading in readings),
-                              max(reading.temperature for reading in readings),
-                              min(reading.voltage for reading in readings), errors)
+        return GripperReading(
+            joint_from_ticks(ticks),
+            -speed * CLOSED_POSITION / TRAVEL_TICKS,
+            -fmean(reading.load for reading in readings),
+            max(reading.temperature for reading in readings),
+            min(reading.voltage for reading in readings),
+            errors,
+        )
 
     def drive(self, drive: Drive) -> None:
         """Sends a command to the motors; only values that have changed are written.
@@ -250,8 +262,10 @@ def describe_errors(errors: ServoErrors, temperature: float, voltage: float) -> 
     """Describes the motor's error bits and what to do."""
     texts = []
     if errors & ServoErrors.OVERHEATING:
-        texts.append(f"the motor is too hot ({temperature:.0f} degrees C) and has switched itself off; let it cool, "
-                     "and hold with less torque")
+        texts.append(
+            f"the motor is too hot ({temperature:.0f} degrees C) and has switched itself off; let it cool, "
+            "and hold with less torque"
+        )
     if errors & ServoErrors.OVERLOAD:
         texts.append("the motor was overloaded and has switched itself off; free the fingers, and use less torque")
     if errors & ServoErrors.VOLTAGE:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters of an EZGripper, checked."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -64,8 +65,10 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
             value = read_number(behaviour, key, default, smallest)
             if value <= largest:
                 return value
-            faults.append(f"parameter {join_names(behaviour.namespace, key)}: got {value:g}; expected a number from "
-                          f"{smallest:g} to {largest:g}")
+            faults.append(
+                f"parameter {join_names(behaviour.namespace, key)}: got {value:g}; expected a number from "
+                f"{smallest:g} to {largest:g}"
+            )
         except ParameterError as error:
             faults.append(str(error))
         return default
@@ -79,22 +82,36 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
     servo_ids = connection.get_param("servo_ids", [1])
     if not _are_ids(servo_ids):
         faults.append(_fault(connection, "servo_ids", servo_ids, f"a list of different numbers from 0 to {LARGEST_ID}"))
-    rules = GripRules(position_tolerance=number("position_tolerance", 0.03, 0.5, 0.002),
-                      stall_s=number("stall_time", 0.25, 5.0, 0.05),
-                      hold_torque=int(number("hold_torque", 400, TORQUE_MAX)))
+    rules = GripRules(
+        position_tolerance=number("position_tolerance", 0.03, 0.5, 0.002),
+        stall_s=number("stall_time", 0.25, 5.0, 0.05),
+        hold_torque=int(number("hold_torque", 400, TORQUE_MAX)),
+    )
     period_s = 1.0 / number("poll_rate", 50.0, 200.0, 1.0)
     start_position = number("start_position", 0.0, CLOSED_POSITION)
     link_timeout_s = number("link_timeout", 0.1, 10.0)
     if faults:
         raise ParameterError("; ".join(faults))
     name = str(connection.get_param("manipulator_name", "EzGripper"))
-    return GripperSettings(port_name, baudrate, tuple(servo_ids), name, period_s, start_position,
-                           link_timeout_s=link_timeout_s, rules=rules)
+    return GripperSettings(
+        port_name,
+        baudrate,
+        tuple(servo_ids),
+        name,
+        period_s,
+        start_position,
+        link_timeout_s=link_timeout_s,
+        rules=rules,
+    )
 
 
 def _are_ids(value: object) -> bool:
-    return (isinstance(value, list) and bool(value) and len(set(map(str, value))) == len(value)
-            and all(isinstance(one, int) and not isinstance(one, bool) and 0 <= one <= LARGEST_ID for one in value))
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and len(set(map(str, value))) == len(value)
+        and all(isinstance(one, int) and not isinstance(one, bool) and 0 <= one <= LARGEST_ID for one in value)
+    )
 
 
 def _fault(handle: NodeHandle, key: str, got: object, expected: str) -> str:

@@ -3,6 +3,7 @@
 
 Source: the public manual of the maker, ROBOTIS e-Manual, "MX-64" and "DYNAMIXEL Protocol 1.0".
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -135,5 +136,11 @@ def direction_word(value: int) -> int:
 
 def parse_reading(data: bytes, errors: ServoErrors) -> Reading:
     """What the eight bytes of `READING` say."""
-    return Reading(signed(from_bytes(data[0:2])), directed(from_bytes(data[2:4])) * SPEED_UNIT_TICKS_S,
-                   directed(from_bytes(data[4:6])) / TORQUE_MAX, data[6] / 10.0, float(data[7]), errors)
+    return Reading(
+        signed(from_bytes(data[0:2])),
+        directed(from_bytes(data[2:4])) * SPEED_UNIT_TICKS_S,
+        directed(from_bytes(data[4:6])) / TORQUE_MAX,
+        data[6] / 10.0,
+        float(data[7]),
+        errors,
+    )

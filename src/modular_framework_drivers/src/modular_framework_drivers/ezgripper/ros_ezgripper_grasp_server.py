@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Grasp action of an EZGripper without ROS controllers: one node drives the servos itself."""
+
 from __future__ import annotations
 
 import threading
@@ -68,7 +69,7 @@ class EzGripperManipulator:
             refuse_no_effort(self._joint, torque)
         before = self._gripper.state()
         self._refuse_fault(before)
-        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)    # forgives rounding
+        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)  # forgives rounding
         number = self._gripper.command(position, torque)
         end_s = time.monotonic() + motion.timeout_s
         # an object that the fingers hold may give way to the new torque
@@ -76,7 +77,7 @@ class EzGripperManipulator:
         while True:
             state = self._gripper.state()
             self._refuse_fault(state)
-            if state.faults != before.faults:    # a fault between two reads may have cancelled the goal
+            if state.faults != before.faults:  # a fault between two reads may have cancelled the goal
                 self._stop()
                 raise GraspCommandError(state.last_fault)
             if motion.stop_requested():
@@ -87,18 +88,25 @@ class EzGripperManipulator:
                 return self._outcome(state)
             if time.monotonic() > end_s:
                 self._stop()
-                raise GraspCommandError(f"the fingers still moved after {motion.timeout_s:.1f} s, at "
-                                        f"{state.reading.position:.4f} rad; check that nothing slips")
+                raise GraspCommandError(
+                    f"the fingers still moved after {motion.timeout_s:.1f} s, at "
+                    f"{state.reading.position:.4f} rad; check that nothing slips"
+                )
             time.sleep(POLL_S)
 
     def _outcome(self, state: GripperState) -> Outcome:
         reading, held = state.reading, state.motion is Motion.HOLDING
         does = "press" if held else "stand"
         allowed = min(state.goal.torque, self._gripper.settings.rules.hold_torque)
-        pressing = held and allowed >= CALIBRATION_TORQUE and (
-            abs(reading.load) * TORQUE_MAX >= PRESSING_SHARE * allowed)
-        return Outcome({self._joint: reading.position}, held,
-                       f"the fingers {does} at {reading.position:.4f} rad with {reading.load:.0%} torque", pressing)
+        pressing = (
+            held and allowed >= CALIBRATION_TORQUE and (abs(reading.load) * TORQUE_MAX >= PRESSING_SHARE * allowed)
+        )
+        return Outcome(
+            {self._joint: reading.position},
+            held,
+            f"the fingers {does} at {reading.position:.4f} rad with {reading.load:.0%} torque",
+            pressing,
+        )
 
     def _refuse_fault(self, state: GripperState) -> None:
         if state.fault:
@@ -114,8 +122,9 @@ class EzGripperManipulator:
             if state.fault or (state.stamp_s > asked_s and standstill.update(state.reading.velocity, state.stamp_s)):
                 return
             time.sleep(POLL_S)
-        rospy.logwarn("%s: told to stop, the fingers still moved after %.1f s", self._gripper.settings.name,
-                      STOP_TIMEOUT_S)
+        rospy.logwarn(
+            "%s: told to stop, the fingers still moved after %.1f s", self._gripper.settings.name, STOP_TIMEOUT_S
+        )
 
     def _publish(self) -> None:
         last_s = self._gripper.state().stamp_s
@@ -128,8 +137,9 @@ class EzGripperManipulator:
 
     def _message(self, state: GripperState) -> JointState:
         reading = state.reading
-        message = JointState(name=[self._joint], position=[reading.position], velocity=[reading.velocity],
-                             effort=[reading.load])
+        message = JointState(
+            name=[self._joint], position=[reading.position], velocity=[reading.velocity], effort=[reading.load]
+        )
         message.header.stamp = rospy.Time.now()
         return message
 

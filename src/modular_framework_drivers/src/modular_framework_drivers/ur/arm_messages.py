@@ -6,6 +6,7 @@ comes from both processes when they begin to connect; STATE, and ALIVE while the
 READY once and ACCEPTED after each command from the one that commands; FAILED with the reason from both, as the last
 message.
 """
+
 from __future__ import annotations
 
 import struct
@@ -50,9 +51,20 @@ class ArmState:
 
     def packed(self) -> bytes:
         """The message that carries it."""
-        return _STATE.pack(STATE, self.received_s, self.timestamp_s, *self.positions, *self.velocities,
-                           *self.currents, *self.wrench, self.speed_fraction, self.speed_scaling, self.robot_mode,
-                           self.safety_mode, self.runtime_state)
+        return _STATE.pack(
+            STATE,
+            self.received_s,
+            self.timestamp_s,
+            *self.positions,
+            *self.velocities,
+            *self.currents,
+            *self.wrench,
+            self.speed_fraction,
+            self.speed_scaling,
+            self.robot_mode,
+            self.safety_mode,
+            self.runtime_state,
+        )
 
     @classmethod
     def unpacked(cls, message: bytes) -> ArmState:

@@ -1,20 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Faults of an arm from the modes of its controller."""
+
 from __future__ import annotations
 
 from modular_framework_drivers.ur.arm_messages import ArmState
 
 PROGRAM_STOPPED, PROGRAM_PLAYING = 1, 2
 _SAFETY_NORMAL, _SAFETY_REDUCED, _ROBOT_RUNNING = 1, 2, 7
-_SAFETY_MODES = {3: "protective stop", 4: "recovery mode", 5: "safeguard stop", 6: "emergency stop (system)",
-                 7: "emergency stop", 8: "safety violation", 9: "safety fault", 10: "joint identification",
-                 11: "undefined safety mode"}
-_ROBOT_MODES = {-1: "has no controller", 0: "is disconnected", 1: "waits for a confirmation of its safety settings",
-                2: "is booting", 3: "has no power", 4: "is being powered", 5: "has its brakes closed",
-                6: "is in backdrive mode", 8: "updates its firmware"}
+_SAFETY_MODES = {
+    3: "protective stop",
+    4: "recovery mode",
+    5: "safeguard stop",
+    6: "emergency stop (system)",
+    7: "emergency stop",
+    8: "safety violation",
+    9: "safety fault",
+    10: "joint identification",
+    11: "undefined safety mode",
+}
+_ROBOT_MODES = {
+    -1: "has no controller",
+    0: "is disconnected",
+    1: "waits for a confirmation of its safety settings",
+    2: "is booting",
+    3: "has no power",
+    4: "is being powered",
+    5: "has its brakes closed",
+    6: "is in backdrive mode",
+    8: "updates its firmware",
+}
 _POWER = "call dashboard/power_on and dashboard/brake_release"
-_REMEDIES = {3: "find its cause and call dashboard/unlock_protective_stop", 6: f"release it and {_POWER}",
-             7: f"release it and {_POWER}", 8: "call dashboard/restart_safety", 9: "call dashboard/restart_safety"}
+_REMEDIES = {
+    3: "find its cause and call dashboard/unlock_protective_stop",
+    6: f"release it and {_POWER}",
+    7: f"release it and {_POWER}",
+    8: "call dashboard/restart_safety",
+    9: "call dashboard/restart_safety",
+}
 
 
 def robot_fault(state: ArmState, address: str) -> str:

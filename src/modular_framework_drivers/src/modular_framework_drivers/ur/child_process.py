@@ -3,6 +3,7 @@
 
 A pipe of multiprocessing would not do: its `send` blocks while the pipe is full, which the control loop must not do.
 """
+
 from __future__ import annotations
 
 import socket
@@ -37,7 +38,9 @@ class ChildProcess:
             try:
                 self._process = subprocess.Popen(
                     [*_ORDINARY, sys.executable, "-m", module, role, str(other.fileno()), *rest],
-                    pass_fds=[other.fileno()], stdin=subprocess.DEVNULL)
+                    pass_fds=[other.fileno()],
+                    stdin=subprocess.DEVNULL,
+                )
             except OSError:
                 self._socket.close()
                 raise
@@ -50,7 +53,7 @@ class ChildProcess:
                 message = self._socket.recv(MESSAGE_SIZE)
             except BlockingIOError:
                 return
-            except ConnectionResetError:    # it ended without reading all messages to it; those from it come next
+            except ConnectionResetError:  # it ended without reading all messages to it; those from it come next
                 continue
             except OSError:
                 message = b""

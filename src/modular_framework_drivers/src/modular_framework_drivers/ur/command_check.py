@@ -10,6 +10,7 @@ The limits are those of all hardware (modular_framework_control.hardware_interfa
 command by the nearest one allowed, which does not do here: a real arm must not drive to the end of its range because a
 controller went wrong, and it stops itself hard when its speed is to change at once.
 """
+
 from __future__ import annotations
 
 import math
@@ -20,7 +21,7 @@ from modular_framework_control.hardware_interface.joint_limit_parameters import 
 from modular_framework_control.hardware_interface.joint_limits import soft_velocities
 from modular_framework_control.trajectory.motion_limits import CURVE_MARGIN
 
-_SLACK = 1e-6     # tolerance for rounding [rad], and as a share of a limit
+_SLACK = 1e-6  # tolerance for rounding [rad], and as a share of a limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +52,10 @@ class CheckedJoint:
         if self.soft is not None:
             slowest, fastest = soft_velocities(position, limits, self.soft)
         below, above = max(position - limits.min_position, 0.0), max(limits.max_position - position, 0.0)
-        return (max(min(slowest, 0.0), -_closing_speed(below, limits.max_acceleration, period_s)),
-                min(max(fastest, 0.0), _closing_speed(above, limits.max_acceleration, period_s)))
+        return (
+            max(min(slowest, 0.0), -_closing_speed(below, limits.max_acceleration, period_s)),
+            min(max(fastest, 0.0), _closing_speed(above, limits.max_acceleration, period_s)),
+        )
 
 
 class CommandCheck:
@@ -108,12 +111,16 @@ class CommandCheck:
                 return f"joint '{joint.name}': command {command} is no position; the arm holds"
             lowest, highest = joint.range_from(sent)
             if not lowest - CURVE_MARGIN <= command <= highest + CURVE_MARGIN:
-                return (f"joint '{joint.name}': command {command:.6g} rad is outside its range "
-                        f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds")
+                return (
+                    f"joint '{joint.name}': command {command:.6g} rad is outside its range "
+                    f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds"
+                )
             if abs(command - sent) > self._max_jump:
-                return (f"joint '{joint.name}': command {command:.6g} rad is {abs(command - sent):.3g} rad away from "
-                        f"{sent:.6g} rad where the arm is told to be; at most {self._max_jump:g} rad at once "
-                        "(parameter max_jump_rad); the arm holds")
+                return (
+                    f"joint '{joint.name}': command {command:.6g} rad is {abs(command - sent):.3g} rad away from "
+                    f"{sent:.6g} rad where the arm is told to be; at most {self._max_jump:g} rad at once "
+                    "(parameter max_jump_rad); the arm holds"
+                )
         return ""
 
     def _brake(self, index: int, change: float, period_s: float) -> None:
@@ -155,6 +162,6 @@ def _closing_speed(distance: float, deceleration: float, period_s: float) -> flo
     A cycle at that speed leaves a distance whose closing speed is lower by what is braked in a cycle, or nothing.
     """
     step = deceleration * period_s
-    cycles = distance / (step * period_s)                       # that it takes at the speed of one step
+    cycles = distance / (step * period_s)  # that it takes at the speed of one step
     brakings = math.floor(math.sqrt(0.25 + 2.0 * cycles) - 0.5)
     return step * (cycles / (brakings + 1) + 0.5 * brakings)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Client of the dashboard server of an arm; one line per request."""
+
 from __future__ import annotations
 
 import socket
@@ -24,16 +25,21 @@ def ask_dashboard(address: str, line: str, timeout_s: float = 2.0, port: int = D
         DashboardError: nobody listens, or no answer in time.
     """
     try:
-        with socket.create_connection((address, port), timeout_s) as connection, \
-                connection.makefile("rw", encoding="utf-8", errors="replace", newline="\n") as lines:
-            lines.readline()    # the greeting
+        with (
+            socket.create_connection((address, port), timeout_s) as connection,
+            connection.makefile("rw", encoding="utf-8", errors="replace", newline="\n") as lines,
+        ):
+            lines.readline()  # the greeting
             lines.write(line + "\n")
             lines.flush()
             answer = lines.readline().strip()
     except OSError as error:
-        raise DashboardError(f"dashboard server at {address}:{port}: '{line}' got no answer: {error}; is the arm's "
-                             "controller on, and in remote control?") from error
+        raise DashboardError(
+            f"dashboard server at {address}:{port}: '{line}' got no answer: {error}; is the arm's "
+            "controller on, and in remote control?"
+        ) from error
     if not answer:
-        raise DashboardError(f"dashboard server at {address}:{port} closed the connection instead of answering "
-                             f"'{line}'")
+        raise DashboardError(
+            f"dashboard server at {address}:{port} closed the connection instead of answering '{line}'"
+        )
     return answer

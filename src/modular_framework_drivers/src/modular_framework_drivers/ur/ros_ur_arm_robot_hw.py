@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An arm of Universal Robots in a ROS node: publishes when it is ready, serves `resume` and the dashboard."""
+
 from __future__ import annotations
 
 import threading

@@ -5,6 +5,7 @@ Two processes run ur-rtde (rtde_process.py). A thread starts them, and starts th
 control loop only exchanges datagrams with them. Whether the arm is silent is decided by the process that reads it,
 because a control loop that is late itself cannot tell.
 """
+
 from __future__ import annotations
 
 import logging
@@ -29,13 +30,13 @@ from modular_framework_drivers.ur.state_watch import SilenceWatch
 LOGGER = logging.getLogger("rosout.ur_arm")
 _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
-_RETRY_S = 0.5                  # between two attempts to connect
-_START_TIMEOUT_S = 30.0         # for a process to start; a busy computer takes its time
-_CONNECT_TIMEOUT_S = 5.0        # from then to the first state
-_PROGRAM_TIMEOUT_S = 15.0       # from then until the program is uploaded and runs
-_SILENCE_TIMEOUT_S = 0.5        # a process that sends nothing for so long counts as failed
-_STOP_PATIENCE_S = 1.5          # for the arm to come to rest when the link is closed
-_FINAL_STOP_S = 0.1             # for a process that is ended to send its stop, behind all commands still queued
+_RETRY_S = 0.5  # between two attempts to connect
+_START_TIMEOUT_S = 30.0  # for a process to start; a busy computer takes its time
+_CONNECT_TIMEOUT_S = 5.0  # from then to the first state
+_PROGRAM_TIMEOUT_S = 15.0  # from then until the program is uploaded and runs
+_SILENCE_TIMEOUT_S = 0.5  # a process that sends nothing for so long counts as failed
+_STOP_PATIENCE_S = 1.5  # for the arm to come to rest when the link is closed
+_FINAL_STOP_S = 0.1  # for a process that is ended to send its stop, behind all commands still queued
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ class RtdeLink:
     def request_program(self) -> None:
         """Requests that the program that takes commands is uploaded (again) as soon as the arm is connected."""
         control = self._control
-        if control is not None and control.working:    # its program may have ended before the arm followed it
+        if control is not None and control.working:  # its program may have ended before the arm followed it
             control.failed, self.commanding = True, False
         self.program_failure = ""
         self._program_wanted = True
@@ -191,7 +192,7 @@ class RtdeLink:
     def _lose(self, states: _RtdeProcess, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
-            if self._has_commanded:    # before the first command nothing has moved, and no `resume` is needed
+            if self._has_commanded:  # before the first command nothing has moved, and no `resume` is needed
                 self._drop("its program was given up when the link was lost")
         if not states.failed:
             states.failed = True
@@ -268,11 +269,19 @@ class RtdeLink:
     def _control_arguments(self) -> list[str]:
         settings, wanted = self._settings, self._settings.speed_scale
         if wanted is not None and self._has_commanded and self.state is not None:
-            wanted = min(wanted, self.state.speed_fraction)    # somebody at the robot has lowered it meanwhile
+            wanted = min(wanted, self.state.speed_fraction)  # somebody at the robot has lowered it meanwhile
         scale = [] if wanted is None else ["--speed-scale", _written(wanted)]
-        return [*scale, "--payload", _written(settings.payload_kg),
-                "--payload-centre", *map(_written, settings.payload_centre_m),
-                "--lookahead", _written(settings.lookahead_s), "--gain", _written(settings.gain)]
+        return [
+            *scale,
+            "--payload",
+            _written(settings.payload_kg),
+            "--payload-centre",
+            *map(_written, settings.payload_centre_m),
+            "--lookahead",
+            _written(settings.lookahead_s),
+            "--gain",
+            _written(settings.gain),
+        ]
 
     def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _RtdeProcess:
         real_time = ["--real-time"] if self._settings.real_time else []

@@ -8,6 +8,7 @@ ends, or is ended, and its parent starts the next one. It also ends, and stops t
 Both use real-time scheduling where that is wanted and permitted, once they are connected, with a lower priority than
 the control loop.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -33,12 +34,22 @@ from modular_framework_drivers.ur.arm_messages import (
 )
 from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
 
-_PRIORITY = 60               # the control loop has 80
+_PRIORITY = 60  # the control loop has 80
 _POLL_PERIOD_S = 0.002
 _ALIVE_PERIOD_S = 0.02
-_STOP_DECELERATION = 10.0    # at the end of a connection [rad/s^2]
-_VARIABLES = ["timestamp", "actual_q", "actual_qd", "actual_current", "actual_TCP_force", "target_speed_fraction",
-              "speed_scaling", "robot_mode", "safety_mode", "runtime_state"]
+_STOP_DECELERATION = 10.0  # at the end of a connection [rad/s^2]
+_VARIABLES = [
+    "timestamp",
+    "actual_q",
+    "actual_qd",
+    "actual_current",
+    "actual_TCP_force",
+    "target_speed_fraction",
+    "speed_scaling",
+    "robot_mode",
+    "safety_mode",
+    "runtime_state",
+]
 
 
 class ConnectionEndedError(Exception):
@@ -84,9 +95,19 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
 
 def _state_of(arm: Any, now_s: float, timestamp_s: float) -> ArmState:
     """Returns the state that ur-rtde received last."""
-    return ArmState(now_s, timestamp_s, tuple(arm.getActualQ()), tuple(arm.getActualQd()),
-                    tuple(arm.getActualCurrent()), tuple(arm.getActualTCPForce()), arm.getTargetSpeedFraction(),
-                    arm.getSpeedScaling(), arm.getRobotMode(), arm.getSafetyMode(), arm.getRuntimeState())
+    return ArmState(
+        now_s,
+        timestamp_s,
+        tuple(arm.getActualQ()),
+        tuple(arm.getActualQd()),
+        tuple(arm.getActualCurrent()),
+        tuple(arm.getActualTCPForce()),
+        arm.getTargetSpeedFraction(),
+        arm.getSpeedScaling(),
+        arm.getRobotMode(),
+        arm.getSafetyMode(),
+        arm.getRuntimeState(),
+    )
 
 
 def _send(channel: socket.socket, message: bytes) -> None:
@@ -133,7 +154,7 @@ def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
             positions, time_s = read_servo_message(message)
             # a paused or stopped program accepts none; the state of the arm says which of the two it is
             if arm.servoJ(positions, 0.0, 0.0, time_s, options.lookahead, options.gain):
-                with contextlib.suppress(BrokenPipeError):   # the parent is gone; the next message says so
+                with contextlib.suppress(BrokenPipeError):  # the parent is gone; the next message says so
                     _send(channel, ACCEPTED)
     arm.servoStop(_STOP_DECELERATION)
     arm.stopScript()
@@ -147,7 +168,7 @@ def _newest(channel: socket.socket) -> bytes:
             message = channel.recv(MESSAGE_SIZE, socket.MSG_DONTWAIT)
     except BlockingIOError:
         return message
-    except ConnectionResetError:    # it ended without reading the last message to it
+    except ConnectionResetError:  # it ended without reading the last message to it
         return b""
     return message
 
@@ -171,9 +192,9 @@ def command_line() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one of the two processes; returns the exit code."""
     options = command_line().parse_args(arguments)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)    # ctrl-c in the terminal is for the control loop, which ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl-c in the terminal is for the control loop, which ends us
     with socket.socket(fileno=options.channel) as channel:
-        channel.setblocking(True)     # one made where sockets have a default timeout, as rospy sets it, does not block
+        channel.setblocking(True)  # one made where sockets have a default timeout, as rospy sets it, does not block
         try:
             if options.role == "state":
                 report_states(options, channel)
@@ -183,10 +204,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         except Exception as error:  # ur-rtde raises many kinds; all mean that this connection is over
             text = str(error).strip() or type(error).__name__
-            if "Failed to start control script" in text:    # ur-rtde gives this reason for some arms only
+            if "Failed to start control script" in text:  # ur-rtde gives this reason for some arms only
                 text += "; is the arm in remote control?"
             try:
-                _send(channel, FAILED + text.encode()[:MESSAGE_SIZE - 1])
+                _send(channel, FAILED + text.encode()[: MESSAGE_SIZE - 1])
             except OSError:
                 return 1
             return 1

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Distinguishes a silent link from a busy computer, and a state of the arm from corrupted data."""
+
 from __future__ import annotations
 
 import math
@@ -7,9 +8,9 @@ import math
 from modular_framework_drivers.ur.arm_messages import ArmState
 
 _LONGEST_STEP_S = 0.02
-_MAX_POSITION = 100.0           # some joints, as wrist 3 of a UR3, turn without end [rad]
-_MAX_SPEED = 2.0 * math.pi      # of a measured joint; twice what a UR5's does [rad/s]
-_SLACK = 0.05                   # rounding and jitter of the clock [rad]
+_MAX_POSITION = 100.0  # some joints, as wrist 3 of a UR3, turn without end [rad]
+_MAX_SPEED = 2.0 * math.pi  # of a measured joint; twice what a UR5's does [rad/s]
+_SLACK = 0.05  # rounding and jitter of the clock [rad]
 
 
 class SilenceWatch:
@@ -43,4 +44,5 @@ def is_plausible(state: ArmState, last: ArmState | None) -> bool:
         return True
     reach = _MAX_SPEED * (state.received_s - last.received_s) + _SLACK
     return state.timestamp_s > last.timestamp_s and all(
-        abs(new - old) <= reach for new, old in zip(state.positions, last.positions, strict=True))
+        abs(new - old) <= reach for new, old in zip(state.positions, last.positions, strict=True)
+    )

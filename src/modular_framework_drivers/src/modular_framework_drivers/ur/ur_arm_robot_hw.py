@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An arm of Universal Robots as a `RobotHW`: joints commanded by position, over RTDE."""
+
 from __future__ import annotations
 
 import logging
@@ -24,12 +25,18 @@ from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_number
 
 LOGGER = logging.getLogger("rosout.ur_arm")
-JOINT_NAMES = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint",
-               "wrist_3_joint")
+JOINT_NAMES = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
 _PERIOD_SMOOTHING = 0.02
 _SHORTEST_PERIOD_S = 0.002
-_LONGEST_PERIOD_S = 0.05    # a longer one is not made up for at once
-_CAUSE_S = 0.03      # by which the state that explains the end of the program may come after it [s]
+_LONGEST_PERIOD_S = 0.05  # a longer one is not made up for at once
+_CAUSE_S = 0.03  # by which the state that explains the end of the program may come after it [s]
 
 
 class UrArmHardware(RobotHW):
@@ -91,8 +98,7 @@ class UrArmHardware(RobotHW):
             handle.limits = joint.limits
             self._handles.append(commands.register_handle(handle))
         self._wrench = ForceTorqueSensorHandle(self._prefix + "wrench", self._prefix + "base")
-        self._scaling = SpeedScalingHandle(self._prefix + "speed_scaling_factor",
-                                           [joint.name for joint in joints], 0.0)
+        self._scaling = SpeedScalingHandle(self._prefix + "speed_scaling_factor", [joint.name for joint in joints], 0.0)
         sensors, scaling = ForceTorqueSensorInterface(), SpeedScalingInterface()
         sensors.register_handle(self._wrench)
         scaling.register_handle(self._scaling)
@@ -123,8 +129,9 @@ class UrArmHardware(RobotHW):
     def _update_handles(self, state: ArmState) -> None:
         self._robot_fault = robot_fault(state, self.address)
         known = self._link is not None and not self._link.lost
-        for handle, position, velocity, current in zip(self._handles, state.positions, state.velocities,
-                                                       state.currents, strict=True):
+        for handle, position, velocity, current in zip(
+            self._handles, state.positions, state.velocities, state.currents, strict=True
+        ):
             joint = handle.state
             joint.position, joint.velocity, joint.effort = position, velocity if known else 0.0, current
         self._wrench.force = state.wrench[0], state.wrench[1], state.wrench[2]
@@ -147,7 +154,7 @@ class UrArmHardware(RobotHW):
         if self._link is None or self._check is None or not self._following:
             return
         if self._link.state is None or self._link.state.runtime_state != PROGRAM_PLAYING:
-            self._restart_from_measured(self._check)    # a paused arm continues from where it stands
+            self._restart_from_measured(self._check)  # a paused arm continues from where it stands
             return
         period_s = min(period_s, _LONGEST_PERIOD_S)
         if period_s > 0.0:

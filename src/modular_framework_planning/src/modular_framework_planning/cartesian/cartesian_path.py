@@ -4,6 +4,7 @@
 The joints follow the line by continuation, so they cannot change the arm's posture on the way; between two rows the
 straight motion of the joints keeps the link within a tenth of a millimetre of the line for steps of a centimetre.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -88,9 +89,16 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
     return objection
 
 
-def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints: Sequence[Transform],
-                  max_step_m: float, jumps: JumpThresholds = NO_JUMP_TEST,
-                  objection: Objection = no_objection, carried: Transform | None = None) -> StraightLine:
+def straight_line(
+    solver: InverseKinematics,
+    link: str,
+    start: Array,
+    waypoints: Sequence[Transform],
+    max_step_m: float,
+    jumps: JumpThresholds = NO_JUMP_TEST,
+    objection: Objection = no_objection,
+    carried: Transform | None = None,
+) -> StraightLine:
     """Follows straight lines through waypoints until something is in the way.
 
     Args:
@@ -113,16 +121,23 @@ def straight_line(solver: InverseKinematics, link: str, start: Array, waypoints:
     reached: list[int] = []
     to_link = pin.SE3.Identity() if carried is None else carried.inverse()
     poses = [follower.pose(rows[0]) * to_link.inverse(), *waypoints]
-    lines = [_Line(follower, (before, after, to_link), min(max_step_m, LONGEST_STEP_M), jumps, objection)
-             for before, after in zip(poses[:-1], poses[1:], strict=True)]
+    lines = [
+        _Line(follower, (before, after, to_link), min(max_step_m, LONGEST_STEP_M), jumps, objection)
+        for before, after in zip(poses[:-1], poses[1:], strict=True)
+    ]
     _require_countable(lines, max_step_m)
     for number, line in enumerate(lines):
         followed, stop, code = line.follow(rows[-1])
         rows += followed
         if stop:
             fraction = (number + len(followed) / line.count) / len(waypoints)
-            return StraightLine(np.array(rows), fraction, tuple(reached), f"waypoint {number}, step "
-                                f"{len(followed) + 1} of {line.count}: {stop}", code)
+            return StraightLine(
+                np.array(rows),
+                fraction,
+                tuple(reached),
+                f"waypoint {number}, step {len(followed) + 1} of {line.count}: {stop}",
+                code,
+            )
         reached.append(len(rows) - 1)
     return StraightLine(np.array(rows), 1.0, tuple(reached), "", ErrorCode.SUCCESS)
 
@@ -131,29 +146,42 @@ def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: Ju
     if not waypoints:
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "waypoints: there is none; give at least one pose")
     if len(waypoints) > MAX_STEPS:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"waypoints: {len(waypoints)}; at most {MAX_STEPS} are "
-                            "followed: thin them out")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"waypoints: {len(waypoints)}; at most {MAX_STEPS} are followed: thin them out",
+        )
     if not (np.isfinite(max_step_m) and max_step_m > 0.0):
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_step is {max_step_m}; a length above 0 m is needed")
     for name in ("factor", "prismatic", "revolute"):
         value = getattr(jumps, name)
         if not (np.isfinite(value) and value >= 0.0):
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"jump threshold '{name}' is {value}; it must be above "
-                                "0, or 0 for no such test")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"jump threshold '{name}' is {value}; it must be above 0, or 0 for no such test",
+            )
 
 
 def _require_countable(lines: Sequence[_Line], max_step_m: float) -> None:
     steps = sum(line.count for line in lines)
     if steps > MAX_STEPS:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{len(lines)} waypoints with max_step {max_step_m} m take "
-                            f"{steps} steps; at most {MAX_STEPS} are followed: choose a longer step or fewer lines")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"{len(lines)} waypoints with max_step {max_step_m} m take "
+            f"{steps} steps; at most {MAX_STEPS} are followed: choose a longer step or fewer lines",
+        )
 
 
 class _Line:
     """One straight line."""
 
-    def __init__(self, follower: PoseFollower, ends: tuple[Transform, Transform, Transform], step_m: float,
-                 jumps: JumpThresholds, objection: Objection) -> None:
+    def __init__(
+        self,
+        follower: PoseFollower,
+        ends: tuple[Transform, Transform, Transform],
+        step_m: float,
+        jumps: JumpThresholds,
+        objection: Objection,
+    ) -> None:
         """Divides the line into steps.
 
         Args:
@@ -169,14 +197,21 @@ class _Line:
         self._turn = pin.log3(start.rotation.T @ end.rotation)
         length = float(np.linalg.norm(end.translation - start.translation))
         angle = float(np.linalg.norm(self._turn))
-        self.count = max(1, int(np.ceil(max(length / step_m, angle / (RADIANS_PER_METRE * step_m)) - 1e-9)),
-                         MIN_STEPS_FOR_MEAN if jumps.factor > 0.0 else 1)
+        self.count = max(
+            1,
+            int(np.ceil(max(length / step_m, angle / (RADIANS_PER_METRE * step_m)) - 1e-9)),
+            MIN_STEPS_FOR_MEAN if jumps.factor > 0.0 else 1,
+        )
 
     def _pose(self, number: int) -> Transform:
         share = number / self.count
-        return pin.SE3(self._start.rotation @ pin.exp3(share * self._turn),
-                       self._start.translation + share * (self._end.translation - self._start.translation)
-                       ) * self._to_link
+        return (
+            pin.SE3(
+                self._start.rotation @ pin.exp3(share * self._turn),
+                self._start.translation + share * (self._end.translation - self._start.translation),
+            )
+            * self._to_link
+        )
 
     def follow(self, begin: Array) -> tuple[list[Array], str, ErrorCode]:
         """Returns the rows after the first, why they end early ("" if they do not) and the code of that."""
@@ -206,8 +241,10 @@ class _Line:
             prismatic = kinds[joint] == "prismatic"
             limit = self._jumps.prismatic if prismatic else self._jumps.revolute
             if limit > 0.0 and abs(high - low) > limit:
-                return (f"joint '{joint}' jumps by {abs(high - low):.4f} {'m' if prismatic else 'rad'}; "
-                        f"{'prismatic' if prismatic else 'revolute'}_jump_threshold allows {limit}")
+                return (
+                    f"joint '{joint}' jumps by {abs(high - low):.4f} {'m' if prismatic else 'rad'}; "
+                    f"{'prismatic' if prismatic else 'revolute'}_jump_threshold allows {limit}"
+                )
         return ""
 
     def _without_far_step(self, rows: list[Array]) -> tuple[list[Array], str]:
@@ -221,5 +258,7 @@ class _Line:
             return rows, ""
         first = int(far[0])
         joint = self._follower.group.joints[int(np.abs(changes[first]).argmax())]
-        return rows[:first + 1], (f"a step of {sizes[first]:.4f} in joint space, most of it by joint '{joint}', is "
-                                  f"more than jump_threshold {self._jumps.factor} times the mean {sizes.mean():.4f}")
+        return rows[: first + 1], (
+            f"a step of {sizes[first]:.4f} in joint space, most of it by joint '{joint}', is "
+            f"more than jump_threshold {self._jumps.factor} times the mean {sizes.mean():.4f}"
+        )

@@ -4,6 +4,7 @@
 Whatever Coal geometry a body has, it gets a surface of triangles, a solid in closed form, or both. Either
 encloses the body; where it is larger, a hit with it is not final and the exact check is asked.
 """
+
 from __future__ import annotations
 
 import threading
@@ -105,25 +106,34 @@ def _make(source: Shape) -> BoundingGeometry:
             x, y, z = (float(value) for value in geometry.halfSide)
             return BoundingGeometry(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
         case coal.Sphere():
-            return BoundingGeometry(lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE,
-                                    size=(float(geometry.radius), 0.0, 0.0))
+            return BoundingGeometry(
+                lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE, size=(float(geometry.radius), 0.0, 0.0)
+            )
         case coal.Capsule():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return BoundingGeometry(lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float), radius,
-                                    kind=CAPSULE, size=(radius, half, 0.0))
+            return BoundingGeometry(
+                lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float),
+                radius,
+                kind=CAPSULE,
+                size=(radius, half, 0.0),
+            )
         case coal.Cylinder():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return BoundingGeometry(lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER,
-                                    (radius, half, 0.0))
+            return BoundingGeometry(
+                lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0)
+            )
         case coal.Cone():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return BoundingGeometry(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE,
-                                    (radius, half, 0.0))
+            return BoundingGeometry(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
         case coal.Plane() | coal.Halfspace():
             normal = np.array(geometry.n, dtype=float)
             kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
-            return BoundingGeometry(None, kind=kind, size=(float(normal[0]), float(normal[1]), float(normal[2])),
-                                    offset=pin.SE3(np.eye(3), normal * float(geometry.d)))
+            return BoundingGeometry(
+                None,
+                kind=kind,
+                size=(float(normal[0]), float(normal[1]), float(normal[2])),
+                offset=pin.SE3(np.eye(3), normal * float(geometry.d)),
+            )
         case _:
             return _bounding_box(geometry)
 
@@ -133,8 +143,9 @@ def _bounding_box(geometry: Any) -> BoundingGeometry:
     low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
     x, y, z = (float(value) for value in 0.5 * (high - low))
     middle = 0.5 * (low + high)
-    return BoundingGeometry(lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False,
-                            pin.SE3(np.eye(3), middle))
+    return BoundingGeometry(
+        lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False, pin.SE3(np.eye(3), middle)
+    )
 
 
 def _surface(triangles: Array) -> Surfaces:
@@ -175,8 +186,9 @@ def _prism_triangles(below: float, above: float, half: float) -> Array:
     rim = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / SIDES)
     result = []
     for here, there in zip(rim[:-1], rim[1:], strict=True):
-        a, b, c, d = ([*(point * radius), z] for z, radius in ((-half, below), (half, above))
-                      for point in (here, there))
+        a, b, c, d = (
+            [*(point * radius), z] for z, radius in ((-half, below), (half, above)) for point in (here, there)
+        )
         result += [[a, b, [0, 0, -half]], [a, b, d], [a, d, c]]
         if above > 0.0:
             result.append([c, d, [0, 0, half]])
@@ -193,11 +205,15 @@ def stacked(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:
     """Returns surfaces in one set of arrays and the root node of each."""
     nodes = np.cumsum([0, *(len(item.spheres) for item in surfaces)])
     faces = np.cumsum([0, *(len(item.triangles) for item in surfaces)])
-    links = [np.where(item.links[:, :1] < 0, [[-1, 0]] + item.links * [[0, 1]] + [[0, face]], item.links + node)
-             for item, node, face in zip(surfaces, nodes, faces, strict=False)]
+    links = [
+        np.where(item.links[:, :1] < 0, [[-1, 0]] + item.links * [[0, 1]] + [[0, face]], item.links + node)
+        for item, node, face in zip(surfaces, nodes, faces, strict=False)
+    ]
     if not surfaces:
         return Surfaces(np.zeros((0, 4)), np.zeros((0, 15)), np.zeros((0, 2), np.int32), np.zeros((0, 9))), []
-    return Surfaces(np.concatenate([item.spheres for item in surfaces]),
-                    np.concatenate([item.boxes for item in surfaces]),
-                    np.ascontiguousarray(np.concatenate(links), dtype=np.int32),
-                    np.concatenate([item.triangles for item in surfaces])), nodes[:-1].tolist()
+    return Surfaces(
+        np.concatenate([item.spheres for item in surfaces]),
+        np.concatenate([item.boxes for item in surfaces]),
+        np.ascontiguousarray(np.concatenate(links), dtype=np.int32),
+        np.concatenate([item.triangles for item in surfaces]),
+    ), nodes[:-1].tolist()

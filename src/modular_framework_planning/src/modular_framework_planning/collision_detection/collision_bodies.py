@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lists the bodies of a scene that can collide, and the pairs of them that are checked."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -54,16 +55,16 @@ class WatchedPair:
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     """Returns every collision geometry of a scene: links, held objects, then the world."""
     model = scene.model
-    result = [PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape,
-                             float(margin))
-              for item, margin in zip(model.link_geometries, scene.link_margins(), strict=True)]
+    result = [
+        PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape, float(margin))
+        for item, margin in zip(model.link_geometries, scene.link_margins(), strict=True)
+    ]
     for held in scene.attached.values():
         frame = model.pin_model.frames[model.frame_ids[held.link]]
         body = Body(held.name, ATTACHED, held.link, held.touch_links)
         for shape, pose in held.body.shapes:
             placement = frame.placement * held.body.pose * pose
-            result.append(PlacedGeometry(body, frame.parentJoint, placement, shape,
-                                         scene.attached_padding()))
+            result.append(PlacedGeometry(body, frame.parentJoint, placement, shape, scene.attached_padding()))
     for thing in scene.obstacles():
         for shape, pose in thing.shapes:
             result.append(PlacedGeometry(Body(thing.name, WORLD), 0, thing.pose * pose, shape, 0.0))
@@ -93,8 +94,14 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
             if allowed is None:
                 allowed = verdicts[key] = _may_touch(scene, one.body, other.body)
             if not allowed:
-                result.append(WatchedPair(first, second, one.margin if other.body.kind == WORLD else 0.0,
-                                          supports[one.joint_id] == supports[other.joint_id]))
+                result.append(
+                    WatchedPair(
+                        first,
+                        second,
+                        one.margin if other.body.kind == WORLD else 0.0,
+                        supports[one.joint_id] == supports[other.joint_id],
+                    )
+                )
     return result
 
 
@@ -102,8 +109,7 @@ def _may_touch(scene: PlanningScene, first: Body, second: Body) -> bool:
     if first.name == second.name and first.kind == second.kind:
         return True
     for held, other in ((first, second), (second, first)) if ATTACHED in (first.kind, second.kind) else ():
-        if held.kind == ATTACHED and other.kind == LINK and (
-                other.name == held.link or other.name in held.touch_links):
+        if held.kind == ATTACHED and other.kind == LINK and (other.name == held.link or other.name in held.touch_links):
             return True
     return scene.acm.allows(first.name, second.name)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Puts the bodies of a scene and the pairs to check into the arrays that compiled collision checks work on."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
@@ -79,8 +80,9 @@ def _link_bounding_geometries(model: RobotModel) -> tuple[BoundingGeometry, ...]
         part = PlacedGeometry(Body(item.link, LINK), item.joint_id, item.placement, item.shape, 0.0)
         shape = bounding_geometry_of(part)
         if shape.kind == SURFACE and shape.corners is not None:
-            shape = BoundingGeometry(partial(moved, shape.corners(), item.placement * shape.offset),
-                                     is_closed=shape.is_closed)
+            shape = BoundingGeometry(
+                partial(moved, shape.corners(), item.placement * shape.offset), is_closed=shape.is_closed
+            )
         result.append(shape)
     return tuple(result)
 
@@ -94,10 +96,14 @@ def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple
     spheres, boxes, links = list(surfaces.spheres), list(surfaces.boxes), list(surfaces.links)
     result, begin = [], 0
     for group in groups:
-        result.append(_joined(spheres, boxes, links, roots[begin:begin + len(group)]))
+        result.append(_joined(spheres, boxes, links, roots[begin : begin + len(group)]))
         begin += len(group)
-    return Surfaces(np.array(spheres).reshape(-1, 4), np.array(boxes).reshape(-1, 15),
-                    np.array(links, dtype=np.int32).reshape(-1, 2), surfaces.triangles), tuple(result)
+    return Surfaces(
+        np.array(spheres).reshape(-1, 4),
+        np.array(boxes).reshape(-1, 15),
+        np.array(links, dtype=np.int32).reshape(-1, 2),
+        surfaces.triangles,
+    ), tuple(result)
 
 
 def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots: Sequence[int]) -> int:
@@ -106,7 +112,7 @@ def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots:
         return roots[0]
     centres = np.array([spheres[root][:3] for root in roots])
     order = [roots[number] for number in np.argsort(centres[:, np.argmax(np.ptp(centres, axis=0))])]
-    low, high = (_joined(spheres, boxes, links, part) for part in (order[:len(order) // 2], order[len(order) // 2:]))
+    low, high = (_joined(spheres, boxes, links, part) for part in (order[: len(order) // 2], order[len(order) // 2 :]))
     one, two = spheres[low], spheres[high]
     gap = float(np.linalg.norm(two[:3] - one[:3]))
     radius = max(one[3], two[3], 0.5 * (gap + one[3] + two[3]))
@@ -136,8 +142,12 @@ def _never_interrupt() -> None:
     """Lets the work go on however long it takes."""
 
 
-def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
-                  check_interrupt: Callable[[], None] = _never_interrupt) -> CompiledWorld:
+def compile_world(
+    model: RobotModel,
+    parts: Sequence[PlacedGeometry],
+    pairs: Sequence[WatchedPair],
+    check_interrupt: Callable[[], None] = _never_interrupt,
+) -> CompiledWorld:
     """Builds the arrays. What was built for a shape is kept as long as the shape.
 
     Args:
@@ -168,13 +178,17 @@ def compile_world(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seq
     chosen = tuple(key for key in keys if key is not None)
     tables, joints = _tables(model, groups, chosen)
     numbers = iter(range(len(chosen)))
-    world = world._replace(tables=tables, table_joints=joints, table_of=np.array(
-        [-1 if key is None else next(numbers) for key in keys], dtype=np.int64))
+    world = world._replace(
+        tables=tables,
+        table_joints=joints,
+        table_of=np.array([-1 if key is None else next(numbers) for key in keys], dtype=np.int64),
+    )
     return CompiledWorld(world, arguments(world), tuple(tuple(item) for item in found.values()), tuple(uncompiled))
 
 
-def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Grouping, robot: Surfaces,
-                  roots: Sequence[int]) -> tuple[list[_Member], dict[int, int]]:
+def _link_members(
+    model: RobotModel, parts: Sequence[PlacedGeometry], groups: Grouping, robot: Surfaces, roots: Sequence[int]
+) -> tuple[list[_Member], dict[int, int]]:
     members, member_of = [], {}
     for group, root in zip(groups, roots, strict=True):
         shapes = [_link_bounding_geometries(model)[number] for number in group]
@@ -185,8 +199,14 @@ def _link_members(model: RobotModel, parts: Sequence[PlacedGeometry], groups: Gr
     return members, member_of
 
 
-def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair],
-                members: list[_Member], member_of: dict[int, int], check_interrupt: Callable[[], None]) -> Surfaces:
+def _add_others(
+    model: RobotModel,
+    parts: Sequence[PlacedGeometry],
+    pairs: Sequence[WatchedPair],
+    members: list[_Member],
+    member_of: dict[int, int],
+    check_interrupt: Callable[[], None],
+) -> Surfaces:
     """Appends links in closed form, held objects and the world; returns the surfaces they need."""
     links = _link_bounding_geometries(model)
     watched = {number for pair in pairs for number in (pair.first, pair.second)}
@@ -205,8 +225,11 @@ def _add_others(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Seque
     remaining = iter(roots)
     for number, shape in zip(others, shapes, strict=True):
         root = next(remaining) if number in wanted and shape.corners is not None else -1
-        sphere = np.array([0.0, 0.0, 0.0, shape.radius]) if root < 0 else (
-            surfaces.spheres[root] + [0, 0, 0, shape.inflation_radius])
+        sphere = (
+            np.array([0.0, 0.0, 0.0, shape.radius])
+            if root < 0
+            else (surfaces.spheres[root] + [0, 0, 0, shape.inflation_radius])
+        )
         pose = (parts[number].placement * shape.offset).homogeneous[:3]
         member_of[number] = len(members)
         members.append(_Member(shape, parts[number].joint_id - 1, pose, root, True, sphere))
@@ -220,33 +243,46 @@ def _scene_surfaces(shapes: tuple[BoundingGeometry, ...]) -> tuple[Surfaces, tup
     return together, tuple(roots)
 
 
-def _with_surface(shapes: Mapping[int, BoundingGeometry], parts: Sequence[PlacedGeometry],
-                  pairs: Sequence[WatchedPair]) -> set[int]:
+def _with_surface(
+    shapes: Mapping[int, BoundingGeometry], parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]
+) -> set[int]:
     """Returns which bodies are checked by their surface.
 
     A solid of the world against a body whose surface is exact is checked in closed form. Its triangles would not be
     used, and building a tree over them takes longer than many plans.
     """
-    plain = {number for number, shape in shapes.items()
-             if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_is_exact}
+    plain = {
+        number
+        for number, shape in shapes.items()
+        if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_is_exact
+    }
     inexact = {number for number, shape in shapes.items() if not shape.surface_is_exact}
-    needed = {number for pair in pairs for number, other in ((pair.first, pair.second), (pair.second, pair.first))
-              if number in plain and (other in inexact or other in plain)}
+    needed = {
+        number
+        for pair in pairs
+        for number, other in ((pair.first, pair.second), (pair.second, pair.first))
+        if number in plain and (other in inexact or other in plain)
+    }
     return set(shapes) - (plain - needed)
 
 
 def _is_exact(members: Sequence[_Member], first: int, second: int) -> bool:
     other = members[second].shape
     return members[first].shape.surface_is_exact and (
-        other.surface_is_exact if other.kind == SURFACE else other.solid_is_exact)
+        other.surface_is_exact if other.kind == SURFACE else other.solid_is_exact
+    )
 
 
 def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, int] | None:
     """Returns the two bodies such that the first one has a surface, the second a closed form if possible."""
-    choices = [(one, two) for one, two in ((first, second), (second, first))
-               if members[one].root >= 0 and (members[two].root >= 0 or members[two].shape.kind != SURFACE)]
-    return max(choices, default=None, key=lambda item: (
-        _is_exact(members, *item), members[item[1]].shape.kind != SURFACE))
+    choices = [
+        (one, two)
+        for one, two in ((first, second), (second, first))
+        if members[one].root >= 0 and (members[two].root >= 0 or members[two].shape.kind != SURFACE)
+    ]
+    return max(
+        choices, default=None, key=lambda item: (_is_exact(members, *item), members[item[1]].shape.kind != SURFACE)
+    )
 
 
 def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
@@ -267,8 +303,9 @@ def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
 
 
 @lru_cache(maxsize=KEPT_GROUPINGS)
-def _tables(model: RobotModel, groups: Grouping,
-            keys: tuple[tuple[int, ...], ...]) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+def _tables(
+    model: RobotModel, groups: Grouping, keys: tuple[tuple[int, ...], ...]
+) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
     """Tables (all unknown at first) of pairs of links.
 
     They hold in every scene: `model` and `groups` only say for which robot and bodies they are kept.
@@ -277,11 +314,18 @@ def _tables(model: RobotModel, groups: Grouping,
     return np.full((len(keys), CELLS, CELLS), UNKNOWN, dtype=np.int8), joints
 
 
-def _arrays(model: RobotModel, members: Sequence[_Member], robot: Surfaces, scene: Surfaces,
-            pairs: Sequence[tuple[int, int, float]]) -> World:
-    inflation = [members[one].shape.inflation_radius
-                 + (members[two].shape.inflation_radius if members[two].shape.kind == SURFACE else 0.0)
-                 for one, two, _ in pairs]
+def _arrays(
+    model: RobotModel,
+    members: Sequence[_Member],
+    robot: Surfaces,
+    scene: Surfaces,
+    pairs: Sequence[tuple[int, int, float]],
+) -> World:
+    inflation = [
+        members[one].shape.inflation_radius
+        + (members[two].shape.inflation_radius if members[two].shape.kind == SURFACE else 0.0)
+        for one, two, _ in pairs
+    ]
     return World(
         tree=tree_of(model),
         joints=np.array([item.joint for item in members], dtype=np.int64),
@@ -292,9 +336,12 @@ def _arrays(model: RobotModel, members: Sequence[_Member], robot: Surfaces, scen
         sizes=np.array([item.shape.size for item in members], dtype=float).reshape(-1, 3),
         spheres=np.array([item.sphere for item in members], dtype=float).reshape(-1, 4),
         closed=np.array([item.shape.is_closed for item in members], dtype=bool),
-        robot=robot, scene=scene,
+        robot=robot,
+        scene=scene,
         pairs=np.array([item[:2] for item in pairs], dtype=np.int64).reshape(-1, 2),
         margins=np.array([item[2] for item in pairs], dtype=float) + np.array(inflation, dtype=float),
         exact=np.array([_is_exact(members, one, two) for one, two, _ in pairs], dtype=bool),
-        tables=np.zeros((0, CELLS, CELLS), dtype=np.int8), table_joints=np.zeros((0, 2), dtype=np.int64),
-        table_of=np.full(len(pairs), -1, dtype=np.int64))
+        tables=np.zeros((0, CELLS, CELLS), dtype=np.int8),
+        table_joints=np.zeros((0, 2), dtype=np.int64),
+        table_of=np.full(len(pairs), -1, dtype=np.int64),
+    )

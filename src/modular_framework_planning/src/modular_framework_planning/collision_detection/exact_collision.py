@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks single pairs of bodies with Coal, on their exact geometry: whether they touch, and how deep."""
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
@@ -65,15 +66,23 @@ class ExactCollision:
         pair = self._pairs[number]
         request.security_margin = pair.margin
         result = coal.CollisionResult()
-        coal.collide(self._parts[pair.first].geometry, self._pose(pair.first),
-                     self._parts[pair.second].geometry, self._pose(pair.second), request, result)
+        coal.collide(
+            self._parts[pair.first].geometry,
+            self._pose(pair.first),
+            self._parts[pair.second].geometry,
+            self._pose(pair.second),
+            request,
+            result,
+        )
         return result
 
     def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
         """Whether any of the pairs touches at these positions (of the whole robot)."""
         self._update_poses(positions)
-        return any(not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
-                   for number in numbers)
+        return any(
+            not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
+            for number in numbers
+        )
 
     def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
         """Returns those of the pairs that touch, each with its deepest contact."""
@@ -89,10 +98,16 @@ class ExactCollision:
 
     def _contact(self, number: int, result: Any) -> Contact:
         pair = self._pairs[number]
-        deepest = max((result.getContact(i) for i in range(result.numContacts())),
-                      key=lambda item: self._depth(pair, item))
-        return Contact(self._parts[pair.first].body, self._parts[pair.second].body, self._depth(pair, deepest),
-                       np.array(deepest.pos), np.array(deepest.normal))
+        deepest = max(
+            (result.getContact(i) for i in range(result.numContacts())), key=lambda item: self._depth(pair, item)
+        )
+        return Contact(
+            self._parts[pair.first].body,
+            self._parts[pair.second].body,
+            self._depth(pair, deepest),
+            np.array(deepest.pos),
+            np.array(deepest.normal),
+        )
 
     @staticmethod
     def _depth(pair: WatchedPair, contact: Any) -> float:
@@ -107,10 +122,20 @@ class ExactCollision:
     def distance(self, positions: Array, numbers: Iterable[int]) -> float:
         """Returns the smallest distance [m] of the pairs, 0 or less where they touch."""
         self._update_poses(positions)
-        return min((coal.distance(self._parts[pair.first].geometry, self._pose(pair.first),
-                                  self._parts[pair.second].geometry, self._pose(pair.second),
-                                  coal.DistanceRequest(), coal.DistanceResult())
-                    for pair in (self._pairs[number] for number in numbers)), default=np.inf)
+        return min(
+            (
+                coal.distance(
+                    self._parts[pair.first].geometry,
+                    self._pose(pair.first),
+                    self._parts[pair.second].geometry,
+                    self._pose(pair.second),
+                    coal.DistanceRequest(),
+                    coal.DistanceResult(),
+                )
+                for pair in (self._pairs[number] for number in numbers)
+            ),
+            default=np.inf,
+        )
 
 
 def _coal_transform(transform: Transform) -> Any:

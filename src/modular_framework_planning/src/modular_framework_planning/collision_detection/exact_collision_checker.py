@@ -3,6 +3,7 @@
 
 A state is called free only where every pair of bodies was proved apart, or where Coal says so.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -128,16 +129,25 @@ class ExactCollisionChecker:
     def _decide(self, path: Array, numbers: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
         """Asks the exact check about (sample, pair) rows; returns the number of a sample that touches, or -1."""
         members = self._compiled.members
-        return next((number for number, pair in undecided.tolist()
-                     if self._exact.touches(sample_at(path, numbers, number),
-                                            (self._moving[member] for member in members[pair]))), -1)
+        return next(
+            (
+                number
+                for number, pair in undecided.tolist()
+                if self._exact.touches(
+                    sample_at(path, numbers, number), (self._moving[member] for member in members[pair])
+                )
+            ),
+            -1,
+        )
 
     def _rest_is_free(self, positions: Array) -> bool:
         """Whether tolerated contacts stay shallow and pairs without bounds apart."""
         if self._exact.touches(positions, (self._moving[number] for number in self._compiled.uncompiled)):
             return False
-        return all(contact.depth <= self._tolerated[number] + DEPTH_SLACK
-                   for number, contact in self._exact.contacts(positions, self._tolerated))
+        return all(
+            contact.depth <= self._tolerated[number] + DEPTH_SLACK
+            for number, contact in self._exact.contacts(positions, self._tolerated)
+        )
 
     def contacts(self, positions: Array, include_fixed: bool = True) -> list[Contact]:
         """Returns every pair that touches, the deepest contact of each, deepest pair first.
@@ -145,8 +155,11 @@ class ExactCollisionChecker:
         A body wholly inside another one, touching none of its surface, is reported only where no other pair touches.
         """
         numbers = [number for number, pair in enumerate(self._pairs) if include_fixed or not pair.is_fixed]
-        found = [contact for number, contact in self._exact.contacts(positions, numbers)
-                 if number not in self._tolerated or contact.depth > self._tolerated[number] + DEPTH_SLACK]
+        found = [
+            contact
+            for number, contact in self._exact.contacts(positions, numbers)
+            if number not in self._tolerated or contact.depth > self._tolerated[number] + DEPTH_SLACK
+        ]
         return sorted(found or self._surrounded(positions), key=lambda item: -item.depth)
 
     def _surrounded(self, positions: Array) -> list[Contact]:

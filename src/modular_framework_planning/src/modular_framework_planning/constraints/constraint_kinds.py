@@ -4,6 +4,7 @@
 The meaning is that of MoveIt's kinematic constraints: a joint within its tolerances, a point of a link within one of
 several regions, the rotation of a link within a tolerance about each axis.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -91,8 +92,10 @@ class JointConstraint:
         """Evaluates a state."""
         value = self.deviation(positions)
         kept = -self.below - SLACK <= value <= self.above + SLACK
-        text = (f"joint '{self.name}' is {value:+.4f} from {self.target:.4f}; allowed is -{self.below:.4f} to "
-                f"+{self.above:.4f}")
+        text = (
+            f"joint '{self.name}' is {value:+.4f} from {self.target:.4f}; allowed is -{self.below:.4f} to "
+            f"+{self.above:.4f}"
+        )
         return ConstraintResult("joint", self.name, kept, self.weight * abs(value), text)
 
     def conditions(self, *_: Any) -> tuple[bool, list[Row]]:
@@ -135,8 +138,9 @@ class PositionConstraint:
         """Evaluates the state whose joint placements `data` holds."""
         distance, _nearest, inside, _region, _solid = self._gap(data)
         text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
-        return ConstraintResult("position", self.link.name, distance <= SLACK,
-                                self.weight * float(np.linalg.norm(inside)), text)
+        return ConstraintResult(
+            "position", self.link.name, distance <= SLACK, self.weight * float(np.linalg.norm(inside)), text
+        )
 
     def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
         """Returns whether the point is outside, and what brings or keeps it inside; `data` holds joint Jacobians."""
@@ -186,8 +190,10 @@ class OrientationConstraint:
         """Evaluates the state whose joint placements `data` holds."""
         angles = np.abs(self.deviation(data)[0])
         excess = float((angles - self.tolerances).max())
-        text = (f"link '{self.link.name}' is turned {np.array2string(angles, precision=4)} rad about x, y, z; allowed "
-                f"is {np.array2string(self.tolerances, precision=4)}")
+        text = (
+            f"link '{self.link.name}' is turned {np.array2string(angles, precision=4)} rad about x, y, z; allowed "
+            f"is {np.array2string(self.tolerances, precision=4)}"
+        )
         return ConstraintResult("orientation", self.link.name, excess <= SLACK, self.weight * float(angles.sum()), text)
 
     def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
@@ -221,8 +227,12 @@ class OrientationConstraint:
         if self.parameterization is Parameterization.ROTATION_VECTOR:
             return self.target @ pin.exp3(self.target.T @ angles)
         angles[1] = np.clip(angles[1], -0.5 * np.pi, 0.5 * np.pi)
-        return self.target @ _rotation_x(angles[0]) @ pin.rpy.rpyToMatrix(0.0, angles[1], 0.0) @ pin.rpy.rpyToMatrix(
-            0.0, 0.0, angles[2])
+        return (
+            self.target
+            @ _rotation_x(angles[0])
+            @ pin.rpy.rpyToMatrix(0.0, angles[1], 0.0)
+            @ pin.rpy.rpyToMatrix(0.0, 0.0, angles[2])
+        )
 
 
 def _rotation_x(angle: float) -> Array:
@@ -245,8 +255,13 @@ def _euler_rates(angles: Array) -> Array:
     pitch_cosine, pitch_sine = np.cos(angles[1]), np.sin(angles[1])
     pitch_cosine = float(np.copysign(max(abs(pitch_cosine), 1.0e-3), pitch_cosine))
     tangent = pitch_sine / pitch_cosine
-    return np.array([[1.0, sine * tangent, -cosine * tangent], [0.0, cosine, sine],
-                     [0.0, -sine / pitch_cosine, cosine / pitch_cosine]])
+    return np.array(
+        [
+            [1.0, sine * tangent, -cosine * tangent],
+            [0.0, cosine, sine],
+            [0.0, -sine / pitch_cosine, cosine / pitch_cosine],
+        ]
+    )
 
 
 Constraint = JointConstraint | PositionConstraint | OrientationConstraint

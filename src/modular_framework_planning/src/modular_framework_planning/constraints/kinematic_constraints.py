@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Says whether a state keeps a set of constraints, and moves or draws states so that they do."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -31,9 +32,14 @@ class KinematicConstraints:
     Positions are those of the whole robot [rad or m].
     """
 
-    def __init__(self, model: RobotModel, joints: Sequence[JointConstraint] = (),
-                 positions: Sequence[PositionConstraint] = (),
-                 orientations: Sequence[OrientationConstraint] = (), name: str = "") -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        joints: Sequence[JointConstraint] = (),
+        positions: Sequence[PositionConstraint] = (),
+        orientations: Sequence[OrientationConstraint] = (),
+        name: str = "",
+    ) -> None:
         self.model = model
         self.name = name
         self.joints, self.positions, self.orientations = tuple(joints), tuple(positions), tuple(orientations)
@@ -76,8 +82,9 @@ class KinematicConstraints:
     @property
     def is_loose(self) -> bool:
         """Whether quite different states satisfy, so that sampling around the middle of the tolerances pays."""
-        return (any(solid.extent > LOOSE for item in self.positions for solid, _ in item.regions)
-                or any(float(item.tolerances.max()) > LOOSE for item in self.orientations))
+        return any(solid.extent > LOOSE for item in self.positions for solid, _ in item.regions) or any(
+            float(item.tolerances.max()) > LOOSE for item in self.orientations
+        )
 
     def pose_target(self, positions: Array, rng: np.random.Generator | None = None) -> Transform:
         """Returns a pose of `pose_link` in the planning frame that satisfies.

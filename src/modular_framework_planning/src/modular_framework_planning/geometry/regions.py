@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Solids a point may be required to stay in: which point of the solid is nearest, and random points in it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Describes the shapes objects are made of and builds their exact collision geometry once."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -19,8 +20,10 @@ MAX_TRIANGLES = 2_000_000
 def _require_positive(kind: str, **dimensions: float) -> None:
     for name, value in dimensions.items():
         if not 0.0 < value <= LARGEST_LENGTH_M:
-            raise GeometryError(f"{kind}: {name} is {value} m; allowed are lengths above 0 m and up to "
-                                f"{LARGEST_LENGTH_M:g} m; use a plane for what has no end")
+            raise GeometryError(
+                f"{kind}: {name} is {value} m; allowed are lengths above 0 m and up to "
+                f"{LARGEST_LENGTH_M:g} m; use a plane for what has no end"
+            )
 
 
 class Shape:
@@ -123,8 +126,9 @@ class Plane(Shape):
     def __post_init__(self) -> None:
         values = np.array([self.a, self.b, self.c, self.d])
         if not np.isfinite(values).all() or np.linalg.norm(values[:3]) < 1e-9:
-            raise GeometryError(f"plane: coefficients {values.tolist()} give no normal; "
-                                "a, b, c, d must be finite and a, b, c not all 0")
+            raise GeometryError(
+                f"plane: coefficients {values.tolist()} give no normal; a, b, c, d must be finite and a, b, c not all 0"
+            )
 
     def _build(self) -> Any:
         normal = np.array([self.a, self.b, self.c])
@@ -147,16 +151,21 @@ class Mesh(Shape):
     def __post_init__(self) -> None:
         count = len(self.triangles)
         if count == 0 or len(self.vertices) < 3:
-            raise GeometryError(f"mesh: {len(self.vertices)} vertices and {count} triangles; "
-                                "at least 3 vertices and 1 triangle are needed")
+            raise GeometryError(
+                f"mesh: {len(self.vertices)} vertices and {count} triangles; "
+                "at least 3 vertices and 1 triangle are needed"
+            )
         if count > MAX_TRIANGLES:
             raise GeometryError(f"mesh: {count} triangles; allowed are {MAX_TRIANGLES}; simplify the mesh")
         if not (np.abs(self.vertices) <= LARGEST_LENGTH_M).all():
-            raise GeometryError("mesh: a vertex is not finite or beyond all reach; allowed are coordinates of at most "
-                                f"{LARGEST_LENGTH_M:g} m")
+            raise GeometryError(
+                "mesh: a vertex is not finite or beyond all reach; allowed are coordinates of at most "
+                f"{LARGEST_LENGTH_M:g} m"
+            )
         if int(np.min(self.triangles)) < 0 or int(np.max(self.triangles)) >= len(self.vertices):
-            raise GeometryError(f"mesh: a triangle names vertex {int(np.max(self.triangles))}; "
-                                f"allowed are 0..{len(self.vertices) - 1}")
+            raise GeometryError(
+                f"mesh: a triangle names vertex {int(np.max(self.triangles))}; allowed are 0..{len(self.vertices) - 1}"
+            )
 
     def _build(self) -> Any:
         model = coal.BVHModelOBBRSS()

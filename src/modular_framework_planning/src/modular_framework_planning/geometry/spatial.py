@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes rigid transforms of positions and xyzw quaternions, and refuses numbers that are not a pose."""
+
 from __future__ import annotations
 
 import logging
@@ -34,12 +35,16 @@ def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], 
     translation = np.asarray(position, dtype=float)
     quaternion = np.asarray(quaternion_xyzw, dtype=float)
     if not (np.isfinite(translation).all() and np.isfinite(quaternion).all()):
-        raise GeometryError(f"{where}: position {list(position)} or orientation {list(quaternion_xyzw)} holds a number "
-                            "that is not finite; every number must be finite")
+        raise GeometryError(
+            f"{where}: position {list(position)} or orientation {list(quaternion_xyzw)} holds a number "
+            "that is not finite; every number must be finite"
+        )
     norm = float(np.linalg.norm(quaternion))
     if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
-        raise GeometryError(f"{where}: quaternion xyzw {list(quaternion_xyzw)} has length {norm:.3g}; allowed is 1 "
-                            f"within {QUATERNION_NORM_TOLERANCE}; the identity is 0 0 0 1")
+        raise GeometryError(
+            f"{where}: quaternion xyzw {list(quaternion_xyzw)} has length {norm:.3g}; allowed is 1 "
+            f"within {QUATERNION_NORM_TOLERANCE}; the identity is 0 0 0 1"
+        )
     x, y, z, w = quaternion / norm
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), translation)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Puts the joints of a robot model into the plain arrays that compiled kinematics works on."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -31,8 +32,12 @@ def tree_of(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
         axes.append(column[:3] if prismatic[-1] else column[3:])
     parents = [pin_model.parents[number] - 1 for number in chosen] if joints is None else range(-1, len(chosen) - 1)
     placements = [pin_model.jointPlacements[number].homogeneous[:3] for number in chosen]
-    return Tree(np.array(parents, dtype=np.int64), np.array(placements, dtype=float).reshape(-1, 3, 4),
-                np.array(axes, dtype=float).reshape(-1, 3), np.array(prismatic, dtype=bool))
+    return Tree(
+        np.array(parents, dtype=np.int64),
+        np.array(placements, dtype=float).reshape(-1, 3, 4),
+        np.array(axes, dtype=float).reshape(-1, 3),
+        np.array(prismatic, dtype=bool),
+    )
 
 
 BALL_GAIN = 10.0  # radians a unit of a ball joint's value: next to free beside the real joints
@@ -49,10 +54,19 @@ def with_ball_joint(chain: Chain, joint: Array, width: int) -> Chain:
     end = (np.vstack([chain.tip, (0.0, 0.0, 0.0, 1.0)]) @ joint)[:3]
     last, tree = len(chain.drivers) - 1, chain.tree
     placements = np.concatenate([tree.placements, end[None], np.tile(np.eye(3, 4), (2, 1, 1))])
-    longer = Tree(np.concatenate([tree.parents, last + np.arange(3)]), placements,
-                  np.vstack([tree.axes, np.eye(3)]), np.append(tree.prismatic, np.zeros(3, dtype=bool)))
-    return Chain(longer, np.eye(3, 4), np.concatenate([chain.drivers, width + np.arange(3)]),
-                 np.append(chain.gains, np.full(3, BALL_GAIN)), np.append(chain.offsets, np.zeros(3)))
+    longer = Tree(
+        np.concatenate([tree.parents, last + np.arange(3)]),
+        placements,
+        np.vstack([tree.axes, np.eye(3)]),
+        np.append(tree.prismatic, np.zeros(3, dtype=bool)),
+    )
+    return Chain(
+        longer,
+        np.eye(3, 4),
+        np.concatenate([chain.drivers, width + np.arange(3)]),
+        np.append(chain.gains, np.full(3, BALL_GAIN)),
+        np.append(chain.offsets, np.zeros(3)),
+    )
 
 
 class ChainModel:
@@ -78,8 +92,13 @@ class ChainModel:
             gains.append(gain)
             offsets.append(offset)
         self._rest = np.array(drivers) < 0
-        self._chain = Chain(tree_of(model, path), np.ascontiguousarray(frame.placement.homogeneous[:3]),
-                            np.array(drivers, dtype=np.int64), np.array(gains), np.array(offsets, dtype=float))
+        self._chain = Chain(
+            tree_of(model, path),
+            np.ascontiguousarray(frame.placement.homogeneous[:3]),
+            np.array(drivers, dtype=np.int64),
+            np.array(gains),
+            np.array(offsets, dtype=float),
+        )
 
     @property
     def is_own(self) -> bool:

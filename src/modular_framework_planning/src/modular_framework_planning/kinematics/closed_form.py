@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Closed-form inverse kinematics of six revolute joints, or of seven with one of them held at chosen values (EAIK)."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -27,8 +28,11 @@ class ClosedForm:
         """
         kinds = {model.document.joint_kinds[name] for name in group.joints}
         if len(group.joints) not in (6, 7) or not kinds <= {"revolute", "continuous"}:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"group '{group.name}': {len(group.joints)} joints of kind "
-                                f"{', '.join(sorted(kinds))}; a closed form needs 6 or 7 revolute ones")
+            raise PlanningError(
+                ErrorCode.NO_IK_SOLUTION,
+                f"group '{group.name}': {len(group.joints)} joints of kind "
+                f"{', '.join(sorted(kinds))}; a closed form needs 6 or 7 revolute ones",
+            )
         self._axes, self._offsets, self._rotation = _axes_and_offsets(model, group, base_link, last_link)
         self.locked = self._choose_locked(group.name)
         self._robots: dict[float, Any] = {}
@@ -65,8 +69,9 @@ class ClosedForm:
         return robot
 
 
-def _axes_and_offsets(model: RobotModel, group: JointGroup, base_link: str,
-                      last_link: str) -> tuple[Array, Array, Array]:
+def _axes_and_offsets(
+    model: RobotModel, group: JointGroup, base_link: str, last_link: str
+) -> tuple[Array, Array, Array]:
     """Returns axes (n, 3) and steps between their points (n + 1, 3) in the base's frame, and the last link's rotation.
 
     The rotation, transposed, is what turns a pose of the last link into one of a tip that is not turned at zero.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Forward kinematics and least-squares inverse kinematics as compiled loops: a microsecond a state."""
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -129,8 +130,9 @@ def rotation_vector(first: Array, second: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, positions: Array,
-               poses: Array) -> float:
+def pose_error(
+    chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, positions: Array, poses: Array
+) -> float:
     """Compares the tip with a target.
 
     Args:
@@ -188,8 +190,9 @@ def pose_error(chain: Chain, values: Array, target: Array, jacobian: Array, erro
 
 
 @njit(cache=True, nogil=True)
-def _damped_step(jacobian: Array, error: Array, damping: float, free: NDArray[np.bool_], step: Array,
-                 square: Array, solved: Array) -> None:
+def _damped_step(
+    jacobian: Array, error: Array, damping: float, free: NDArray[np.bool_], step: Array, square: Array, solved: Array
+) -> None:
     """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping."""
     width = jacobian.shape[1]
     for row in range(POSE_SIZE):
@@ -219,8 +222,9 @@ def _damped_step(jacobian: Array, error: Array, damping: float, free: NDArray[np
 
 
 @njit(cache=True, nogil=True)
-def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Array, tolerance: float,
-             steps: int) -> bool:
+def converge(
+    chain: Chain, values: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int
+) -> bool:
     """Moves joint values, within bounds, until the tip is at the target; changes `values` in place.
 
     Args:
@@ -242,8 +246,10 @@ def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Ar
             _damped_step(jacobian, error, damping, free, step, square, solved)
             blocked = False
             for joint in range(width):
-                if free[joint] and ((values[joint] <= lower[joint] and step[joint] < 0.0)
-                                    or (values[joint] >= upper[joint] and step[joint] > 0.0)):
+                if free[joint] and (
+                    (values[joint] <= lower[joint] and step[joint] < 0.0)
+                    or (values[joint] >= upper[joint] and step[joint] > 0.0)
+                ):
                     free[joint] = False
                     blocked = True
             if not blocked:
@@ -260,8 +266,16 @@ def converge(chain: Chain, values: Array, target: Array, lower: Array, upper: Ar
 
 
 @njit(cache=True, nogil=True)
-def polish(chain: Chain, candidates: Array, target: Array, lower: Array, upper: Array, tolerance: float,
-           furthest: float, steps: int) -> NDArray[np.bool_]:
+def polish(
+    chain: Chain,
+    candidates: Array,
+    target: Array,
+    lower: Array,
+    upper: Array,
+    tolerance: float,
+    furthest: float,
+    steps: int,
+) -> NDArray[np.bool_]:
     """Drives approximate solutions to the target, in place; says which arrived.
 
     Args:
@@ -275,14 +289,16 @@ def polish(chain: Chain, candidates: Array, target: Array, lower: Array, upper: 
     for number in range(count):
         size = pose_error(chain, candidates[number], target, jacobian, error, positions, poses)
         if size < furthest:
-            arrived[number] = size < tolerance or converge(chain, candidates[number], target, lower, upper, tolerance,
-                                                           steps)
+            arrived[number] = size < tolerance or converge(
+                chain, candidates[number], target, lower, upper, tolerance, steps
+            )
     return arrived
 
 
 @njit(cache=True, nogil=True)
-def search(chain: Chain, starts: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int,
-           most: int) -> NDArray[np.bool_]:
+def search(
+    chain: Chain, starts: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int, most: int
+) -> NDArray[np.bool_]:
     """Runs `converge` from each start, in place, until `most` have arrived; says which did."""
     arrived = np.zeros(len(starts), dtype=np.bool_)
     found = 0
@@ -295,8 +311,9 @@ def search(chain: Chain, starts: Array, target: Array, lower: Array, upper: Arra
 
 
 @njit(cache=True, nogil=True)
-def approach_seed(chain: Chain, values: Array, seed: Array, target: Array, lower: Array, upper: Array,
-                  tolerance: float, steps: int) -> None:
+def approach_seed(
+    chain: Chain, values: Array, seed: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int
+) -> None:
     """Moves a solution of a redundant chain nearer to the seed while the tip stays; changes `values` in place."""
     width = len(values)
     jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
@@ -315,8 +332,9 @@ def approach_seed(chain: Chain, values: Array, seed: Array, target: Array, lower
         for joint in range(width):
             move = wish[joint] - back[joint]
             widest = max(widest, abs(move))
-            trial[joint] = min(max(values[joint] + move * min(1.0, 0.3 / max(abs(move), 1e-12)), lower[joint]),
-                               upper[joint])
+            trial[joint] = min(
+                max(values[joint] + move * min(1.0, 0.3 / max(abs(move), 1e-12)), lower[joint]), upper[joint]
+            )
         if widest < 1.0e-4 or not converge(chain, trial, target, lower, upper, tolerance, 8):
             return
         if np.sum((trial - seed) ** 2) >= np.sum((values - seed) ** 2):

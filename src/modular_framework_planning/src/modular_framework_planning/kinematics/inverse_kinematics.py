@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds joint positions that bring a link to a pose: every closed-form solution where there are some, else numeric."""
+
 from __future__ import annotations
 
 import time
@@ -43,11 +44,18 @@ APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the se
 class InverseKinematics:
     """Solves for one group of the robot; safe to share between threads."""
 
-    def __init__(self, model: RobotModel, group: JointGroup,
-                 settings: KinematicsSettings = KinematicsSettings()) -> None:  # noqa: B008 - frozen
+    def __init__(
+        self,
+        model: RobotModel,
+        group: JointGroup,
+        settings: KinematicsSettings = KinematicsSettings(),  # noqa: B008 - frozen
+    ) -> None:
         if not group.is_chain:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"group '{group.name}' is not a chain of joints; inverse "
-                                "kinematics needs a chain from a base link to a tip link")
+            raise PlanningError(
+                ErrorCode.NO_IK_SOLUTION,
+                f"group '{group.name}' is not a chain of joints; inverse "
+                "kinematics needs a chain from a base link to a tip link",
+            )
         self.model, self.group, self.settings = model, group, settings
         self._members = frozenset(int(number) for number in group.indices)
         self._last_link = model.document.joint_children[group.joints[-1]]
@@ -70,8 +78,9 @@ class InverseKinematics:
         return "" if number is None else self.group.joints[number]
 
     def _try_closed_form(self) -> ClosedForm | None:
-        between = [name for name in self.model.chain_joints(self.base_link, self._last_link)
-                   if name in self.model.index]
+        between = [
+            name for name in self.model.chain_joints(self.base_link, self._last_link) if name in self.model.index
+        ]
         if self.settings.solver == NUMERIC or between != list(self.group.joints):
             return None
         try:
@@ -99,12 +108,21 @@ class InverseKinematics:
         frames = self.model.pin_model.frames
         tip, last = (frames[self.model.frame_ids[name]] for name in (tip_link, self._last_link))
         if tip.parentJoint != last.parentJoint:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"link '{tip_link}' is not rigidly fixed to "
-                                f"'{self._last_link}', the end of group '{self.group.name}'; choose a link that is")
+            raise PlanningError(
+                ErrorCode.NO_IK_SOLUTION,
+                f"link '{tip_link}' is not rigidly fixed to "
+                f"'{self._last_link}', the end of group '{self.group.name}'; choose a link that is",
+            )
         return tip.placement.inverse() * last.placement
 
-    def solutions(self, tip_link: str, target: Transform, seed: Array, timeout_s: float | None = None,
-                  rng: np.random.Generator | None = None) -> list[Array]:
+    def solutions(
+        self,
+        tip_link: str,
+        target: Transform,
+        seed: Array,
+        timeout_s: float | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> list[Array]:
         """Returns all solutions found, as positions of the whole robot, nearest to the seed first.
 
         Args:
@@ -121,8 +139,15 @@ class InverseKinematics:
             found = self._from_search(problem, rng or np.random.default_rng(0))
         return self._ranked(problem, found)
 
-    def position_solutions(self, tip_link: str, point: Array, position: Array, seed: Array,
-                           timeout_s: float | None = None, rng: np.random.Generator | None = None) -> list[Array]:
+    def position_solutions(
+        self,
+        tip_link: str,
+        point: Array,
+        position: Array,
+        seed: Array,
+        timeout_s: float | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> list[Array]:
         """As `solutions`, for the position of a point alone; the orientation is left open, and kept where it can be.
 
         Args:
@@ -141,23 +166,34 @@ class InverseKinematics:
 
     def _problem(self, target: Transform, seed: Array, timeout_s: float | None = None) -> _Problem:
         allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
-        return _Problem(self._chain.at(seed), target, np.asarray(seed, dtype=float),
-                        np.array(seed[self.group.indices], dtype=float), *self._bounds(seed), self._turning,
-                        time.monotonic() + allowed)
+        return _Problem(
+            self._chain.at(seed),
+            target,
+            np.asarray(seed, dtype=float),
+            np.array(seed[self.group.indices], dtype=float),
+            *self._bounds(seed),
+            self._turning,
+            time.monotonic() + allowed,
+        )
 
     def _bounds(self, seed: Array) -> tuple[Array, Array]:
         """Returns the bounds of the group's joints; those without ends get three turns around the seed."""
         values = seed[self.group.indices]
         lower, upper = self.model.lower[self.group.indices], self.model.upper[self.group.indices]
-        return (np.where(self._is_continuous, values - 3.0 * np.pi, lower),
-                np.where(self._is_continuous, values + 3.0 * np.pi, upper))
+        return (
+            np.where(self._is_continuous, values - 3.0 * np.pi, lower),
+            np.where(self._is_continuous, values + 3.0 * np.pi, upper),
+        )
 
     def _from_closed_form(self, problem: _Problem) -> Array:
         """Returns the closed form's solutions within bounds, whole turns included, shape (k, joints)."""
         if self._closed is None:
             return np.empty((0, len(self.group.joints)))
-        base = self.model.link_transforms(problem.full_seed)[self.base_link] if not self._chain.is_own else (
-            self._fixed_base())
+        base = (
+            self.model.link_transforms(problem.full_seed)[self.base_link]
+            if not self._chain.is_own
+            else (self._fixed_base())
+        )
         in_base = base.actInv(problem.target)
         if self._closed.locked is None:
             return self._polished(problem, self._closed.solve(in_base))
@@ -193,8 +229,9 @@ class InverseKinematics:
         if not len(candidates):
             return candidates
         endless = np.full(candidates.shape[1], np.inf)
-        arrived = polish(problem.chain, candidates, problem.pose, -endless, endless, ACCURACY, FURTHEST_CANDIDATE,
-                         POLISH_STEPS)
+        arrived = polish(
+            problem.chain, candidates, problem.pose, -endless, endless, ACCURACY, FURTHEST_CANDIDATE, POLISH_STEPS
+        )
         rows = candidates[arrived]
         rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
         return whole_turns(rows, self._turning, problem.lower, problem.upper, MAX_TURNS)
@@ -223,8 +260,8 @@ class InverseKinematics:
             return []
         rows = found[np.argsort(np.linalg.norm(found - problem.seed, axis=1), kind="stable")]
         if rows.shape[1] > 6:
-            rows = self._approached(problem, rows)[:, :len(self.group.joints)]
-            distances = np.linalg.norm(rows - problem.seed[:rows.shape[1]], axis=1)
+            rows = self._approached(problem, rows)[:, : len(self.group.joints)]
+            distances = np.linalg.norm(rows - problem.seed[: rows.shape[1]], axis=1)
             rows = rows[np.argsort(distances, kind="stable")]
         result = np.tile(problem.full_seed, (len(rows), 1))
         result[:, self.group.indices] = rows
@@ -238,8 +275,16 @@ class InverseKinematics:
         """Adds solutions of a redundant chain that were moved nearer to the seed."""
         nearer = rows[:APPROACHED].copy()
         for values in nearer:
-            approach_seed(problem.chain, values, problem.seed, problem.pose, problem.lower, problem.upper, ACCURACY,
-                          APPROACH_STEPS)
+            approach_seed(
+                problem.chain,
+                values,
+                problem.seed,
+                problem.pose,
+                problem.lower,
+                problem.upper,
+                ACCURACY,
+                APPROACH_STEPS,
+            )
         rows = np.vstack([nearer, rows])
         rows = rows[unique_rows(rows, np.zeros(rows.shape[1], dtype=bool), SAME_SOLUTION)]
         return rows[np.argsort(np.linalg.norm(rows - problem.seed, axis=1), kind="stable")]
@@ -252,11 +297,15 @@ class InverseKinematics:
         distance = float(np.linalg.norm(last.translation - shoulder.translation))
         where = np.array2string(target.translation, precision=3, separator=", ")
         if distance > self.reach:
-            return (f"no inverse kinematics for '{tip_link}' at {where} m: out of reach, '{self._last_link}' would be "
-                    f"{distance:.3f} m from the shoulder and the arm reaches at most {self.reach:.3f} m")
-        return (f"no inverse kinematics for '{tip_link}' at {where} m: '{self._last_link}' would be {distance:.3f} m "
-                f"from the shoulder (at most {self.reach:.3f} m), but no joint positions within the bounds of group "
-                f"'{self.group.name}' give this orientation there")
+            return (
+                f"no inverse kinematics for '{tip_link}' at {where} m: out of reach, '{self._last_link}' would be "
+                f"{distance:.3f} m from the shoulder and the arm reaches at most {self.reach:.3f} m"
+            )
+        return (
+            f"no inverse kinematics for '{tip_link}' at {where} m: '{self._last_link}' would be {distance:.3f} m "
+            f"from the shoulder (at most {self.reach:.3f} m), but no joint positions within the bounds of group "
+            f"'{self.group.name}' give this orientation there"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -279,9 +328,14 @@ class _Problem:
     def with_ball_joint(self, joint: Transform) -> _Problem:
         """Returns the problem with a ball joint, at a pose in the last link's frame, that takes up the orientation."""
         reach = np.full(3, np.pi / BALL_GAIN)
-        return replace(self, chain=with_ball_joint(self.chain, joint.homogeneous, len(self.seed)),
-                       seed=np.append(self.seed, np.zeros(3)), lower=np.append(self.lower, -reach),
-                       upper=np.append(self.upper, reach), turning=np.append(self.turning, np.zeros(3, dtype=bool)))
+        return replace(
+            self,
+            chain=with_ball_joint(self.chain, joint.homogeneous, len(self.seed)),
+            seed=np.append(self.seed, np.zeros(3)),
+            lower=np.append(self.lower, -reach),
+            upper=np.append(self.upper, reach),
+            turning=np.append(self.turning, np.zeros(3, dtype=bool)),
+        )
 
 
 class KinematicsPool:

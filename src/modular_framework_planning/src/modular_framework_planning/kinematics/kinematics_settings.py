@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How each group's inverse kinematics is solved: the contents of kinematics.yaml."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -30,10 +31,13 @@ class KinematicsSettings:
 
     def __post_init__(self) -> None:
         if not (self.search_resolution > 0.0 and self.timeout_s > 0.0 and self.attempts >= 1):
-            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: kinematics_solver_search_resolution is "
-                                f"{self.search_resolution}, kinematics_solver_timeout is {self.timeout_s}, "
-                                f"kinematics_solver_attempts is {self.attempts}; allowed are numbers above 0, and "
-                                "whole attempts")
+            raise PlanningError(
+                ErrorCode.FAILURE,
+                f"kinematics.yaml: kinematics_solver_search_resolution is "
+                f"{self.search_resolution}, kinematics_solver_timeout is {self.timeout_s}, "
+                f"kinematics_solver_attempts is {self.attempts}; allowed are numbers above 0, and "
+                "whole attempts",
+            )
 
 
 def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSettings]:
@@ -45,8 +49,10 @@ def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSetti
     result = {}
     for group, entry in parameters.items():
         if not isinstance(entry, Mapping):
-            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}' is {entry!r}; a mapping with "
-                                "kinematics_solver and its keys is needed")
+            raise PlanningError(
+                ErrorCode.FAILURE,
+                f"kinematics.yaml: '{group}' is {entry!r}; a mapping with kinematics_solver and its keys is needed",
+            )
         default = KinematicsSettings()
         try:
             result[group] = KinematicsSettings(
@@ -54,10 +60,14 @@ def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSetti
                 float(entry.get("kinematics_solver_search_resolution", default.search_resolution)),
                 float(entry.get("kinematics_solver_timeout", default.timeout_s)),
                 int(entry.get("kinematics_solver_attempts", default.attempts)),
-                _bool(entry.get("position_only_ik", default.position_only)))
+                _bool(entry.get("position_only_ik", default.position_only)),
+            )
         except (TypeError, ValueError) as error:
-            raise PlanningError(ErrorCode.FAILURE, f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
-                                "needed, and for position_only_ik true or false") from error
+            raise PlanningError(
+                ErrorCode.FAILURE,
+                f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
+                "needed, and for position_only_ik true or false",
+            ) from error
     return result
 
 

@@ -5,6 +5,7 @@ Each step starts from the joint positions before it and solves for the nearest s
 never changes its posture on the way. Where it cannot go on, the error says which joint would have to jump or leave its
 bounds, or that the pose is out of reach.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -60,8 +61,11 @@ class PoseFollower:
         self._solver = solver
         self._rest = np.array(rest, dtype=float)
         self._members = frozenset(int(number) for number in self.group.indices)
-        self._followers = [(follower, self.group.joints.index(self.model.joint_names[leader]), multiplier)
-                           for follower, leader, multiplier, _ in self.model.mimics if leader in self._members]
+        self._followers = [
+            (follower, self.group.joints.index(self.model.joint_names[leader]), multiplier)
+            for follower, leader, multiplier, _ in self.model.mimics
+            if leader in self._members
+        ]
         self._frame = self.model.frame_ids[link]
         self._data = self.model.pin_model.createData()
 
@@ -108,8 +112,10 @@ class PoseFollower:
         jump = np.abs(values - guess)
         if jump.max() > MAX_JUMP:
             number = int(jump.argmax())
-            raise self._refusal(f"joint '{self.group.joints[number]}' would jump from {guess[number]:.3f} to "
-                                f"{values[number]:.3f}, because the arm is near a singular posture")
+            raise self._refusal(
+                f"joint '{self.group.joints[number]}' would jump from {guess[number]:.3f} to "
+                f"{values[number]:.3f}, because the arm is near a singular posture"
+            )
         problems = self.model.bound_violations(self.full_positions(values), self.group.indices, BOUND_TOLERANCE)
         if problems:
             raise self._refusal("; ".join(problems))
@@ -141,8 +147,9 @@ class PoseFollower:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, self._solver.explain_unreachable(self.link, target, seed))
         return np.asarray(found[0][self.group.indices], dtype=float)
 
-    def rates(self, values: Array, motion: LinkMotion, wanted: tuple[Array, Array] | None = None
-              ) -> tuple[Array, Array]:
+    def rates(
+        self, values: Array, motion: LinkMotion, wanted: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
         """Returns joint velocities and accelerations that give the link a velocity and an acceleration.
 
         Args:

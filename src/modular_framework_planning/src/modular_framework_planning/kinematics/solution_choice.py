@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Chooses among solutions of inverse kinematics: the nearest that is free, and of equally near ones the clearest."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads moveit_msgs/Constraints, and refuses what has no meaning instead of guessing one."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -32,13 +33,16 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
 
 PRIMITIVES: dict[int, tuple[Callable[..., Solid], int]] = {
-    SolidPrimitive.BOX: (BoxSolid, 3), SolidPrimitive.SPHERE: (SphereSolid, 1),
-    SolidPrimitive.CYLINDER: (CylinderSolid, 2), SolidPrimitive.CONE: (ConeSolid, 2)}
+    SolidPrimitive.BOX: (BoxSolid, 3),
+    SolidPrimitive.SPHERE: (SphereSolid, 1),
+    SolidPrimitive.CYLINDER: (CylinderSolid, 2),
+    SolidPrimitive.CONE: (ConeSolid, 2),
+}
 
 
-def constraints_from_message(scene: PlanningScene, message: Any, where: str,
-                             code: ErrorCode = ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                             tip: str = "") -> KinematicConstraints:
+def constraints_from_message(
+    scene: PlanningScene, message: Any, where: str, code: ErrorCode = ErrorCode.INVALID_GOAL_CONSTRAINTS, tip: str = ""
+) -> KinematicConstraints:
     """Reads a Constraints message.
 
     Args:
@@ -53,20 +57,30 @@ def constraints_from_message(scene: PlanningScene, message: Any, where: str,
             below 0, a rotation of no length, a region without a shape.
     """
     if message.visibility_constraints:
-        raise PlanningError(code, f"{where}: {len(message.visibility_constraints)} visibility constraints; they are "
-                            "not supported; use joint, position or orientation constraints")
+        raise PlanningError(
+            code,
+            f"{where}: {len(message.visibility_constraints)} visibility constraints; they are "
+            "not supported; use joint, position or orientation constraints",
+        )
     reader = _Reader(scene, code, tip)
     return KinematicConstraints(
         scene.model,
         [reader.joint(item, f"{where}.joint_constraints[{n}]") for n, item in enumerate(message.joint_constraints)],
-        [reader.position(item, f"{where}.position_constraints[{n}]")
-         for n, item in enumerate(message.position_constraints)],
-        [reader.orientation(item, f"{where}.orientation_constraints[{n}]")
-         for n, item in enumerate(message.orientation_constraints)], message.name)
+        [
+            reader.position(item, f"{where}.position_constraints[{n}]")
+            for n, item in enumerate(message.position_constraints)
+        ],
+        [
+            reader.orientation(item, f"{where}.orientation_constraints[{n}]")
+            for n, item in enumerate(message.orientation_constraints)
+        ],
+        message.name,
+    )
 
 
-def evaluated_one_by_one(scene: PlanningScene, message: Any, where: str,
-                         tip: str) -> tuple[list[ConstraintResult], list[str]]:
+def evaluated_one_by_one(
+    scene: PlanningScene, message: Any, where: str, tip: str
+) -> tuple[list[ConstraintResult], list[str]]:
     """Returns what each constraint says of the scene's state, and why some are refused.
 
     A refused one, of any kind, is not satisfied and infinitely far off; the results are in the order of
@@ -114,8 +128,14 @@ def holding_link(scene: PlanningScene, name: str) -> str:
         return name
     if name in scene.objects:
         return ""
-    return next((item.link for held, item in scene.attached.items() if name == held
-                 or (name.startswith(f"{held}/") and name.removeprefix(f"{held}/") in item.body.subframes)), "")
+    return next(
+        (
+            item.link
+            for held, item in scene.attached.items()
+            if name == held or (name.startswith(f"{held}/") and name.removeprefix(f"{held}/") in item.body.subframes)
+        ),
+        "",
+    )
 
 
 class _Reader:
@@ -148,35 +168,48 @@ class _Reader:
         target = min(max(message.position, model.lower[number]), model.upper[number])
         if abs(target - message.position) > BEYOND_BOUND:
             target = message.position  # whoever uses the constraint says that it cannot be met
-        return JointConstraint(message.joint_name, number, float(target),
-                               self._tolerance(where, "tolerance_below", message.tolerance_below),
-                               self._tolerance(where, "tolerance_above", message.tolerance_above),
-                               model.is_continuous(number), self._weight(where, message.weight))
+        return JointConstraint(
+            message.joint_name,
+            number,
+            float(target),
+            self._tolerance(where, "tolerance_below", message.tolerance_below),
+            self._tolerance(where, "tolerance_above", message.tolerance_above),
+            model.is_continuous(number),
+            self._weight(where, message.weight),
+        )
 
     def _link(self, name: str, where: str) -> FrameOnRobot:
         name = (name or self._tip).removeprefix("/")
         scene = self._scene
         if not holding_link(scene, name):
-            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"{where}: link", name,
-                                   [*scene.model.frame_ids, *scene.attached])
+            raise UnknownNameError(
+                ErrorCode.INVALID_LINK_NAME, f"{where}: link", name, [*scene.model.frame_ids, *scene.attached]
+            )
         return frame_on_robot(scene, name)
 
     def position(self, message: Any, where: str) -> PositionConstraint:
         """Reads a PositionConstraint."""
         offset = message.target_point_offset
         self._finite(f"{where}: target_point_offset", x=offset.x, y=offset.y, z=offset.z)
-        return PositionConstraint(self._link(message.link_name, where), np.array([offset.x, offset.y, offset.z]),
-                                  frame_on_robot(self._scene, message.header.frame_id),
-                                  self._regions(message.constraint_region, f"{where}: constraint_region"),
-                                  self._weight(where, message.weight))
+        return PositionConstraint(
+            self._link(message.link_name, where),
+            np.array([offset.x, offset.y, offset.z]),
+            frame_on_robot(self._scene, message.header.frame_id),
+            self._regions(message.constraint_region, f"{where}: constraint_region"),
+            self._weight(where, message.weight),
+        )
 
     def _regions(self, volume: Any, where: str) -> tuple[tuple[Solid, Transform], ...]:
         regions = []
-        for kind, shapes, poses in (("primitive", volume.primitives, volume.primitive_poses),
-                                    ("mesh", volume.meshes, volume.mesh_poses)):
+        for kind, shapes, poses in (
+            ("primitive", volume.primitives, volume.primitive_poses),
+            ("mesh", volume.meshes, volume.mesh_poses),
+        ):
             if len(shapes) != len(poses):
-                raise PlanningError(self._code, f"{where}: {len(shapes)} {kind} shapes and {len(poses)} poses; one "
-                                    "pose a shape is needed")
+                raise PlanningError(
+                    self._code,
+                    f"{where}: {len(shapes)} {kind} shapes and {len(poses)} poses; one pose a shape is needed",
+                )
             for number, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
                 source = f"{where} {kind} {number}"
                 regions.append((self._solid(shape, source), self._region_pose(shape, pose, source)))
@@ -190,8 +223,11 @@ class _Reader:
         rotation = (q.x, q.y, q.z, q.w)
         is_ball = getattr(shape, "type", 0) == SolidPrimitive.SPHERE
         try:
-            return make_transform((p.x, p.y, p.z), IDENTITY_XYZW if is_ball and not any(rotation) else
-                                  quaternion_or_identity(rotation, where), where)
+            return make_transform(
+                (p.x, p.y, p.z),
+                IDENTITY_XYZW if is_ball and not any(rotation) else quaternion_or_identity(rotation, where),
+                where,
+            )
         except GeometryError as error:
             raise PlanningError(self._code, error.reason) from error
 
@@ -218,12 +254,20 @@ class _Reader:
             raise PlanningError(self._code, error.reason) from error
         known = {item.value: item for item in Parameterization}
         if message.parameterization not in known:
-            raise PlanningError(self._code, f"{where}: parameterization {message.parameterization}; allowed are "
-                                + ", ".join(f"{item.value} {item.name}" for item in Parameterization))
-        tolerances = [self._tolerance(where, name, abs(getattr(message, name)))
-                      for name in ("absolute_x_axis_tolerance", "absolute_y_axis_tolerance",
-                                   "absolute_z_axis_tolerance")]
-        return OrientationConstraint(self._link(message.link_name, where),
-                                     frame_on_robot(self._scene, message.header.frame_id), target,
-                                     np.minimum(tolerances, 2.0 * np.pi), known[message.parameterization],
-                                     self._weight(where, message.weight))
+            raise PlanningError(
+                self._code,
+                f"{where}: parameterization {message.parameterization}; allowed are "
+                + ", ".join(f"{item.value} {item.name}" for item in Parameterization),
+            )
+        tolerances = [
+            self._tolerance(where, name, abs(getattr(message, name)))
+            for name in ("absolute_x_axis_tolerance", "absolute_y_axis_tolerance", "absolute_z_axis_tolerance")
+        ]
+        return OrientationConstraint(
+            self._link(message.link_name, where),
+            frame_on_robot(self._scene, message.header.frame_id),
+            target,
+            np.minimum(tolerances, 2.0 * np.pi),
+            known[message.parameterization],
+            self._weight(where, message.weight),
+        )

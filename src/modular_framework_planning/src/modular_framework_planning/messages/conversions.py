@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where messages meet the planner's own types: states, goals and trajectories."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -30,8 +31,10 @@ def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[fl
         PlanningError: lengths differ, a joint does not exist, or a value is not finite.
     """
     if len(names) != len(positions):
-        raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: {len(names)} joint names and {len(positions)} "
-                            "positions; one position per name is needed")
+        raise PlanningError(
+            ErrorCode.INVALID_ROBOT_STATE,
+            f"{where}: {len(names)} joint names and {len(positions)} positions; one position per name is needed",
+        )
     values = {}
     for name, position in zip(names, positions, strict=True):
         if name not in model.index:
@@ -39,8 +42,9 @@ def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[fl
                 continue
             raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint", name, model.joint_names)
         if not np.isfinite(position):
-            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint '{name}' is {position}; "
-                                "a finite number is needed")
+            raise PlanningError(
+                ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint '{name}' is {position}; a finite number is needed"
+            )
         values[name] = float(position)
     return values
 
@@ -62,21 +66,24 @@ def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robo
     return scene
 
 
-def state_message(scene: PlanningScene, positions: Array | None = None, with_attached: bool = True,
-                  with_geometry: bool = True) -> RobotState:
+def state_message(
+    scene: PlanningScene, positions: Array | None = None, with_attached: bool = True, with_geometry: bool = True
+) -> RobotState:
     """Writes joint positions (the scene's by default) and attached objects."""
     message = RobotState()
     message.joint_state.header.frame_id = scene.model.planning_frame
     message.joint_state.name = list(scene.model.joint_names)
     message.joint_state.position = [float(v) for v in (scene.positions if positions is None else positions)]
     if with_attached:
-        message.attached_collision_objects = [attached_to_message(scene, item, with_geometry)
-                                              for item in scene.attached.values()]
+        message.attached_collision_objects = [
+            attached_to_message(scene, item, with_geometry) for item in scene.attached.values()
+        ]
     return message
 
 
-def goals_from_constraints(scene: PlanningScene, constraints: Sequence[Any],
-                           tip: str) -> tuple[JointGoal | PoseGoal | ConstraintGoal, ...]:
+def goals_from_constraints(
+    scene: PlanningScene, constraints: Sequence[Any], tip: str
+) -> tuple[JointGoal | PoseGoal | ConstraintGoal, ...]:
     """Reads goal_constraints; each entry is one alternative.
 
     Raises:
@@ -88,12 +95,17 @@ def goals_from_constraints(scene: PlanningScene, constraints: Sequence[Any],
 def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | PoseGoal | ConstraintGoal:
     constraints = constraints_from_message(scene, item, where, ErrorCode.INVALID_GOAL_CONSTRAINTS, tip)
     if constraints.is_empty:
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: no constraint; give joint, position or "
-                            "orientation constraints")
+        raise PlanningError(
+            ErrorCode.INVALID_GOAL_CONSTRAINTS,
+            f"{where}: no constraint; give joint, position or orientation constraints",
+        )
     joints = constraints.joints
     if len({joint.name for joint in joints}) == len(joints) and not (constraints.positions or constraints.orientations):
-        return JointGoal({joint.name: joint.target for joint in joints}, {joint.name: joint.below for joint in joints},
-                         {joint.name: joint.above for joint in joints})
+        return JointGoal(
+            {joint.name: joint.target for joint in joints},
+            {joint.name: joint.below for joint in joints},
+            {joint.name: joint.above for joint in joints},
+        )
     name = constraints.pose_link
     if not name:
         return ConstraintGoal(constraints)
@@ -104,8 +116,14 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
 
 def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
     """Raises PlanningError unless the constraints are empty: an answer that left them out would claim too much."""
-    if any((constraints.joint_constraints, constraints.position_constraints, constraints.orientation_constraints,
-            constraints.visibility_constraints)):
+    if any(
+        (
+            constraints.joint_constraints,
+            constraints.position_constraints,
+            constraints.orientation_constraints,
+            constraints.visibility_constraints,
+        )
+    ):
         raise PlanningError(code, f"{where}: constraints are not supported here; leave them empty")
 
 
@@ -115,8 +133,14 @@ def trajectory_message(trajectory: Trajectory, frame: str) -> RobotTrajectory:
     message.joint_trajectory.header.frame_id = frame
     message.joint_trajectory.joint_names = list(trajectory.joint_names)
     message.joint_trajectory.points = [
-        JointTrajectoryPoint(positions=row.tolist(), velocities=speed.tolist(), accelerations=change.tolist(),
-                             time_from_start=genpy.Duration.from_sec(float(stamp)))
-        for stamp, row, speed, change in zip(trajectory.times, trajectory.positions, trajectory.velocities,
-                                             trajectory.accelerations, strict=True)]
+        JointTrajectoryPoint(
+            positions=row.tolist(),
+            velocities=speed.tolist(),
+            accelerations=change.tolist(),
+            time_from_start=genpy.Duration.from_sec(float(stamp)),
+        )
+        for stamp, row, speed, change in zip(
+            trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
+        )
+    ]
     return message

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns a planned trajectory into the goals of single controllers: checked, split by joints, at another speed."""
+
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
@@ -32,17 +33,24 @@ def check_trajectory(motion: JointTrajectory) -> None:
     """Refuses trajectories no controller could follow; raises PlanningError."""
     count = len(motion.joint_names)
     if motion.points and not count:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory: {len(motion.points)} points but no "
-                            "joint_names; name the joint of each position")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"trajectory: {len(motion.points)} points but no joint_names; name the joint of each position",
+        )
     before = -1.0
     for number, point in enumerate(motion.points):
         stamp = point.time_from_start.to_sec()
         if len(point.positions) != count or not np.isfinite(point.positions).all():
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory point {number}: {len(point.positions)} "
-                                f"positions for {count} joints, all must be finite")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"trajectory point {number}: {len(point.positions)} positions for {count} joints, all must be finite",
+            )
         if stamp <= before:
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"trajectory point {number} at {stamp} s does not come "
-                                f"after the one before at {before} s; times must strictly increase")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"trajectory point {number} at {stamp} s does not come "
+                f"after the one before at {before} s; times must strictly increase",
+            )
         before = stamp
 
 
@@ -59,10 +67,15 @@ def split(motion: JointTrajectory, controllers: Sequence[ControllerSpec]) -> lis
 def _columns(motion: JointTrajectory, columns: Collection[int]) -> JointTrajectory:
     part = JointTrajectory(header=motion.header, joint_names=[motion.joint_names[i] for i in columns])
     for point in motion.points:
-        part.points.append(JointTrajectoryPoint(
-            *([values[i] for i in columns] if values else [] for values in
-              (point.positions, point.velocities, point.accelerations, point.effort)),
-            point.time_from_start))
+        part.points.append(
+            JointTrajectoryPoint(
+                *(
+                    [values[i] for i in columns] if values else []
+                    for values in (point.positions, point.velocities, point.accelerations, point.effort)
+                ),
+                point.time_from_start,
+            )
+        )
     return part
 
 
@@ -72,10 +85,15 @@ def at_speed(motion: JointTrajectory, factor: float) -> JointTrajectory:
         return motion
     faster = JointTrajectory(header=motion.header, joint_names=motion.joint_names)
     for point in motion.points:
-        faster.points.append(JointTrajectoryPoint(
-            point.positions, [value * factor for value in point.velocities],
-            [value * factor ** 2 for value in point.accelerations], point.effort,
-            Duration.from_sec(point.time_from_start.to_sec() / factor)))
+        faster.points.append(
+            JointTrajectoryPoint(
+                point.positions,
+                [value * factor for value in point.velocities],
+                [value * factor**2 for value in point.accelerations],
+                point.effort,
+                Duration.from_sec(point.time_from_start.to_sec() / factor),
+            )
+        )
     return faster
 
 
@@ -85,8 +103,13 @@ def trajectory_goal(part: MotionPart) -> FollowJointTrajectoryGoal:
     moved = set(part.trajectory.joint_names)
     goal = FollowJointTrajectoryGoal(trajectory=part.trajectory)
     goal.path_tolerance, goal.goal_tolerance = (
-        [JointTolerance(item.joint, item.position, item.velocity, item.acceleration) for item in items
-         if item.joint in moved] for items in (spec.path_tolerances, spec.goal_tolerances))
+        [
+            JointTolerance(item.joint, item.position, item.velocity, item.acceleration)
+            for item in items
+            if item.joint in moved
+        ]
+        for items in (spec.path_tolerances, spec.goal_tolerances)
+    )
     goal.goal_time_tolerance = Duration.from_sec(spec.goal_time_tolerance)
     return goal
 

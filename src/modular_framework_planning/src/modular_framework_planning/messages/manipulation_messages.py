@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the messages of pickup and place into manoeuvres; every fault of a message is an error that names the field."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -43,15 +44,20 @@ def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Tr
     desired, minimum = float(message.desired_distance), float(message.min_distance)
     distances = np.array([desired, minimum])
     if not (np.isfinite(direction).all() and np.isfinite(distances).all() and (distances >= 0.0).all()):
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: direction {direction.tolist()}, "
-                            f"desired_distance {desired}, min_distance {minimum}; finite numbers are needed, distances "
-                            "of at least 0")
+        raise PlanningError(
+            ErrorCode.INVALID_GOAL_CONSTRAINTS,
+            f"{where}: direction {direction.tolist()}, "
+            f"desired_distance {desired}, min_distance {minimum}; finite numbers are needed, distances "
+            "of at least 0",
+        )
     desired = max(desired, minimum)
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
         if desired > 0.0:
-            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: the direction is zero but "
-                                f"{desired} m are asked for; give a direction")
+            raise PlanningError(
+                ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                f"{where}: the direction is zero but {desired} m are asked for; give a direction",
+            )
         return Translation(np.array([0.0, 0.0, 1.0]), False, 0.0, 0.0)
     frame = message.direction.header.frame_id.removeprefix("/")
     turn = scene.frame_transform(frame).rotation
@@ -80,14 +86,18 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
     known = hand.joints | hand.mimics.keys()
     unknown = [name for name in message.joint_names if name not in known]
     if unknown:
-        raise UnknownNameError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint of the end effector", unknown[0],
-                               known)
+        raise UnknownNameError(
+            ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint of the end effector", unknown[0], known
+        )
     points = message.points
     values = list(points[-1].positions) if points else []
     if len(values) != len(message.joint_names) or not np.isfinite(values).all():
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: {len(points)} points, the last with "
-                            f"{len(values)} positions for {len(message.joint_names)} joints; one finite position for "
-                            "each joint is needed")
+        raise PlanningError(
+            ErrorCode.INVALID_GOAL_CONSTRAINTS,
+            f"{where}: {len(points)} points, the last with "
+            f"{len(values)} positions for {len(message.joint_names)} joints; one finite position for "
+            "each joint is needed",
+        )
     return with_leaders(dict(zip(message.joint_names, map(float, values), strict=True)), hand.mimics)
 
 
@@ -113,8 +123,11 @@ def attaching(target: str, link: str, touch_links: Sequence[str]) -> SceneChange
     def change(scene: PlanningScene) -> PlanningScene:
         body = scene.find_object(target)
         in_link = scene.model.link_transforms(scene.positions)[link].actInv(body.pose)
-        return scene.with_attached(AttachedObject(CollisionObject(body.name, in_link, body.shapes, body.subframes),
-                                                  link, frozenset(touch_links)))
+        return scene.with_attached(
+            AttachedObject(
+                CollisionObject(body.name, in_link, body.shapes, body.subframes), link, frozenset(touch_links)
+            )
+        )
 
     return change
 
@@ -124,29 +137,47 @@ def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, whe
     _require_quality(grasp.grasp_quality, f"{where}.grasp_quality")
     touch = list(goal.attached_object_touch_links) or [*hand.links, hand.link]
     return Manoeuvre(
-        grasp.id or where, stamped_in_scene(scene, grasp.grasp_pose, f"{where}.grasp_pose"),
+        grasp.id or where,
+        stamped_in_scene(scene, grasp.grasp_pose, f"{where}.grasp_pose"),
         translation(scene, grasp.pre_grasp_approach, hand.link, f"{where}.pre_grasp_approach"),
         translation(scene, grasp.post_grasp_retreat, hand.link, f"{where}.post_grasp_retreat"),
-        _allowance(hand, goal.target_name, goal.support_surface_name, goal.allow_gripper_support_collision,
-                   [*goal.allowed_touch_objects, *grasp.allowed_touch_objects]),
+        _allowance(
+            hand,
+            goal.target_name,
+            goal.support_surface_name,
+            goal.allow_gripper_support_collision,
+            [*goal.allowed_touch_objects, *grasp.allowed_touch_objects],
+        ),
         attaching(goal.target_name, hand.link, touch),
         posture(grasp.pre_grasp_posture, hand, f"{where}.pre_grasp_posture"),
-        posture(grasp.grasp_posture, hand, f"{where}.grasp_posture"), goal.minimize_object_distance)
+        posture(grasp.grasp_posture, hand, f"{where}.grasp_posture"),
+        goal.minimize_object_distance,
+    )
 
 
-def place_manoeuvre(scene: PlanningScene, goal: Any, location: Any, hand: Hand, held: AttachedObject,
-                    where: str) -> Manoeuvre:
+def place_manoeuvre(
+    scene: PlanningScene, goal: Any, location: Any, hand: Hand, held: AttachedObject, where: str
+) -> Manoeuvre:
     """Reads one PlaceLocation of a PlaceGoal; raises PlanningError."""
     _require_quality(location.quality, f"{where}.quality")
     pose = stamped_in_scene(scene, location.place_pose, f"{where}.place_pose")
     return Manoeuvre(
-        location.id or where, pose if goal.place_eef else _link_pose(scene, pose, held, hand.link),
+        location.id or where,
+        pose if goal.place_eef else _link_pose(scene, pose, held, hand.link),
         translation(scene, location.pre_place_approach, hand.link, f"{where}.pre_place_approach"),
         translation(scene, location.post_place_retreat, hand.link, f"{where}.post_place_retreat"),
-        _allowance(hand, held.name, goal.support_surface_name, goal.allow_gripper_support_collision,
-                   [*goal.allowed_touch_objects, *location.allowed_touch_objects]),
-        lambda now: now.with_detached(held.name), {},
-        posture(location.post_place_posture, hand, f"{where}.post_place_posture"), middle="release")
+        _allowance(
+            hand,
+            held.name,
+            goal.support_surface_name,
+            goal.allow_gripper_support_collision,
+            [*goal.allowed_touch_objects, *location.allowed_touch_objects],
+        ),
+        lambda now: now.with_detached(held.name),
+        {},
+        posture(location.post_place_posture, hand, f"{where}.post_place_posture"),
+        middle="release",
+    )
 
 
 def _link_pose(scene: PlanningScene, object_pose: Transform, held: AttachedObject, link: str) -> Transform:
@@ -169,7 +200,9 @@ def held_object(scene: PlanningScene, name: str, hand: Hand) -> AttachedObject:
             raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, f"object attached to {hand.link}:", name, held)
         return held[name]
     if len(held) != 1:
-        raise PlanningError(ErrorCode.INVALID_OBJECT_NAME, f"attached_object_name is empty and the end effector at "
-                            f"'{hand.link}' holds {len(held)} objects ({', '.join(held) or 'none'}); name one")
+        raise PlanningError(
+            ErrorCode.INVALID_OBJECT_NAME,
+            f"attached_object_name is empty and the end effector at "
+            f"'{hand.link}' holds {len(held)} objects ({', '.join(held) or 'none'}); name one",
+        )
     return next(iter(held.values()))
-

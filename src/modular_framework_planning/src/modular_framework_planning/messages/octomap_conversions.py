@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the octomap of a planning scene message into the scene, and writes it."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Poses as messages."""
+
 from __future__ import annotations
 
 from geometry_msgs.msg import Pose, PoseStamped

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Applies planning scene messages to a scene snapshot and writes snapshots as messages."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -34,14 +35,18 @@ def _is_unset(pose: Any) -> bool:
 
 def _primitive(message: Any, where: str) -> Shape:
     kinds: dict[int, tuple[type[Any], int]] = {
-        SolidPrimitive.BOX: (Box, 3), SolidPrimitive.SPHERE: (Sphere, 1),
-        SolidPrimitive.CYLINDER: (Cylinder, 2), SolidPrimitive.CONE: (Cone, 2)}
+        SolidPrimitive.BOX: (Box, 3),
+        SolidPrimitive.SPHERE: (Sphere, 1),
+        SolidPrimitive.CYLINDER: (Cylinder, 2),
+        SolidPrimitive.CONE: (Cone, 2),
+    }
     if message.type not in kinds:
         raise GeometryError(f"{where}: primitive type {message.type}; allowed are 1 box, 2 sphere, 3 cylinder, 4 cone")
     kind, count = kinds[message.type]
     if len(message.dimensions) < count:
-        raise GeometryError(f"{where}: {kind.__name__.lower()} with {len(message.dimensions)} dimensions; "
-                            f"{count} are needed")
+        raise GeometryError(
+            f"{where}: {kind.__name__.lower()} with {len(message.dimensions)} dimensions; {count} are needed"
+        )
     try:
         return kind(*message.dimensions[:count])
     except GeometryError as error:
@@ -60,9 +65,10 @@ def _mesh(message: Any, where: str) -> Shape:
 def _shapes(message: Any, where: str) -> tuple[tuple[Shape, Transform], ...]:
     result: list[tuple[Shape, Transform]] = []
     for kind, items, poses, build in (
-            ("primitive", message.primitives, message.primitive_poses, _primitive),
-            ("mesh", message.meshes, message.mesh_poses, _mesh),
-            ("plane", message.planes, message.plane_poses, lambda item, _: Plane(*item.coef))):
+        ("primitive", message.primitives, message.primitive_poses, _primitive),
+        ("mesh", message.meshes, message.mesh_poses, _mesh),
+        ("plane", message.planes, message.plane_poses, lambda item, _: Plane(*item.coef)),
+    ):
         if len(poses) > len(items):
             raise GeometryError(f"{where}: {len(items)} {kind} shapes and {len(poses)} poses; one pose a shape")
         for number, item in enumerate(items):
@@ -81,10 +87,14 @@ def _object_pose(scene: PlanningScene, message: Any, where: str) -> Transform:
 def _body(scene: PlanningScene, message: Any) -> core.CollisionObject:
     where = f"collision object '{message.id}'"
     if len(message.subframe_names) != len(message.subframe_poses):
-        raise GeometryError(f"{where}: {len(message.subframe_names)} subframe names and "
-                            f"{len(message.subframe_poses)} poses; one pose a name")
-    subframes = {name: _transform(pose, f"{where} subframe '{name}'")
-                 for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)}
+        raise GeometryError(
+            f"{where}: {len(message.subframe_names)} subframe names and "
+            f"{len(message.subframe_poses)} poses; one pose a name"
+        )
+    subframes = {
+        name: _transform(pose, f"{where} subframe '{name}'")
+        for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)
+    }
     pose, shapes = _object_pose(scene, message, where), _shapes(message, where)
     if len(shapes) == 1 and _is_unset(message.pose):  # as in MoveIt: the only shape says where the object is
         shape, pose_in_header = shapes[0]
@@ -106,8 +116,9 @@ def apply_collision_object(scene: PlanningScene, message: CollisionObject) -> Pl
         return scene.without_object(message.id) if message.id in scene.objects else scene  # already gone: fine
     if message.operation == CollisionObject.MOVE:
         return _moved(scene, message)
-    raise GeometryError(f"collision object '{message.id}': operation {message.operation}; allowed are 0 ADD, 1 REMOVE, "
-                        "2 APPEND, 3 MOVE")
+    raise GeometryError(
+        f"collision object '{message.id}': operation {message.operation}; allowed are 0 ADD, 1 REMOVE, 2 APPEND, 3 MOVE"
+    )
 
 
 def _moved(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
@@ -115,8 +126,10 @@ def _moved(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
     where = f"collision object '{message.id}'"
     scene.find_object(message.id)
     pose = _object_pose(scene, message, where)
-    shape_poses = [_transform(item, f"{where} shape {number}") for number, item in enumerate(
-        (*message.primitive_poses, *message.mesh_poses, *message.plane_poses))]
+    shape_poses = [
+        _transform(item, f"{where} shape {number}")
+        for number, item in enumerate((*message.primitive_poses, *message.mesh_poses, *message.plane_poses))
+    ]
     if len(shape_poses) == 1 and _is_unset(message.pose):  # as in ADD: the only shape says where the object is
         pose, shape_poses = pose * shape_poses[0], [pin.SE3.Identity()]
     return scene.with_object_moved(message.id, pose, shape_poses)
@@ -130,8 +143,9 @@ def apply_attached_object(scene: PlanningScene, message: AttachedCollisionObject
     if operation not in (CollisionObject.ADD, CollisionObject.APPEND):
         raise GeometryError(f"attached object '{name}': operation {operation}; allowed are 0 ADD, 1 REMOVE, 2 APPEND")
     if message.link_name not in scene.model.frame_ids:
-        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"attaching '{name}': link", message.link_name,
-                               scene.model.frame_ids)
+        raise UnknownNameError(
+            ErrorCode.INVALID_LINK_NAME, f"attaching '{name}': link", message.link_name, scene.model.frame_ids
+        )
     body = _body(scene, message.object)
     if name in scene.attached and (operation == CollisionObject.APPEND or not body.shapes):
         released = scene.with_detached(name)
@@ -146,8 +160,10 @@ def apply_attached_object(scene: PlanningScene, message: AttachedCollisionObject
 def _detached(scene: PlanningScene, name: str, link: str) -> PlanningScene:
     """Puts one attached object, or all of a link (of the robot where no link is named), back into the world."""
     if name in scene.attached and link not in ("", scene.attached[name].link):
-        raise GeometryError(f"detaching '{name}': it is attached to '{scene.attached[name].link}', not to '{link}'; "
-                            "name that link or leave link_name empty")
+        raise GeometryError(
+            f"detaching '{name}': it is attached to '{scene.attached[name].link}', not to '{link}'; "
+            "name that link or leave link_name empty"
+        )
     names = [name] if name else [key for key, item in scene.attached.items() if link in ("", item.link)]
     for item in names:
         scene = scene.with_detached(item)
@@ -163,8 +179,10 @@ def with_matrix_of(scene: PlanningScene, message: Any) -> PlanningScene:
         GeometryError: the matrix is not square, or names and values of defaults differ in number.
     """
     if len(message.default_entry_names) != len(message.default_entry_values):
-        raise GeometryError(f"allowed_collision_matrix: {len(message.default_entry_names)} default_entry_names and "
-                            f"{len(message.default_entry_values)} default_entry_values; give one value for each name")
+        raise GeometryError(
+            f"allowed_collision_matrix: {len(message.default_entry_names)} default_entry_names and "
+            f"{len(message.default_entry_values)} default_entry_values; give one value for each name"
+        )
     defaults = dict(zip(message.default_entry_names, map(bool, message.default_entry_values), strict=True))
     if not message.entry_names:
         return scene.with_acm(scene.acm.with_defaults(defaults)) if defaults else scene
@@ -194,8 +212,7 @@ def fixed_frames_from(scene: PlanningScene, transforms: Sequence[Any]) -> dict[s
     return frames
 
 
-def object_to_message(body: core.CollisionObject, frame: str,
-                      with_geometry: bool = True) -> CollisionObject:
+def object_to_message(body: core.CollisionObject, frame: str, with_geometry: bool = True) -> CollisionObject:
     """Writes an object whose pose is given in `frame`."""
     message = CollisionObject(id=body.name, operation=CollisionObject.ADD)
     message.header.frame_id = frame
@@ -224,8 +241,12 @@ def _write_shape(message: CollisionObject, shape: Shape, pose: Any) -> None:
             message.plane_poses.append(pose)
             return
         case Mesh():
-            message.meshes.append(MeshMessage([MeshTriangle([int(i) for i in row]) for row in shape.triangles],
-                                              [Point(*row) for row in shape.vertices]))
+            message.meshes.append(
+                MeshMessage(
+                    [MeshTriangle([int(i) for i in row]) for row in shape.triangles],
+                    [Point(*row) for row in shape.vertices],
+                )
+            )
             message.mesh_poses.append(pose)
             return
         case _:
@@ -234,8 +255,9 @@ def _write_shape(message: CollisionObject, shape: Shape, pose: Any) -> None:
     message.primitive_poses.append(pose)
 
 
-def attached_to_message(scene: PlanningScene, item: core.AttachedObject,
-                        with_geometry: bool = True) -> AttachedCollisionObject:
+def attached_to_message(
+    scene: PlanningScene, item: core.AttachedObject, with_geometry: bool = True
+) -> AttachedCollisionObject:
     """Writes an attached object in the frame of its link."""
     message = AttachedCollisionObject(link_name=item.link, touch_links=sorted(item.touch_links))
     message.object = object_to_message(item.body, item.link, with_geometry)
@@ -260,7 +282,10 @@ def frames_to_message(scene: PlanningScene) -> list[TransformStamped]:
         item.header.frame_id = scene.model.planning_frame
         pose = pose_message(transform)
         item.transform.translation.x, item.transform.translation.y, item.transform.translation.z = (
-            pose.position.x, pose.position.y, pose.position.z)
+            pose.position.x,
+            pose.position.y,
+            pose.position.z,
+        )
         item.transform.rotation = pose.orientation
         result.append(item)
     return result

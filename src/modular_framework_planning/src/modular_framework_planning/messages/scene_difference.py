@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes what changed between two snapshots of the scene, so that whoever applies it has the second one."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -63,8 +64,11 @@ def _attached_changes(before: PlanningScene, after: PlanningScene) -> list[Attac
         release = AttachedCollisionObject()
         release.object.id, release.object.operation = name, CollisionObject.REMOVE
         changes.append(release)
-    return changes + [attached_to_message(after, item) for name, item in after.attached.items()
-                      if before.attached.get(name) is not item]
+    return changes + [
+        attached_to_message(after, item)
+        for name, item in after.attached.items()
+        if before.attached.get(name) is not item
+    ]
 
 
 def _world_changes(before: PlanningScene, after: PlanningScene) -> list[CollisionObject]:

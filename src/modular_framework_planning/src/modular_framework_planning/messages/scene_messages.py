@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Applies a whole PlanningScene message to a snapshot, all of it or nothing, and writes one with the asked parts."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -42,8 +43,9 @@ def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
         PlanningError: something in the message is not usable; the given scene is unchanged, as always.
     """
     if not message.is_diff:
-        scene = empty_scene(scene.model, scene.positions).with_padding(scene.padding).with_fixed_frames(
-            scene.fixed_frames)
+        scene = (
+            empty_scene(scene.model, scene.positions).with_padding(scene.padding).with_fixed_frames(scene.fixed_frames)
+        )
     if message.name:
         scene = scene.with_name(message.name)
     if message.fixed_frame_transforms:
@@ -52,9 +54,12 @@ def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
     scene = apply_world(scene, message.world)
     scene = with_matrix_of(scene, message.allowed_collision_matrix)
     if message.link_padding or message.link_scale:
-        scene = scene.with_padding(scene.padding.with_links(
-            {item.link_name: item.padding for item in message.link_padding},
-            {item.link_name: item.scale for item in message.link_scale}))
+        scene = scene.with_padding(
+            scene.padding.with_links(
+                {item.link_name: item.padding for item in message.link_padding},
+                {item.link_name: item.scale for item in message.link_scale},
+            )
+        )
     if message.object_colors:
         scene = scene.with_colors({c.id: (c.color.r, c.color.g, c.color.b, c.color.a) for c in message.object_colors})
     return scene
@@ -70,8 +75,9 @@ def scene_message(scene: PlanningScene, components: int) -> SceneMessage:
         message.robot_state = state_message(scene, None, bool(wanted & Parts.ROBOT_STATE_ATTACHED_OBJECTS))
     geometry = bool(wanted & Parts.WORLD_OBJECT_GEOMETRY)
     if geometry or wanted & Parts.WORLD_OBJECT_NAMES:
-        message.world.collision_objects = [object_to_message(body, scene.model.planning_frame, geometry)
-                                           for body in scene.objects.values()]
+        message.world.collision_objects = [
+            object_to_message(body, scene.model.planning_frame, geometry) for body in scene.objects.values()
+        ]
     if wanted & Parts.OCTOMAP:
         message.world.octomap = octomap_message(scene)
     if wanted & Parts.TRANSFORMS:

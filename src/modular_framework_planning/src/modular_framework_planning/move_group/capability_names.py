@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of every endpoint of the move_group node, in one place."""
+
 PLAN_SERVICE = "plan_kinematic_path"
 IK_SERVICE = "compute_ik"
 FK_SERVICE = "compute_fk"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which endpoints the node offers: MoveIt's default set, with those that parameters add and without those they drop."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -43,10 +44,14 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[Callable[[MoveGroup
     wanted = [(rospy.resolve_name("~capabilities"), name) for name in _split(rospy.get_param("~capabilities", ""))]
     for pipeline, settings in (rospy.get_param(PIPELINES, {}) or {}).items():
         if isinstance(settings, dict):
-            wanted += [(rospy.resolve_name(f"{PIPELINES}/{pipeline}/capabilities"), name)
-                       for name in _split(settings.get("capabilities", ""))]
-    disabled = [(rospy.resolve_name("~disable_capabilities"), name)
-                for name in _split(rospy.get_param("~disable_capabilities", ""))]
+            wanted += [
+                (rospy.resolve_name(f"{PIPELINES}/{pipeline}/capabilities"), name)
+                for name in _split(settings.get("capabilities", ""))
+            ]
+    disabled = [
+        (rospy.resolve_name("~disable_capabilities"), name)
+        for name in _split(rospy.get_param("~disable_capabilities", ""))
+    ]
     known = list(dict.fromkeys(item.name for item in table))
     for where, name in (*wanted, *disabled):
         if name not in known:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the endpoints of the node share."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

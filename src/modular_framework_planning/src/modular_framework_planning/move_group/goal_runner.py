@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An action server whose goals run in threads of their own, so that a cancel arrives while a goal is worked on."""
+
 from __future__ import annotations
 
 import threading
@@ -21,8 +22,9 @@ class GoalRunner:
     `work(goal, cancelled, feedback)` returns the result and whether it succeeded; `cancelled` is an Event.
     """
 
-    def __init__(self, name: str, kind: Any,
-                 work: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]]) -> None:
+    def __init__(
+        self, name: str, kind: Any, work: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]]
+    ) -> None:
         self._work = work
         self._result_type = type(kind().action_result.result)
         self._lock = threading.Lock()
@@ -52,8 +54,9 @@ class GoalRunner:
     def _run(self, handle: Any, cancelled: threading.Event) -> None:
         if not self._turn.acquire(timeout=PREVIOUS_GOAL_TIMEOUT_S):
             self._forget(handle)
-            handle.set_rejected(self._result(ErrorCode.PREEMPTED),
-                                f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s")
+            handle.set_rejected(
+                self._result(ErrorCode.PREEMPTED), f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s"
+            )
             return
         try:
             if cancelled.is_set():

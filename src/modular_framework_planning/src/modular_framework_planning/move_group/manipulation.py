@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Works on a goal of pickup or place: tries its grasps or locations in turn and executes the first that can be done."""
+
 from __future__ import annotations
 
 import threading
@@ -64,9 +65,12 @@ class _Attempts:
         codes = {error.code for _, error in self.failures}
         reported = [error.reason for _, error in self.failures[:MAX_REASONS]]
         more = len(self.failures) - len(reported)
-        return PlanningError(codes.pop() if len(codes) == 1 else ErrorCode.PLANNING_FAILED,
-                             f"none of {len(self.failures)} ways can be done: " + " | ".join(reported)
-                             + (f" | and {more} more" if more else ""))
+        return PlanningError(
+            codes.pop() if len(codes) == 1 else ErrorCode.PLANNING_FAILED,
+            f"none of {len(self.failures)} ways can be done: "
+            + " | ".join(reported)
+            + (f" | and {more} more" if more else ""),
+        )
 
     def entries(self) -> list[dict[str, Any]]:
         """For the report."""
@@ -76,8 +80,9 @@ class _Attempts:
 class Manipulation:
     """One goal."""
 
-    def __init__(self, context: MoveGroupContext, task: Task, cancelled: threading.Event,
-                 feedback: Callable[[str], None]) -> None:
+    def __init__(
+        self, context: MoveGroupContext, task: Task, cancelled: threading.Event, feedback: Callable[[str], None]
+    ) -> None:
         self._context, self._task, self._cancelled, self._feedback = context, task, cancelled, feedback
         self._attempts = _Attempts()
         self._grasped = False
@@ -98,12 +103,19 @@ class Manipulation:
                     if last or error.code != ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
                         raise
         except Exception as error:  # noqa: BLE001 - the client must get a code; the reporter logs the error
-            result.error_code.val = self._context.reporter.failure(task.kind, error, **details,
-                                                                   attempts=self._attempts.entries())
+            result.error_code.val = self._context.reporter.failure(
+                task.kind, error, **details, attempts=self._attempts.entries()
+            )
             return str(error)
         result.error_code.val = ErrorCode.SUCCESS
-        self._context.reporter.report(task.kind, ErrorCode.SUCCESS, "", **details, attempts=self._attempts.entries(),
-                                      stages=list(result.trajectory_descriptions))
+        self._context.reporter.report(
+            task.kind,
+            ErrorCode.SUCCESS,
+            "",
+            **details,
+            attempts=self._attempts.entries(),
+            stages=list(result.trajectory_descriptions),
+        )
         return "planned" if options.plan_only else "planned and executed"
 
     def _once(self, result: Any) -> None:
@@ -130,8 +142,12 @@ class Manipulation:
         model = self._context.model
         group, effector = choose_end_effector(model, task.group, task.end_effector)
         fingers = frozenset(model.group(effector.group).joints)
-        hand = Hand(effector.parent_link, hand_links(model, effector), fingers,
-                    {name: mimic for name, mimic in model.document.mimics.items() if mimic.leader in fingers})
+        hand = Hand(
+            effector.parent_link,
+            hand_links(model, effector),
+            fingers,
+            {name: mimic for name, mimic in model.document.mimics.items() if mimic.leader in fingers},
+        )
         task.check(scene)
         candidates = [(candidate, task.read(scene, candidate, hand)) for candidate in task.candidates]
         planner = self._planner(scene, group, hand)
@@ -154,19 +170,36 @@ class Manipulation:
         goal, model = self._task.goal, self._context.model
         allowed_s = goal.allowed_planning_time
         if not np.isfinite(allowed_s):
-            raise PlanningError(ErrorCode.TIMED_OUT, f"allowed_planning_time is {allowed_s}; a finite number of "
-                                "seconds is needed")
+            raise PlanningError(
+                ErrorCode.TIMED_OUT, f"allowed_planning_time is {allowed_s}; a finite number of seconds is needed"
+            )
         settings = self._context.pipeline("").settings
         constraints = constraints_from_message(scene, goal.path_constraints, "path_constraints")
-        arm = Arm(group, hand.link, self._context.kinematics.solver(group.name),
-                  model.max_velocity[group.indices] * settings.default_velocity_scaling_factor,
-                  model.max_acceleration[group.indices] * settings.default_acceleration_scaling_factor)
-        request = PlanningRequest(scene, group.name, (), goal.planner_id, 1,
-                                  allowed_s if allowed_s > 0.0 else DEFAULT_PLANNING_TIME_S,
-                                  cancelled=self._cancelled.is_set,
-                                  path_constraints=None if constraints.is_empty else constraints)
-        return ManoeuvrePlanner(arm, self._context.plan, request, settings.start_state_contact_tolerance,
-                                self._context.settings.pick_place, self._context.new_checker)
+        arm = Arm(
+            group,
+            hand.link,
+            self._context.kinematics.solver(group.name),
+            model.max_velocity[group.indices] * settings.default_velocity_scaling_factor,
+            model.max_acceleration[group.indices] * settings.default_acceleration_scaling_factor,
+        )
+        request = PlanningRequest(
+            scene,
+            group.name,
+            (),
+            goal.planner_id,
+            1,
+            allowed_s if allowed_s > 0.0 else DEFAULT_PLANNING_TIME_S,
+            cancelled=self._cancelled.is_set,
+            path_constraints=None if constraints.is_empty else constraints,
+        )
+        return ManoeuvrePlanner(
+            arm,
+            self._context.plan,
+            request,
+            settings.start_state_contact_tolerance,
+            self._context.settings.pick_place,
+            self._context.new_checker,
+        )
 
     # ---------------------------------------------------------------- execution
     def _message(self, stage: Stage) -> RobotTrajectory:
@@ -181,17 +214,19 @@ class Manipulation:
         if not len(numbers):
             return message
         duration_s = float((np.abs(end - start) / model.max_velocity[numbers]).max()) + FINGER_SETTLE_S
-        motion.points = [JointTrajectoryPoint(positions=start.tolist(), time_from_start=genpy.Duration(0)),
-                         JointTrajectoryPoint(positions=end.tolist(),
-                                              time_from_start=genpy.Duration.from_sec(duration_s))]
+        motion.points = [
+            JointTrajectoryPoint(positions=start.tolist(), time_from_start=genpy.Duration(0)),
+            JointTrajectoryPoint(positions=end.tolist(), time_from_start=genpy.Duration.from_sec(duration_s)),
+        ]
         return message
 
     def _execute(self, stage: Stage, message: RobotTrajectory, change: SceneChange) -> None:
         """Executes a stage and makes its effect real; raises PlanningError naming the stage."""
         try:
             if stage.motion is not None:
-                WatchedMotion(self._context, message, stage.scene,
-                              lambda scene: stage.change(change(scene))).execute(self._cancelled)
+                WatchedMotion(self._context, message, stage.scene, lambda scene: stage.change(change(scene))).execute(
+                    self._cancelled
+                )
             elif stage.fingers:
                 self._context.execution.execute(self._from_here(message), self._cancelled)
             if stage.effect is not None:

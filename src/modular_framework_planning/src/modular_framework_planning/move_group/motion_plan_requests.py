@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Answers a MotionPlanRequest message: used by the planning service and by the move_group action."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -27,8 +28,9 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 DEFAULT_PLANNING_TIME_S = 5.0
 
 
-def read_request(context: MoveGroupContext, scene: PlanningScene, message: Any,
-                 cancelled: Callable[[], bool] = lambda: False) -> PlanningRequest:
+def read_request(
+    context: MoveGroupContext, scene: PlanningScene, message: Any, cancelled: Callable[[], bool] = lambda: False
+) -> PlanningRequest:
     """Reads a moveit_msgs/MotionPlanRequest.
 
     Args:
@@ -45,25 +47,37 @@ def read_request(context: MoveGroupContext, scene: PlanningScene, message: Any,
     for constraints in message.trajectory_constraints.constraints:
         refuse_constraints("trajectory_constraints", constraints, ErrorCode.PLANNING_FAILED)
     if not np.isfinite([message.allowed_planning_time, message.max_cartesian_speed]).all():
-        raise PlanningError(ErrorCode.TIMED_OUT, f"allowed_planning_time is {message.allowed_planning_time}, "
-                            f"max_cartesian_speed {message.max_cartesian_speed}; both must be finite")
+        raise PlanningError(
+            ErrorCode.TIMED_OUT,
+            f"allowed_planning_time is {message.allowed_planning_time}, "
+            f"max_cartesian_speed {message.max_cartesian_speed}; both must be finite",
+        )
     scene = scene_with_state(scene, message.start_state, "start_state")
     state = message.start_state.joint_state
     constraints, point = _path_constraints(pipeline, scene, message, group.tip_link)
     return PlanningRequest(
-        scene, group.name, goals_from_constraints(scene, message.goal_constraints, group.tip_link),
-        message.planner_id, max(1, message.num_planning_attempts),
+        scene,
+        group.name,
+        goals_from_constraints(scene, message.goal_constraints, group.tip_link),
+        message.planner_id,
+        max(1, message.num_planning_attempts),
         message.allowed_planning_time if message.allowed_planning_time > 0.0 else DEFAULT_PLANNING_TIME_S,
-        message.max_velocity_scaling_factor, message.max_acceleration_scaling_factor, cancelled,
-        pipeline_id=message.pipeline_id, path_constraints=constraints, auxiliary_point=point,
+        message.max_velocity_scaling_factor,
+        message.max_acceleration_scaling_factor,
+        cancelled,
+        pipeline_id=message.pipeline_id,
+        path_constraints=constraints,
+        auxiliary_point=point,
         start_velocities=dict(zip(state.name, state.velocity, strict=False)),
         max_cartesian_speed=message.max_cartesian_speed,
         cartesian_speed_limited_link=message.cartesian_speed_limited_link,
-        workspace=_workspace(scene, message.workspace_parameters))
+        workspace=_workspace(scene, message.workspace_parameters),
+    )
 
 
-def _path_constraints(pipeline: PlanningPipeline, scene: PlanningScene, message: Any,
-                      tip: str) -> tuple[KinematicConstraints | None, AuxiliaryPoint | None]:
+def _path_constraints(
+    pipeline: PlanningPipeline, scene: PlanningScene, message: Any, tip: str
+) -> tuple[KinematicConstraints | None, AuxiliaryPoint | None]:
     """Returns what the motion must keep, or what the planner takes from the same field instead."""
     given = message.path_constraints
     if given.name and given.name in pipeline.auxiliary_constraints:
@@ -78,16 +92,29 @@ def _workspace(scene: PlanningScene, message: Any) -> Workspace | None:
     if not low.any() and not high.any():
         return None
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low <= high).all()):
-        raise PlanningError(ErrorCode.PLANNING_FAILED, f"workspace_parameters: min_corner {low.tolist()}, max_corner "
-                            f"{high.tolist()}; both must be finite and min at most max")
+        raise PlanningError(
+            ErrorCode.PLANNING_FAILED,
+            f"workspace_parameters: min_corner {low.tolist()}, max_corner "
+            f"{high.tolist()}; both must be finite and min at most max",
+        )
     frame = scene.frame_transform(message.header.frame_id)
-    corners = np.array([frame.act(np.array([x, y, z])) for x in (low[0], high[0]) for y in (low[1], high[1])
-                        for z in (low[2], high[2])])
+    corners = np.array(
+        [
+            frame.act(np.array([x, y, z]))
+            for x in (low[0], high[0])
+            for y in (low[1], high[1])
+            for z in (low[2], high[2])
+        ]
+    )
     return Workspace(corners.min(axis=0), corners.max(axis=0))
 
 
-def answer(context: MoveGroupContext, message: Any, change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
-           cancelled: Callable[[], bool] = lambda: False) -> MotionPlanResponse:
+def answer(
+    context: MoveGroupContext,
+    message: Any,
+    change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> MotionPlanResponse:
     """Plans, reports and shows the motion.
 
     Args:
@@ -100,8 +127,14 @@ def answer(context: MoveGroupContext, message: Any, change: Callable[[PlanningSc
         PlanningError: with code and reason, already reported.
     """
     name = message.goal_constraints[0].name if message.goal_constraints else ""
-    details: dict[str, Any] = {"group": message.group_name, "planner_id": message.planner_id, "request_name": name,
-                               "planning_time_s": 0.0, "start": {}, "goal": {}}
+    details: dict[str, Any] = {
+        "group": message.group_name,
+        "planner_id": message.planner_id,
+        "request_name": name,
+        "planning_time_s": 0.0,
+        "start": {},
+        "goal": {},
+    }
     context.reporter.request(message)
     try:
         if not message.start_state.joint_state.name or message.start_state.is_diff:
@@ -121,16 +154,23 @@ def answer(context: MoveGroupContext, message: Any, change: Callable[[PlanningSc
     response.trajectory = trajectory_message(found.trajectory, scene.model.planning_frame)
     response.planning_time = found.total_time_s
     response.error_code.val = ErrorCode.SUCCESS
-    details.update(planner_id=found.planner_id, planning_time_s=found.total_time_s,
-                   goal=dict(zip(scene.model.joint_names, found.goal.tolist(), strict=True)))
+    details.update(
+        planner_id=found.planner_id,
+        planning_time_s=found.total_time_s,
+        goal=dict(zip(scene.model.joint_names, found.goal.tolist(), strict=True)),
+    )
     context.reporter.report("plan", ErrorCode.SUCCESS, "", **details)
     context.markers.show_contacts(())
     context.markers.show_path(scene, response, found)
     return response
 
 
-def plan(context: MoveGroupContext, message: Any, change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
-         cancelled: Callable[[], bool] = lambda: False) -> MotionPlanResponse:
+def plan(
+    context: MoveGroupContext,
+    message: Any,
+    change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> MotionPlanResponse:
     """As `answer`, but a failure comes back as the response's code, never as an exception."""
     try:
         return answer(context, message, change, cancelled)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plans a MotionSequenceRequest message: used by the service plan_sequence_path and the action sequence_move_group."""
+
 from __future__ import annotations
 
 import copy
@@ -35,8 +36,12 @@ class SolvedSequence:
     reason: str
 
 
-def solve_sequence(context: MoveGroupContext, message: Any, change: Callable[[PlanningScene], PlanningScene],
-                   cancelled: Callable[[], bool] = lambda: False) -> SolvedSequence:
+def solve_sequence(
+    context: MoveGroupContext,
+    message: Any,
+    change: Callable[[PlanningScene], PlanningScene],
+    cancelled: Callable[[], bool] = lambda: False,
+) -> SolvedSequence:
     """Plans all motions or none; failures come back as a code and a reason, never as an exception.
 
     Args:
@@ -55,8 +60,9 @@ def solve_sequence(context: MoveGroupContext, message: Any, change: Callable[[Pl
         return SolvedSequence(response, (), str(error))
     response.planning_time = time.monotonic() - begun
     response.error_code.val = ErrorCode.SUCCESS
-    response.planned_trajectories = [trajectory_message(part.trajectory, context.model.planning_frame)
-                                     for part in parts]
+    response.planned_trajectories = [
+        trajectory_message(part.trajectory, context.model.planning_frame) for part in parts
+    ]
     if parts:
         response.sequence_start = state_message(parts[0].scene, parts[0].answers[0].start)
         _show(context, parts, response)
@@ -64,11 +70,16 @@ def solve_sequence(context: MoveGroupContext, message: Any, change: Callable[[Pl
     return SolvedSequence(response, parts, "planned")
 
 
-def _plan(context: MoveGroupContext, items: Sequence[Any], change: Callable[[PlanningScene], PlanningScene],
-          cancelled: Callable[[], bool]) -> tuple[SequencePart, ...]:
+def _plan(
+    context: MoveGroupContext,
+    items: Sequence[Any],
+    change: Callable[[PlanningScene], PlanningScene],
+    cancelled: Callable[[], bool],
+) -> tuple[SequencePart, ...]:
     """Plans each motion from the end of the one before, then joins them; raises PlanningError with the item."""
-    radii, warnings = checked_radii([ItemSpec(item.req.group_name, item.blend_radius, _has_start(item.req.start_state))
-                                     for item in items])
+    radii, warnings = checked_radii(
+        [ItemSpec(item.req.group_name, item.blend_radius, _has_start(item.req.start_state)) for item in items]
+    )
     for text in warnings:
         rospy.logwarn("sequence: %s", text)
     if not items:
@@ -117,6 +128,9 @@ def _show(context: MoveGroupContext, parts: Sequence[SequencePart], response: Mo
     """Shows the longest part."""
     number = max(range(len(parts)), key=lambda item: parts[item].trajectory.duration_s)
     part = parts[number]
-    shown = MotionPlanResponse(group_name=part.group.name, trajectory=response.planned_trajectories[number],
-                               trajectory_start=state_message(part.scene, part.answers[0].start))
+    shown = MotionPlanResponse(
+        group_name=part.group.name,
+        trajectory=response.planned_trajectories[number],
+        trajectory_start=state_message(part.scene, part.answers[0].start),
+    )
     context.markers.show_path(part.scene, shown, replace(part.answers[0], trajectory=part.trajectory))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Executes a planned motion, stops it when a change of the scene gets in its way, and records where the robot went."""
+
 from __future__ import annotations
 
 import math
@@ -25,8 +26,13 @@ JOIN_TIMEOUT_S = 5.0
 class WatchedMotion:
     """One execution of one motion; `executed` holds what was measured, also after a failure."""
 
-    def __init__(self, context: MoveGroupContext, trajectory: Any, planned_in: PlanningScene,
-                 change: Callable[[PlanningScene], PlanningScene] = lambda scene: scene) -> None:
+    def __init__(
+        self,
+        context: MoveGroupContext,
+        trajectory: Any,
+        planned_in: PlanningScene,
+        change: Callable[[PlanningScene], PlanningScene] = lambda scene: scene,
+    ) -> None:
         """Takes a motion.
 
         Args:
@@ -80,8 +86,11 @@ class WatchedMotion:
 
     def _raise_if_blocked(self) -> None:
         if self._blocked:
-            raise PlanningError(ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, "the scene changed and the "
-                                f"rest of the motion is blocked: {self._blocked}; plan again, or ask for replan")
+            raise PlanningError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                "the scene changed and the "
+                f"rest of the motion is blocked: {self._blocked}; plan again, or ask for replan",
+            )
 
     def _monitor(self, cancelled: threading.Event) -> None:
         pause_s, due_s = min(PERIOD_S, self._period_s), time.monotonic() + self._period_s
@@ -116,5 +125,8 @@ class WatchedMotion:
         if points and stamp <= points[-1].time_from_start:
             return
         model, positions = self._context.model, self._context.monitor.positions()
-        points.append(JointTrajectoryPoint(positions=[float(positions[model.index[name]]) for name in self._joints],
-                                           time_from_start=stamp))
+        points.append(
+            JointTrajectoryPoint(
+                positions=[float(positions[model.index[name]]) for name in self._joints], time_from_start=stamp
+            )
+        )

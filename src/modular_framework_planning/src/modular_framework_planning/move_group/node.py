@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The move_group node: reads the robot, then offers every endpoint; nothing is advertised before it can answer."""
+
 from __future__ import annotations
 
 import sys
@@ -83,10 +84,20 @@ def build_context() -> MoveGroupContext:
     new_checker = collision_detector(detector)
     pipelines = load_pipelines(model, kinematics, detector)
     pipelines.sampling_settings = given_settings("ompl", pipelines.sampling_settings)
-    settings = MotionSettings(given_settings("plan_execution", PlanExecutionSettings()),
-                              given_settings("pick_place", PickPlaceSettings()))
-    return MoveGroupContext(model, monitor, kinematics, pipelines, execution, MarkerPublisher(model.planning_frame),
-                            Reporter(publish_requests="--debug" in rospy.myargv()), settings, new_checker)
+    settings = MotionSettings(
+        given_settings("plan_execution", PlanExecutionSettings()), given_settings("pick_place", PickPlaceSettings())
+    )
+    return MoveGroupContext(
+        model,
+        monitor,
+        kinematics,
+        pipelines,
+        execution,
+        MarkerPublisher(model.planning_frame),
+        Reporter(publish_requests="--debug" in rospy.myargv()),
+        settings,
+        new_checker,
+    )
 
 
 def advertise(context: MoveGroupContext) -> None:
@@ -123,9 +134,15 @@ def main() -> int:
     checker.is_free(scene.positions)  # builds what both checks need of the links
     checker.distance(scene.positions)
     advertise(context)
-    rospy.loginfo("move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
-                  context.model.name, ", ".join(context.model.groups), ", ".join(context.pipelines),
-                  context.default_pipeline, context.execution.describe(), time.monotonic() - begun)
+    rospy.loginfo(
+        "move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",
+        context.model.name,
+        ", ".join(context.model.groups),
+        ", ".join(context.pipelines),
+        context.default_pipeline,
+        context.execution.describe(),
+        time.monotonic() - begun,
+    )
     rospy.spin()
     return 0
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Settings of move_group that may change while it runs, under MoveIt's names."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field

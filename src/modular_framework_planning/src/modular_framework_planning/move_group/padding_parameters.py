@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the distances the robot keeps from the world out of robot_description_planning."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -20,16 +21,28 @@ def load_padding(model: RobotModel) -> Padding:
     """
     given: dict[str, Any] = rospy.get_param("robot_description_planning", {}) or {}
     try:
-        padding, scale, objects, attached = (float(given.get(f"default_{key}", default)) for key, default in (
-            ("robot_padding", 0.0), ("robot_scale", 1.0), ("object_padding", 0.0), ("attached_padding", 0.0)))
-        links, scales = ({str(link): float(value)
-                          for link, value in (given.get(f"default_robot_link_{key}") or {}).items()}
-                         for key in ("padding", "scale"))
+        padding, scale, objects, attached = (
+            float(given.get(f"default_{key}", default))
+            for key, default in (
+                ("robot_padding", 0.0),
+                ("robot_scale", 1.0),
+                ("object_padding", 0.0),
+                ("attached_padding", 0.0),
+            )
+        )
+        links, scales = (
+            {str(link): float(value) for link, value in (given.get(f"default_robot_link_{key}") or {}).items()}
+            for key in ("padding", "scale")
+        )
     except (TypeError, ValueError, AttributeError) as error:
-        raise ModelError(f"robot_description_planning: a padding or scale is no number ({error}); lengths in m, and "
-                         "default_robot_link_padding and _scale as a mapping of link to number are needed") from error
+        raise ModelError(
+            f"robot_description_planning: a padding or scale is no number ({error}); lengths in m, and "
+            "default_robot_link_padding and _scale as a mapping of link to number are needed"
+        ) from error
     unknown = sorted(link for link in (*links, *scales) if not model.has_link(link))
     if unknown:
-        raise ModelError(f"robot_description_planning: padding or scale of {', '.join(unknown)}; links of the robot "
-                         f"are {', '.join(model.frame_ids)}")
+        raise ModelError(
+            f"robot_description_planning: padding or scale of {', '.join(unknown)}; links of the robot "
+            f"are {', '.join(model.frame_ids)}"
+        )
     return uniform_padding(model.frame_ids, padding, scale, objects, attached).with_links(links, scales)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Builds the planning pipelines from the parameters of the node, in the layouts config packages load them."""
+
 from __future__ import annotations
 
 import threading
@@ -30,8 +31,9 @@ PARENT = "~planning_pipelines"
 class PipelineSet(Mapping[str, PlanningPipeline]):
     """The pipelines of the node, by name."""
 
-    def __init__(self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str],
-                 seeded: SeededPlanning) -> None:
+    def __init__(
+        self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str], seeded: SeededPlanning
+    ) -> None:
         """Stores the parts.
 
         Args:
@@ -79,8 +81,10 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         if name in self._loaded:
             return self._loaded[name]
         reason = f" ({self._refused[name]})" if name in self._refused else ""
-        raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline_id '{name}' is not loaded{reason}; available: "
-                            f"{', '.join(self._loaded)}")
+        raise PlanningError(
+            ErrorCode.PLANNING_FAILED,
+            f"pipeline_id '{name}' is not loaded{reason}; available: {', '.join(self._loaded)}",
+        )
 
 
 def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
@@ -111,10 +115,12 @@ def pipeline_settings(parameters: Mapping[str, Any]) -> PipelineSettings:
         for key, value in source.items():
             if key in known and isinstance(value, int | float) and not isinstance(value, bool):
                 values[key] = value
-    values["planner_configs"] = {name: item for name, item in (parameters.get("planner_configs") or {}).items()
-                                 if isinstance(item, dict)}
-    values["groups"] = {name: item for name, item in parameters.items()
-                        if isinstance(item, dict) and name != "planner_configs"}
+    values["planner_configs"] = {
+        name: item for name, item in (parameters.get("planner_configs") or {}).items() if isinstance(item, dict)
+    }
+    values["groups"] = {
+        name: item for name, item in parameters.items() if isinstance(item, dict) and name != "planner_configs"
+    }
     return PipelineSettings(**values, parameters=parameters, robot_planning=planning)
 
 
@@ -142,8 +148,10 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_dete
             refused[name] = error.reason
     if default not in loaded:
         reason = refused.get(default, f"there is none of that name below {rospy.resolve_name(PARENT)}")
-        raise ModelError(f"{rospy.resolve_name('~default_planning_pipeline')}: pipeline '{default}' cannot be used: "
-                         f"{reason}; usable: {', '.join(loaded) or 'none'}")
+        raise ModelError(
+            f"{rospy.resolve_name('~default_planning_pipeline')}: pipeline '{default}' cannot be used: "
+            f"{reason}; usable: {', '.join(loaded) or 'none'}"
+        )
     for name, reason in refused.items():
         rospy.logwarn("planning pipeline '%s' is left out: %s", name, reason)
     seeded = SeededPlanning(model, specs)
@@ -163,8 +171,13 @@ def _start(seeded: SeededPlanning) -> None:
 def _spec(name: str, parameters: Mapping[str, Any], collision_detector: str) -> PipelineSpec:
     given = parameters.get("request_adapters")
     adapters = DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given)
-    return PipelineSpec(name, str(parameters.get("planning_plugin") or DEFAULT_PLANNER), adapters,
-                        pipeline_settings(parameters), collision_detector)
+    return PipelineSpec(
+        name,
+        str(parameters.get("planning_plugin") or DEFAULT_PLANNER),
+        adapters,
+        pipeline_settings(parameters),
+        collision_detector,
+    )
 
 
 def _build(spec: PipelineSpec, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:

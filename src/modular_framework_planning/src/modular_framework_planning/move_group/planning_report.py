@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reports every planning, kinematics and execution result: in the log once, and on ~planning_report as JSON."""
+
 from __future__ import annotations
 
 import itertools
@@ -26,8 +27,11 @@ class Reporter:
         """
         self._ids = itertools.count(1)
         self._publisher = rospy.Publisher(names.REPORT_TOPIC, String, queue_size=100)
-        self._requests = rospy.Publisher(names.REQUEST_TOPIC, MotionPlanRequest, queue_size=10,
-                                         latch=True) if publish_requests else None
+        self._requests = (
+            rospy.Publisher(names.REQUEST_TOPIC, MotionPlanRequest, queue_size=10, latch=True)
+            if publish_requests
+            else None
+        )
 
     def request(self, message: MotionPlanRequest) -> None:
         """Publishes a request as it came."""
@@ -43,8 +47,14 @@ class Reporter:
             reason: why it failed; empty on success.
             details: further keys; values must fit into JSON.
         """
-        entry = {"id": next(self._ids), "time": rospy.get_time(), "kind": kind, "error_code": int(code),
-                 "reason": reason, **details}
+        entry = {
+            "id": next(self._ids),
+            "time": rospy.get_time(),
+            "kind": kind,
+            "error_code": int(code),
+            "reason": reason,
+            **details,
+        }
         if code != ErrorCode.SUCCESS:
             name = ErrorCode(code).name if code in set(ErrorCode) else str(code)
             rospy.logwarn("%s failed (%s): %s", kind, name, reason)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The settings of move_group that may be adjusted while it runs, by dynamic_reconfigure as in MoveIt."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -21,19 +22,23 @@ TABLES = {
         Adjustable("allowed_goal_duration_margin", 0.1, 30.0, "margin beyond the planned time [s]"),
         Adjustable("execution_velocity_scaling", 0.1, 10.0, "how many times as fast as planned motions are executed"),
         Adjustable("allowed_start_tolerance", 0.0, NO_LIMIT, "of a joint from the first point [rad or m]; 0: any"),
-        Adjustable("wait_for_trajectory_completion", False, True, "wait until the joints stand still")),
+        Adjustable("wait_for_trajectory_completion", False, True, "wait until the joints stand still"),
+    ),
     "planning_scene_monitor": (
         Adjustable("publish_planning_scene", False, True, "publish changes of the scene"),
         Adjustable("publish_planning_scene_hz", 0.1, 100.0, "rate of joints and frames while they change"),
         Adjustable("publish_geometry_updates", False, True, "publish changes of objects"),
         Adjustable("publish_state_updates", False, True, "publish changes of joints"),
-        Adjustable("publish_transforms_updates", False, True, "publish changes of frames outside the robot")),
+        Adjustable("publish_transforms_updates", False, True, "publish changes of frames outside the robot"),
+    ),
     "plan_execution": (
         Adjustable("max_replan_attempts", 0, 1000, "plans of a goal that asks for replanning and gives no number"),
-        Adjustable("record_trajectory_state_frequency", 0.0, 1000.0, "of the executed trajectory [Hz]; 0: none")),
+        Adjustable("record_trajectory_state_frequency", 0.0, 1000.0, "of the executed trajectory [Hz]; 0: none"),
+    ),
     "pick_place": (
         Adjustable("max_attempted_states_per_pose", 1, 100, "postures of the arm tried for one grasp or place"),
-        Adjustable("cartesian_motion_step_size", 0.005, 0.1, "between the poses solved on a straight line [m]")),
+        Adjustable("cartesian_motion_step_size", 0.005, 0.1, "between the poses solved on a straight line [m]"),
+    ),
     "ompl": (Adjustable("simplify_solutions", False, True, "shorten the paths that are found"),),
 }
 
@@ -45,9 +50,12 @@ def reconfigurations(context: MoveGroupContext) -> tuple[Reconfiguration, ...]:
         ("planning_scene_monitor", context.monitor, "settings"),
         ("plan_execution", context.settings, "plan_execution"),
         ("pick_place", context.settings, "pick_place"),
-        ("ompl", context.pipelines, "sampling_settings"))
-    return tuple(Reconfiguration(f"~{namespace}", TABLES[namespace], holder, attribute)
-                 for namespace, holder, attribute in adjusted)
+        ("ompl", context.pipelines, "sampling_settings"),
+    )
+    return tuple(
+        Reconfiguration(f"~{namespace}", TABLES[namespace], holder, attribute)
+        for namespace, holder, attribute in adjusted
+    )
 
 
 def given_settings(namespace: str, settings: Settings) -> Settings:
@@ -59,6 +67,13 @@ def given_settings(namespace: str, settings: Settings) -> Settings:
         if item.accepts(value):
             values[item.name] = value
         else:
-            rospy.logerr("%s is %r; allowed is %s of %s to %s; %s is used", rospy.resolve_name(name), value, item.kind,
-                         item.lowest, item.highest, default)
+            rospy.logerr(
+                "%s is %r; allowed is %s of %s to %s; %s is used",
+                rospy.resolve_name(name),
+                value,
+                item.kind,
+                item.lowest,
+                item.highest,
+                default,
+            )
     return replace(settings, **values)  # type: ignore[type-var]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the robot from the parameter server, as MoveIt config packages load it."""
+
 from __future__ import annotations
 
 import time
@@ -25,12 +26,15 @@ def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
     while not all(rospy.has_param(name) for name in names):
         if time.monotonic() > deadline or rospy.is_shutdown():
             missing = [rospy.resolve_name(name) for name in names if not rospy.has_param(name)]
-            raise ModelError(f"parameter {' and '.join(missing)} not set after {timeout_s:.0f} s; load the robot's "
-                             "description (planning_context.launch) before move_group")
+            raise ModelError(
+                f"parameter {' and '.join(missing)} not set after {timeout_s:.0f} s; load the robot's "
+                "description (planning_context.launch) before move_group"
+            )
         rospy.rostime.wallsleep(0.1)
     planning = rospy.get_param(f"{DESCRIPTION}_planning", {})
-    model = RobotModel(str(rospy.get_param(names[0])), str(rospy.get_param(names[1])),
-                       planning.get("joint_limits") or {})
+    model = RobotModel(
+        str(rospy.get_param(names[0])), str(rospy.get_param(names[1])), planning.get("joint_limits") or {}
+    )
     for note in model.document.notes:
         rospy.logwarn(note)
     return model

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled loops over voxels: which ones rays go through, and which leaves an octree's byte stream holds."""
+
 from __future__ import annotations  # noqa: I001 - numba_cache has to come before numba
 
 import numpy as np
@@ -113,8 +114,9 @@ def cells_on_rays(origin: NDArray[np.float64], ends: NDArray[np.float64]) -> Key
 
 
 @njit(cache=True, nogil=True)
-def merged(keys: Keys, values: Values, new_keys: Keys, steps: Values, lowest: float,
-           highest: float) -> tuple[Keys, Values]:
+def merged(
+    keys: Keys, values: Values, new_keys: Keys, steps: Values, lowest: float, highest: float
+) -> tuple[Keys, Values]:
     """Adds steps to the values of keys and clamps the sums; a key that is not there yet begins at 0.
 
     Args:
@@ -214,9 +216,14 @@ def read_binary(codes: NDArray[np.uint16], levels: int) -> tuple[int, Keys, NDAr
 
 
 @njit(cache=True, nogil=True)
-def within_regions(points: NDArray[np.float64], origin: NDArray[np.float64], shadow: float,
-                   balls: NDArray[np.float64], planes: NDArray[np.float64],
-                   starts: NDArray[np.int64]) -> NDArray[np.bool_]:
+def within_regions(
+    points: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    shadow: float,
+    balls: NDArray[np.float64],
+    planes: NDArray[np.float64],
+    starts: NDArray[np.int64],
+) -> NDArray[np.bool_]:
     """Says which points lie within convex regions, or less than a shadow's length behind one as seen from a place.
 
     Args:

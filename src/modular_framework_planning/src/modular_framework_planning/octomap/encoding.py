@@ -5,6 +5,7 @@ Two streams exist, both pre-order walks of the octree in which eight equal child
 full: of each node its log odds (float32) and one bit a child that exists;
 binary: of each inner node two bits a child: 1 free leaf, 2 occupied leaf, 3 inner node, 0 unknown.
 """
+
 from __future__ import annotations
 
 import os
@@ -47,8 +48,15 @@ class _Nodes:
 
     def __init__(self, keys: Keys, values: Values) -> None:
         """Builds the layers from the voxels up; a layer holds numbers, values, child bits, codes, and who is a leaf."""
-        layers: list[tuple[Any, ...]] = [(keys, values, np.zeros(len(keys), np.uint8), np.zeros(len(keys), np.uint16),
-                                          np.ones(len(keys), dtype=bool))]
+        layers: list[tuple[Any, ...]] = [
+            (
+                keys,
+                values,
+                np.zeros(len(keys), np.uint8),
+                np.zeros(len(keys), np.uint16),
+                np.ones(len(keys), dtype=bool),
+            )
+        ]
         kept = [np.ones(len(keys), dtype=bool)]
         for _ in range(LEVELS):
             numbers, values, bits, _, is_leaf = layers[-1]
@@ -70,8 +78,9 @@ class _Nodes:
             order.append(((numbers[keep] << (3 * level)) << 5) | (LEVELS - level))  # a parent before its first child
             parts.append([part[keep] for part in rest])
         indices = np.argsort(np.concatenate(order), kind="stable")
-        self.values, self.children, self.codes = (np.concatenate([part[i] for part in parts])[indices]
-                                                  for i in range(3))
+        self.values, self.children, self.codes = (
+            np.concatenate([part[i] for part in parts])[indices] for i in range(3)
+        )
 
 
 def write_full(voxels: VoxelMap) -> bytes:
@@ -123,16 +132,20 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
         values = nodes["value"][indices].astype(np.float32)
     count = len(data) // unit
     if read != count:
-        raise _broken("a tree that ends early or is deeper than 16 levels" if read < 0 else
-                      f"{count - read} nodes after the end of the tree")
+        raise _broken(
+            "a tree that ends early or is deeper than 16 levels"
+            if read < 0
+            else f"{count - read} nodes after the end of the tree"
+        )
     if not np.isfinite(values).all():
         raise _broken("an occupancy that is not finite")
     return _expanded(resolution, starts, depths, np.clip(values, LOWEST, HIGHEST))
 
 
 def _broken(got: str) -> GeometryError:
-    return GeometryError(f"octomap data: got {got}; expected the pre-order stream of one OcTree; send the data as "
-                         "octomap writes it")
+    return GeometryError(
+        f"octomap data: got {got}; expected the pre-order stream of one OcTree; send the data as octomap writes it"
+    )
 
 
 def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values: Values) -> VoxelMap:
@@ -140,8 +153,10 @@ def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values
     counts = np.int64(1) << (3 * (LEVELS - depths))
     total = float(counts.astype(float).sum())
     if total > MAX_VOXELS:
-        raise GeometryError(f"octomap data: {total:.3g} voxels of {resolution} m; allowed are {MAX_VOXELS}; "
-                            "send a map with larger voxels, or leave out wide free space")
+        raise GeometryError(
+            f"octomap data: {total:.3g} voxels of {resolution} m; allowed are {MAX_VOXELS}; "
+            "send a map with larger voxels, or leave out wide free space"
+        )
     order = np.argsort(starts)
     starts, counts, values = starts[order], counts[order], values[order]
     within = np.arange(int(total)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -174,13 +189,16 @@ def read_file(path: Path) -> VoxelMap:
             raise OSError(f"no regular file of at most {MAX_FILE_BYTES} bytes")
         content = path.read_bytes()
     except OSError as error:
-        raise GeometryError(f"octomap file {path}: cannot be read ({error}); give the path of a .bt or .ot file that "
-                            "this node may read") from error
+        raise GeometryError(
+            f"octomap file {path}: cannot be read ({error}); give the path of a .bt or .ot file that this node may read"
+        ) from error
     head, separator, data = content.partition(b"\ndata\n")
     first = head.split(b"\n", 1)[0].rstrip()
     if first not in (BINARY_HEADER, FULL_HEADER) or not separator or len(head) > MAX_HEADER_BYTES:
-        raise GeometryError(f"octomap file {path}: begins with '{first[:40].decode(errors='replace')}'; expected "
-                            f"'{BINARY_HEADER.decode()}' or '{FULL_HEADER.decode()}', a header and a line 'data'")
+        raise GeometryError(
+            f"octomap file {path}: begins with '{first[:40].decode(errors='replace')}'; expected "
+            f"'{BINARY_HEADER.decode()}' or '{FULL_HEADER.decode()}', a header and a line 'data'"
+        )
     words = [line.split() for line in head.decode(errors="replace").splitlines() if not line.startswith("#")]
     fields = {line[0]: line[1] for line in words if len(line) == 2}
     try:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shape of an octomap: what a scene holds and collision checks see of a map of voxels."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -5,6 +5,7 @@ Occupancy is a log-odds value per voxel, updated and clamped as in Hornung et al
 3D mapping framework based on octrees", Autonomous Robots 34 (2013), with the constants of their library, so that maps
 may be exchanged with it. A map is two flat arrays sorted by Morton code: the order of an octree's leaves.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -22,8 +23,9 @@ Values = NDArray[np.float32]
 
 LEVELS = 16  # the tree's depth; an axis has 2**16 voxels
 AXIS_CENTER = 1 << (LEVELS - 1)  # voxel that begins at coordinate 0
-HIT, MISS, LOWEST, HIGHEST = (float(np.float32(np.log(chance / (1.0 - chance))))
-                              for chance in (0.7, 0.4, 0.1192, 0.971))
+HIT, MISS, LOWEST, HIGHEST = (
+    float(np.float32(np.log(chance / (1.0 - chance)))) for chance in (0.7, 0.4, 0.1192, 0.971)
+)
 """Log odds of the chance that a voxel is occupied: steps of a hit and of a miss, lower and upper clamp."""
 MAX_VOXELS = 16_000_000
 
@@ -59,8 +61,10 @@ class VoxelMap:
         if not np.isfinite(self.resolution) or self.resolution < 1.0e-3:
             raise GeometryError(f"octomap resolution: got {self.resolution} m; allowed are lengths of 0.001 m or more")
         if len(self.keys) > MAX_VOXELS:
-            raise GeometryError(f"octomap: {len(self.keys)} voxels of {self.resolution} m; allowed are {MAX_VOXELS}; "
-                                "use larger voxels or a shorter max_range")
+            raise GeometryError(
+                f"octomap: {len(self.keys)} voxels of {self.resolution} m; allowed are {MAX_VOXELS}; "
+                "use larger voxels or a shorter max_range"
+            )
 
     @cached_property
     def occupied_keys(self) -> Keys:
@@ -91,7 +95,7 @@ class VoxelMap:
         steps = np.repeat(np.array([MISS, HIT, LOWEST - HIGHEST], np.float32), [len(free), len(occupied), len(masked)])
         order = np.argsort(keys, kind="stable")
         keys, steps = keys[order], steps[order]
-        last = np.append(keys[1:] != keys[:-1], True)[:len(keys)]  # of several updates of a voxel the strongest
+        last = np.append(keys[1:] != keys[:-1], True)[: len(keys)]  # of several updates of a voxel the strongest
         return VoxelMap(self.resolution, *merged(self.keys, self.values, keys[last], steps[last], LOWEST, HIGHEST))
 
     def with_point_cloud(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:
@@ -107,8 +111,10 @@ class VoxelMap:
         ends = self.centers(np.concatenate([occupied, known, beyond])) / self.resolution + AXIS_CENTER
         start = np.asarray(origin, dtype=float) / self.resolution + AXIS_CENTER
         if not ((start >= 0.0) & (start < 2 * AXIS_CENTER)).all():
-            raise GeometryError(f"octomap: the sensor is at {np.round(origin, 2).tolist()} m; a map with voxels of "
-                                f"{self.resolution} m reaches {AXIS_CENTER * self.resolution:.0f} m in each direction")
+            raise GeometryError(
+                f"octomap: the sensor is at {np.round(origin, 2).tolist()} m; a map with voxels of "
+                f"{self.resolution} m reaches {AXIS_CENTER * self.resolution:.0f} m in each direction"
+            )
         return self.updated(np.sort(cells_on_rays(start, ends)), occupied, known)
 
     def freed(self, keys: Keys) -> VoxelMap:

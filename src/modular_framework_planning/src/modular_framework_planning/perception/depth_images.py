@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns depth images and point clouds into points, those whose ray ended within range apart from those beyond it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -25,8 +26,10 @@ class Pinhole:
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.fx, self.fy, self.cx, self.cy]).all() or min(self.fx, self.fy) <= 0.0:
-            raise GeometryError(f"camera_info: K gives fx, fy, cx, cy = {self.fx}, {self.fy}, {self.cx}, {self.cy}; "
-                                "focal lengths above 0 and finite numbers are needed; is the camera calibrated?")
+            raise GeometryError(
+                f"camera_info: K gives fx, fy, cx, cy = {self.fx}, {self.fy}, {self.cx}, {self.cy}; "
+                "focal lengths above 0 and finite numbers are needed; is the camera calibrated?"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +59,10 @@ def depth_array(data: bytes, encoding: str, shape: tuple[int, int], row_bytes: i
     item = np.dtype(kind).newbyteorder(">" if big_endian else "<")
     height, width = shape
     if row_bytes < width * item.itemsize or len(data) < height * row_bytes:
-        raise GeometryError(f"depth image: {len(data)} bytes in rows of {row_bytes}; {width} x {height} pixels of "
-                            f"'{encoding}' need {width * height * item.itemsize}")
+        raise GeometryError(
+            f"depth image: {len(data)} bytes in rows of {row_bytes}; {width} x {height} pixels of "
+            f"'{encoding}' need {width * height * item.itemsize}"
+        )
     rows = np.ndarray((height, width), item, data, strides=(row_bytes, item.itemsize))
     return rows.astype(np.float64) * unit
 
@@ -75,14 +80,17 @@ def points_of_depth(depth: Array, camera: Pinhole, near: float, far: float, skip
     vertical, horizontal = skip
     rows = np.arange(vertical, max(vertical, depth.shape[0] - vertical))
     columns = np.arange(horizontal, max(horizontal, depth.shape[1] - horizontal))
-    inner = depth[vertical:vertical + len(rows), horizontal:horizontal + len(columns)]
+    inner = depth[vertical : vertical + len(rows), horizontal : horizontal + len(columns)]
     x, y = np.meshgrid((columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy)
     ends = (inner >= near) & (inner <= far)
     beyond = inner > far
     z = inner[ends]
     indices = (rows[:, None] * depth.shape[1] + columns)[ends]
-    return SeenPoints(np.column_stack([x[ends] * z, y[ends] * z, z]),
-                      np.column_stack([x[beyond], y[beyond], np.ones(int(beyond.sum()))]) * far, indices)
+    return SeenPoints(
+        np.column_stack([x[ends] * z, y[ends] * z, z]),
+        np.column_stack([x[beyond], y[beyond], np.ones(int(beyond.sum()))]) * far,
+        indices,
+    )
 
 
 def cloud_array(message: Any) -> Array:
@@ -94,20 +102,28 @@ def cloud_array(message: Any) -> Array:
     fields = {field.name: field for field in message.fields}
     bad = [name for name in "xyz" if name not in fields or fields[name].datatype not in CLOUD_TYPES]
     if bad:
-        raise GeometryError(f"point cloud: field {', '.join(bad)} is missing or no float; fields are "
-                            f"{', '.join(fields) or 'none'}; x, y and z of type FLOAT32 or FLOAT64 are needed")
+        raise GeometryError(
+            f"point cloud: field {', '.join(bad)} is missing or no float; fields are "
+            f"{', '.join(fields) or 'none'}; x, y and z of type FLOAT32 or FLOAT64 are needed"
+        )
     shape, data = (message.height, message.width), bytes(message.data)
     reach = max(fields[name].offset + np.dtype(CLOUD_TYPES[fields[name].datatype]).itemsize for name in "xyz")
     needed = (shape[0] - 1) * message.row_step + (shape[1] - 1) * message.point_step + reach if min(shape) else 0
     if message.row_step < shape[1] * message.point_step or len(data) < needed:
-        raise GeometryError(f"point cloud: {len(data)} bytes in rows of {message.row_step} and points of "
-                            f"{message.point_step}; {shape[1]} x {shape[0]} points need {needed}")
+        raise GeometryError(
+            f"point cloud: {len(data)} bytes in rows of {message.row_step} and points of "
+            f"{message.point_step}; {shape[1]} x {shape[0]} points need {needed}"
+        )
     if not min(shape):
         return np.empty((*shape, 3))
-    types = [np.dtype(CLOUD_TYPES[fields[name].datatype]).newbyteorder(">" if message.is_bigendian else "<")
-             for name in "xyz"]
-    axes = [np.ndarray(shape, kind, data, fields[name].offset, (message.row_step, message.point_step))
-            for name, kind in zip("xyz", types, strict=True)]
+    types = [
+        np.dtype(CLOUD_TYPES[fields[name].datatype]).newbyteorder(">" if message.is_bigendian else "<")
+        for name in "xyz"
+    ]
+    axes = [
+        np.ndarray(shape, kind, data, fields[name].offset, (message.row_step, message.point_step))
+        for name, kind in zip("xyz", types, strict=True)
+    ]
     return np.stack(axes, axis=-1).astype(np.float64)
 
 
@@ -120,5 +136,6 @@ def points_of_cloud(cloud: Array, max_range: float, subsample: int) -> SeenPoint
     points = points[np.isfinite(points).all(axis=1)]
     distances = np.linalg.norm(points, axis=1)
     far = distances > max_range
-    return SeenPoints(points[~far], points[far] * (max_range / distances[far])[:, None] if far.any()
-                      else np.empty((0, 3)))
+    return SeenPoints(
+        points[~far], points[far] * (max_range / distances[far])[:, None] if far.any() else np.empty((0, 3))
+    )

@@ -4,6 +4,7 @@
 Every shape is covered by a convex region: a ball cut by half-spaces. A region is padded by moving its planes outwards,
 so it holds at least what the padded shape holds; a mesh is covered by its convex hull.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
@@ -30,7 +31,7 @@ def _even_directions(count: int) -> Array:
     """Unit vectors spread over the sphere along a spiral (count, 3), and both directions of each axis."""
     heights = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     angles = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
-    widths = np.sqrt(1.0 - heights ** 2)
+    widths = np.sqrt(1.0 - heights**2)
     spiral = np.column_stack([widths * np.cos(angles), widths * np.sin(angles), heights])
     return np.vstack([np.eye(3), -np.eye(3), spiral])
 
@@ -67,8 +68,14 @@ class SelfFilter:
 
     def hides(self, points: Array, origin: Array, shadow: float = 0.0) -> Any:
         """Returns which points (n, 3) [m] lie in a region, or up to `shadow` [m] behind one as seen from `origin`."""
-        return within_regions(np.ascontiguousarray(points, dtype=float), np.asarray(origin, dtype=float), shadow,
-                              self.balls, self.planes, self.starts)
+        return within_regions(
+            np.ascontiguousarray(points, dtype=float),
+            np.asarray(origin, dtype=float),
+            shadow,
+            self.balls,
+            self.planes,
+            self.starts,
+        )
 
 
 class RegionCache:
@@ -113,15 +120,17 @@ def _region_of(geometry: Any) -> Region:
             slope = radius / (2.0 * half_length)
             return Region(middle, float(np.hypot(radius, half_length)), _round_planes(radius / 2.0, half_length, slope))
         case _:
-            return _hull_region(np.array(geometry.vertices()) if hasattr(geometry, "vertices")
-                                else np.array(geometry.points()))
+            return _hull_region(
+                np.array(geometry.vertices()) if hasattr(geometry, "vertices") else np.array(geometry.points())
+            )
 
 
 def _round_planes(radius: float, half_length: float, slope: float) -> Array:
     """Planes that touch a cylinder (slope 0) or a cone; `radius` is that at half height, the slope that towards z."""
     angles = 2.0 * np.pi * np.arange(ROUND_SIDES) / ROUND_SIDES
-    sides = np.column_stack([np.cos(angles), np.sin(angles), np.full(ROUND_SIDES, slope),
-                             np.full(ROUND_SIDES, -radius)]) / np.hypot(1.0, slope)
+    sides = np.column_stack(
+        [np.cos(angles), np.sin(angles), np.full(ROUND_SIDES, slope), np.full(ROUND_SIDES, -radius)]
+    ) / np.hypot(1.0, slope)
     return np.vstack([sides, [0.0, 0.0, 1.0, -half_length], [0.0, 0.0, -1.0, -half_length]])
 
 
@@ -146,28 +155,36 @@ def bodies_in_scene(scene: PlanningScene, positions: Array) -> list[tuple[Any, T
     """
     links = scene.model.link_transforms(positions)
     frames = scene.model.pin_model.frames
-    bodies = [(item.geometry, links[item.link] * frames[item.frame_id].placement.inverse() * item.placement)
-              for item in scene.model.link_geometries]
+    bodies = [
+        (item.geometry, links[item.link] * frames[item.frame_id].placement.inverse() * item.placement)
+        for item in scene.model.link_geometries
+    ]
     things = [(links[held.link] * held.body.pose, held.body.shapes) for held in scene.attached.values()]
     things += [(body.pose, body.shapes) for body in scene.objects.values()]
-    return bodies + [(shape.geometry, pose * shape_pose) for pose, shapes in things for shape, shape_pose in shapes
-                     if not isinstance(shape, Plane | Octree)]
+    return bodies + [
+        (shape.geometry, pose * shape_pose)
+        for pose, shapes in things
+        for shape, shape_pose in shapes
+        if not isinstance(shape, Plane | Octree)
+    ]
 
 
-def self_filter_of(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], scale: float,
-                   padding: float) -> SelfFilter:
+def self_filter_of(
+    cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], scale: float, padding: float
+) -> SelfFilter:
     """Returns the filter of bodies whose shapes are scaled about their centre and padded [m]."""
     return _assembled([(cache.region(geometry), pose, scale, padding) for geometry, pose in bodies])
 
 
-def depth_self_filter(cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], origin: Array, scale: float,
-                      padding: float) -> SelfFilter:
+def depth_self_filter(
+    cache: RegionCache, bodies: Sequence[tuple[Any, Transform]], origin: Array, scale: float, padding: float
+) -> SelfFilter:
     """Returns the filter for a depth camera at `origin`: padding plus `scale` times the camera's noise at the body."""
     items = []
     for geometry, pose in bodies:
         region = cache.region(geometry)
         furthest = float(np.linalg.norm(pose.act(region.center) - origin)) + region.radius
-        items.append((region, pose, 1.0, padding + scale * DEPTH_NOISE * furthest ** 2))
+        items.append((region, pose, 1.0, padding + scale * DEPTH_NOISE * furthest**2))
     return _assembled(items)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the sensors that feed the octomap, in the layout of MoveIt's sensors_3d.yaml (or sensor_plugins.yaml)."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -71,7 +72,8 @@ class DepthImageSettings:
 SensorSettings = PointCloudSettings | DepthImageSettings
 PLUGINS: Mapping[str, type[PointCloudSettings] | type[DepthImageSettings]] = {
     "occupancy_map_monitor/PointCloudOctomapUpdater": PointCloudSettings,
-    "occupancy_map_monitor/DepthImageOctomapUpdater": DepthImageSettings}
+    "occupancy_map_monitor/DepthImageOctomapUpdater": DepthImageSettings,
+}
 
 
 def read_sensors(entries: Any, max_range: float | None) -> tuple[list[SensorSettings], list[str]]:

@@ -3,6 +3,7 @@
 
 Picking and placing differ in what the fingers and the scene do in the middle, and in what may touch on the two lines.
 """
+
 from __future__ import annotations
 
 import time
@@ -128,9 +129,15 @@ class Arm:
 class ManoeuvrePlanner:
     """Plans manoeuvres one after the other within one deadline. Not for use from two threads at a time."""
 
-    def __init__(self, arm: Arm, plan: Callable[[PlanningRequest], PlanningAnswer], request: PlanningRequest,
-                 contact_tolerance_m: float, settings: PickPlaceSettings | None = None,
-                 new_checker: CollisionCheckerFactory = DEFAULT_CHECKER) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        plan: Callable[[PlanningRequest], PlanningAnswer],
+        request: PlanningRequest,
+        contact_tolerance_m: float,
+        settings: PickPlaceSettings | None = None,
+        new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
+    ) -> None:
         """Takes what all manoeuvres share.
 
         Args:
@@ -180,8 +187,11 @@ class ManoeuvrePlanner:
         """Builds the checkers of a scene; shallow contacts that a held object has there may stay."""
         indices = self._arm.group.indices
         checker = self._new_checker(scene, indices)
-        shallow = [item for item in checker.contacts(scene.positions, include_fixed=False)
-                   if {item.first.kind, item.second.kind} == {ATTACHED, WORLD} and item.depth <= self._tolerance_m]
+        shallow = [
+            item
+            for item in checker.contacts(scene.positions, include_fixed=False)
+            if {item.first.kind, item.second.kind} == {ATTACHED, WORLD} and item.depth <= self._tolerance_m
+        ]
         if shallow:
             checker = self._new_checker(scene, indices, shallow)
         return checker, MotionChecker(checker, indices, scene.positions)
@@ -204,16 +214,25 @@ class ManoeuvrePlanner:
         arm = self._arm
         found = arm.solver.solutions(arm.link, manoeuvre.tip_pose, scene.positions)
         if not found:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"{manoeuvre.name}: reach: " + arm.solver.explain_unreachable(
-                arm.link, manoeuvre.tip_pose, scene.positions))
+            raise PlanningError(
+                ErrorCode.NO_IK_SOLUTION,
+                f"{manoeuvre.name}: reach: "
+                + arm.solver.explain_unreachable(arm.link, manoeuvre.tip_pose, scene.positions),
+            )
         at_nearest = scene.with_positions(found[0])
         checker, motion = self._checkers(at_nearest)
-        free = first_free([item[arm.group.indices] for item in found], motion.state_is_free,
-                          self._settings.max_attempted_states_per_pose)
+        free = first_free(
+            [item[arm.group.indices] for item in found],
+            motion.state_is_free,
+            self._settings.max_attempted_states_per_pose,
+        )
         if not free:
-            raise PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{manoeuvre.name}: reach: all {len(found)} inverse "
-                                "kinematics solutions collide; the nearest: "
-                                f"{describe_contacts(checker.contacts(found[0], include_fixed=False))}")
+            raise PlanningError(
+                ErrorCode.GOAL_IN_COLLISION,
+                f"{manoeuvre.name}: reach: all {len(found)} inverse "
+                "kinematics solutions collide; the nearest: "
+                f"{describe_contacts(checker.contacts(found[0], include_fixed=False))}",
+            )
         return free
 
     def _lines(self, manoeuvre: Manoeuvre, scene: PlanningScene, values: Array) -> tuple[Array, Array]:
@@ -225,8 +244,10 @@ class ManoeuvrePlanner:
         approach = _enough(f"{name}: approach (looked at from the grasp backwards)", back, translation)[::-1]
         if manoeuvre.closing_in:
             untouched = self._with_fingers(self._template.scene, manoeuvre.fingers_before)
-            further = self._line(untouched.with_positions(at_grasp.positions),
-                                 translation.ending_at(pose, translation.desired_distance_m))
+            further = self._line(
+                untouched.with_positions(at_grasp.positions),
+                translation.ending_at(pose, translation.desired_distance_m),
+            )
             approach = np.vstack([approach, further.rows[1:]])
             at_grasp = scene.with_positions(self._at(scene, approach[-1]))
             pose = at_grasp.frame_transform(arm.link)
@@ -245,8 +266,14 @@ class ManoeuvrePlanner:
 
     def _line(self, scene: PlanningScene, end: Transform) -> StraightLine:
         """Follows a line from where the robot is in the scene."""
-        return straight_line(self._arm.solver, self._arm.link, scene.positions, [end],
-                             self._settings.cartesian_motion_step_size, objection=self._objection(scene))
+        return straight_line(
+            self._arm.solver,
+            self._arm.link,
+            scene.positions,
+            [end],
+            self._settings.cartesian_motion_step_size,
+            objection=self._objection(scene),
+        )
 
     def _plan_to_approach(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
         """Plans from where the robot is to the start of the approach, with nothing allowed to touch."""
@@ -260,8 +287,9 @@ class ManoeuvrePlanner:
         except PlanningError as error:
             raise PlanningError(error.code, f"{manoeuvre.name}: way to the approach: {error.reason}") from error
 
-    def _stages(self, manoeuvre: Manoeuvre, open_scene: PlanningScene, to_approach: Trajectory, approach: Array,
-                retreat: Array) -> tuple[Stage, ...]:
+    def _stages(
+        self, manoeuvre: Manoeuvre, open_scene: PlanningScene, to_approach: Trajectory, approach: Array, retreat: Array
+    ) -> tuple[Stage, ...]:
         """Times the lines and puts everything in order; a line without length is left out."""
         allow, before = manoeuvre.allow, manoeuvre.fingers_before
         ready = open_scene.with_positions(self._at(open_scene, approach[0]))
@@ -280,8 +308,13 @@ class ManoeuvrePlanner:
     def _timed(self, scene: PlanningScene, rows: Array) -> Trajectory:
         """Times a line that begins where the robot is in the scene."""
         _, motion = self._checkers(scene)
-        return time_line(self._arm.group.joints, rows, self._arm.velocity, self._arm.acceleration,
-                         lambda curve: motion.colliding_state(curve, CHECK_STEP) is None)
+        return time_line(
+            self._arm.group.joints,
+            rows,
+            self._arm.velocity,
+            self._arm.acceleration,
+            lambda curve: motion.colliding_state(curve, CHECK_STEP) is None,
+        )
 
 
 def _moves(rows: Array) -> bool:
@@ -304,6 +337,9 @@ def _enough(what: str, line: StraightLine, translation: Translation) -> Array:
     """Returns the rows of a line that went far enough; raises _LineTooShort."""
     distance = line.fraction * translation.desired_distance_m
     if distance < translation.min_distance_m - DISTANCE_SLACK_M:
-        raise _LineTooShort(f"{what}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m, at least "
-                            f"{translation.min_distance_m:.3f} m are asked for; {line.stop}", line.fraction)
+        raise _LineTooShort(
+            f"{what}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m, at least "
+            f"{translation.min_distance_m:.3f} m are asked for; {line.stop}",
+            line.fraction,
+        )
     return line.rows

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What planners, adapters and services ask a collision checker: the one interface of every checker."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -85,8 +86,12 @@ class CollisionChecker(Protocol):
 class CollisionCheckerFactory(Protocol):
     """Makes checkers; mostly the checker's class itself. Threads share it."""
 
-    def __call__(self, scene: PlanningScene, moving: Sequence[int] | NDArray[np.int64] | None = None,
-                 tolerated: Sequence[Contact] = ()) -> CollisionChecker:
+    def __call__(
+        self,
+        scene: PlanningScene,
+        moving: Sequence[int] | NDArray[np.int64] | None = None,
+        tolerated: Sequence[Contact] = (),
+    ) -> CollisionChecker:
         """Makes the checker of a scene.
 
         Args:

@@ -3,6 +3,7 @@
 
 Nothing else of the package chooses a checker: who needs one is given its factory.
 """
+
 from __future__ import annotations
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker

@@ -3,6 +3,7 @@
 
 The search is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
 """
+
 from __future__ import annotations
 
 import math
@@ -35,10 +36,17 @@ MAX_POSES = 16  # poses tried within the tolerances of one goal
 class GoalResolver:
     """Resolves the goals of one request."""
 
-    def __init__(self, request: PlanningRequest, group: JointGroup, kinematics: KinematicsPool,
-                 checker: CollisionChecker, motion: MotionChecker, rng: np.random.Generator,
-                 path_constraints: KinematicConstraints | None = None,
-                 interrupted: Callable[[], bool] = lambda: False) -> None:
+    def __init__(
+        self,
+        request: PlanningRequest,
+        group: JointGroup,
+        kinematics: KinematicsPool,
+        checker: CollisionChecker,
+        motion: MotionChecker,
+        rng: np.random.Generator,
+        path_constraints: KinematicConstraints | None = None,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Stores the parts.
 
         Args:
@@ -65,17 +73,22 @@ class GoalResolver:
             PlanningError: no goal was given, or none can be reached; the reason is that of the first goal.
         """
         if not self._request.goals:
-            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, "the request has no goal; give joint constraints "
-                                "or a position and an orientation constraint")
+            raise PlanningError(
+                ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                "the request has no goal; give joint constraints or a position and an orientation constraint",
+            )
         vectors: list[Array] = []
         failures: list[PlanningError] = []
         for number, goal in enumerate(self._request.goals):
             if number and self._interrupted():
                 if vectors:
                     break
-                raise PlanningError(ErrorCode.TIMED_OUT, f"goal_constraints: {number} of {len(self._request.goals)} "
-                                    f"alternatives were looked at in the allowed {self._request.allowed_time_s:.2f} s, "
-                                    f"none can be reached ({failures[0].reason}); allow more time or give fewer goals")
+                raise PlanningError(
+                    ErrorCode.TIMED_OUT,
+                    f"goal_constraints: {number} of {len(self._request.goals)} "
+                    f"alternatives were looked at in the allowed {self._request.allowed_time_s:.2f} s, "
+                    f"none can be reached ({failures[0].reason}); allow more time or give fewer goals",
+                )
             try:
                 vectors += self._vectors(goal)
             except PlanningError as error:
@@ -99,17 +112,22 @@ class GoalResolver:
         """Whether a state satisfies the path constraints and is free."""
         constraints = self._path_constraints
         return (constraints is None or constraints.satisfied(self._motion.full_positions(values))) and (
-            self._motion.state_is_free(values))
+            self._motion.state_is_free(values)
+        )
 
     def _rejection(self, values: Array, what: str) -> PlanningError:
         """Says what is wrong with the best candidate of a goal."""
         full, constraints = self._motion.full_positions(values), self._path_constraints
         if constraints is not None and not constraints.satisfied(full):
-            return PlanningError(ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS, f"{what} violates the path constraints: "
-                                 f"{constraints.describe(full)}; move the goal or widen the tolerances")
+            return PlanningError(
+                ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
+                f"{what} violates the path constraints: "
+                f"{constraints.describe(full)}; move the goal or widen the tolerances",
+            )
         contacts = self._checker.contacts(full, include_fixed=False)
-        return PlanningError(ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}",
-                             contacts)
+        return PlanningError(
+            ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}", contacts
+        )
 
     def _joint(self, goal: JointGoal) -> Array:
         """Returns the exact target; where that is not free, the first free state found within the tolerances."""
@@ -131,17 +149,23 @@ class GoalResolver:
         low, high = values.copy(), values.copy()
         for name, wanted in goal.positions.items():
             if name not in self._group.joints:
-                raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal: joint '{name}' is not in group "
-                                    f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}")
+                raise PlanningError(
+                    ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                    f"goal: joint '{name}' is not in group "
+                    f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}",
+                )
             number, column = self._model.index[name], self._group.joints.index(name)
             if self._model.is_continuous(number):
                 wanted += 2.0 * np.pi * np.round((values[column] - wanted) / (2.0 * np.pi))
             least = max(self._model.lower[number], wanted - goal.below.get(name, 0.0))
             most = min(self._model.upper[number], wanted + goal.above.get(name, 0.0))
             if least > most + BEYOND_BOUND:
-                raise PlanningError(ErrorCode.GOAL_STATE_INVALID, f"goal: joint '{name}' at {wanted:.6f} is outside "
-                                    f"[{self._model.lower[number]:.6f}, {self._model.upper[number]:.6f}]; give a "
-                                    f"position at most {BEYOND_BOUND} beyond a bound")
+                raise PlanningError(
+                    ErrorCode.GOAL_STATE_INVALID,
+                    f"goal: joint '{name}' at {wanted:.6f} is outside "
+                    f"[{self._model.lower[number]:.6f}, {self._model.upper[number]:.6f}]; give a "
+                    f"position at most {BEYOND_BOUND} beyond a bound",
+                )
             bounds = self._model.lower[number], self._model.upper[number]
             low[column], high[column] = np.clip((min(least, most), max(least, most)), *bounds)
             values[column] = np.clip(wanted, low[column], high[column])
@@ -170,10 +194,12 @@ class GoalResolver:
             return free
         if not candidates:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
-        raise self._rejection(candidates[0], f"goal: all {len(candidates)} inverse kinematics solutions for "
-                            f"'{goal.link}' collide; the nearest is" if self._path_constraints is None else
-                            f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; "
-                            "the nearest")
+        raise self._rejection(
+            candidates[0],
+            f"goal: all {len(candidates)} inverse kinematics solutions for '{goal.link}' collide; the nearest is"
+            if self._path_constraints is None
+            else f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; the nearest",
+        )
 
     def _at_other_poses(self, goal: PoseGoal, allowed: KinematicConstraints, solver: InverseKinematics) -> list[Array]:
         """Returns solutions at random poses within the tolerances."""
@@ -192,8 +218,9 @@ class GoalResolver:
         free: list[Array] = []
         rejected: list[Array] = []
         for number in range(MAX_SAMPLES):
-            found = constraints.project(seed, indices) if number == 0 else (
-                constraints.sample(self._rng, seed, indices, 1))
+            found = (
+                constraints.project(seed, indices) if number == 0 else (constraints.sample(self._rng, seed, indices, 1))
+            )
             if found is not None:
                 (free if self._is_valid(found[indices]) else rejected).append(found[indices])
             if len(free) >= MAX_GOAL_STATES:
@@ -201,8 +228,12 @@ class GoalResolver:
         if free:
             return free
         if rejected:
-            raise self._rejection(rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; "
-                                "the nearest is")
-        raise PlanningError(ErrorCode.GOAL_CONSTRAINTS_VIOLATED, "goal region was empty: no state of group "
-                            f"'{self._group.name}' within its joint bounds satisfies all constraints; from the start, "
-                            f"{constraints.describe(seed)}")
+            raise self._rejection(
+                rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; the nearest is"
+            )
+        raise PlanningError(
+            ErrorCode.GOAL_CONSTRAINTS_VIOLATED,
+            "goal region was empty: no state of group "
+            f"'{self._group.name}' within its joint bounds satisfies all constraints; from the start, "
+            f"{constraints.describe(seed)}",
+        )

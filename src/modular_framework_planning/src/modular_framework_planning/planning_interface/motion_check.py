@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks straight motions of one group: a whole edge or path per call."""
+
 from __future__ import annotations
 
 import numpy as np

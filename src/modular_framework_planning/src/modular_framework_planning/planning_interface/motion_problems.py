@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads motion-planning problems kept as YAML (a PlanningScene and a MotionPlanRequest each) without a ROS master."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,8 +56,9 @@ def read_scene(model: RobotModel, path: Path) -> PlanningScene:
     for entry in _load(path)["world"]["collision_objects"]:
         where = f"{path.name} '{entry['id']}'"
         poses = entry.get("primitive_poses") or [None] * len(entry["primitives"])
-        shapes = tuple((_shape(item, where), _pose(pose, where))
-                       for item, pose in zip(entry["primitives"], poses, strict=True))
+        shapes = tuple(
+            (_shape(item, where), _pose(pose, where)) for item, pose in zip(entry["primitives"], poses, strict=True)
+        )
         frame = scene.frame_transform(str((entry.get("header") or {}).get("frame_id", "")))
         scene = scene.with_object(CollisionObject(entry["id"], frame * _pose(entry.get("pose"), where), shapes))
     return scene
@@ -66,19 +68,24 @@ def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowe
     """Returns one problem; joints of its start state the robot does not have are left out."""
     request = _load(request_path)
     state = request["start_state"]["joint_state"]
-    values = {name: float(value) for name, value in zip(state["name"], state["position"], strict=True)
-              if name in model.index}
+    values = {
+        name: float(value) for name, value in zip(state["name"], state["position"], strict=True) if name in model.index
+    }
     scene = read_scene(model, scene_path)
     scene = scene.with_positions(model.merge(scene.positions, values))
-    goals = tuple(JointGoal({item["joint_name"]: float(item["position"]) for item in goal["joint_constraints"]})
-                  for goal in request["goal_constraints"])
+    goals = tuple(
+        JointGoal({item["joint_name"]: float(item["position"]) for item in goal["joint_constraints"]})
+        for goal in request["goal_constraints"]
+    )
     name = f"{scene_path.parent.name}/{request_path.stem.removeprefix('request')}"
-    return MotionProblem(name, PlanningRequest(scene, request["group_name"], goals, request.get("planner_id", ""), 1,
-                                               allowed_time_s))
+    return MotionProblem(
+        name, PlanningRequest(scene, request["group_name"], goals, request.get("planner_id", ""), 1, allowed_time_s)
+    )
 
 
 def read_problems(model: RobotModel, folder: Path, allowed_time_s: float) -> Iterator[MotionProblem]:
     """Yields every problem below a folder (<family>/sceneNNNN.yaml with requestNNNN.yaml), in the order of names."""
     for scene_path in sorted(folder.glob("*/scene*.yaml")):
-        yield read_problem(model, scene_path, scene_path.with_name(scene_path.name.replace("scene", "request")),
-                           allowed_time_s)
+        yield read_problem(
+            model, scene_path, scene_path.with_name(scene_path.name.replace("scene", "request")), allowed_time_s
+        )

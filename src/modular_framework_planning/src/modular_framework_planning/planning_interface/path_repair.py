@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Repairs a path whose edges a search checked too coarsely: each colliding edge is replaced by a detour."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -37,8 +38,11 @@ def repaired(problem: PlanningProblem, path: Array, connect: Connect) -> Array:
             continue
         detour = None if problem.cancelled() else connect(problem, first, second)
         if detour is None:
-            raise EdgeError(ErrorCode.INVALID_MOTION_PLAN, f"edge {number} of {len(path) - 1} of the path found "
-                            f"{edge_fault(problem, first, second)}, and no way round it was found")
+            raise EdgeError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"edge {number} of {len(path) - 1} of the path found "
+                f"{edge_fault(problem, first, second)}, and no way round it was found",
+            )
         pieces.append(detour[1:])
     return np.vstack(pieces)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The named settings of a pipeline's planners, which clients may read and change while the node runs."""
+
 from __future__ import annotations
 
 import threading
@@ -18,7 +19,8 @@ class PlannerConfigurations:
         """
         self._lock = threading.Lock()
         self._entries: dict[tuple[str, str], dict[str, Any]] = {
-            ("", name): dict(entry or {}) for name, entry in named.items()}
+            ("", name): dict(entry or {}) for name, entry in named.items()
+        }
 
     def names(self) -> tuple[str, ...]:
         """Returns the names that settings exist for."""

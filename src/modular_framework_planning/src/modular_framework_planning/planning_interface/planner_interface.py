@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Problem, path and protocols: the one interface between the pipelines and every planner."""
+
 from __future__ import annotations
 
 import time
@@ -103,8 +104,18 @@ class PlanningProblem:
             PlanningError: there is none; says why.
         """
         if not self._goals:
-            self._goals.append(GoalResolver(self.request, self.group, self.kinematics, self.checker, self.motion,
-                                            self.rng, self.constraints, self._goals_must_end).resolve())
+            self._goals.append(
+                GoalResolver(
+                    self.request,
+                    self.group,
+                    self.kinematics,
+                    self.checker,
+                    self.motion,
+                    self.rng,
+                    self.constraints,
+                    self._goals_must_end,
+                ).resolve()
+            )
         return self._goals[0]
 
     def _goals_must_end(self) -> bool:
@@ -119,7 +130,8 @@ class PlanningProblem:
     def state_is_valid(self, values: Array) -> bool:
         """Whether a joint vector is free of collisions and satisfies the path constraints."""
         return self.motion.state_is_free(values) and (
-            self.constraints is None or self.constraints.satisfied(self.motion.full_positions(values)))
+            self.constraints is None or self.constraints.satisfied(self.motion.full_positions(values))
+        )
 
     def edge_is_valid(self, first: Array, second: Array, step: float | None = None) -> bool:
         """Whether the straight motion is free and satisfies the path constraints (its start is not checked).
@@ -133,8 +145,10 @@ class PlanningProblem:
             return True
         step = max(step, self.settings.motion_step)
         count = max(1, int(np.ceil(float(np.abs(second - first).max()) / step)))
-        return all(self.constraints.satisfied(self.motion.full_positions(first + number / count * (second - first)))
-                   for number in range(1, count + 1))
+        return all(
+            self.constraints.satisfied(self.motion.full_positions(first + number / count * (second - first)))
+            for number in range(1, count + 1)
+        )
 
     def cancelled(self) -> bool:
         """Whether somebody asked to stop."""
@@ -147,8 +161,9 @@ class PlanningProblem:
     def with_start(self, start: Array) -> PlanningProblem:
         """Returns the problem from another start (positions of the whole robot)."""
         request = replace(self.request, scene=self.scene.with_positions(start))
-        return replace(self, request=request, start=start, _goals=[],
-                       motion=MotionChecker(self.checker, self.group.indices, start))
+        return replace(
+            self, request=request, start=start, _goals=[], motion=MotionChecker(self.checker, self.group.indices, start)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,4 +232,5 @@ def no_path(problem: PlanningProblem, what: str, states: int | None = None) -> P
         f"{what} found no path in {spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s, the last "
         f"{problem.end_s - problem.deadline_s:.2f} s of them for the check of a motion)"
         f"{': time ran out' if timed_out else ': nothing was left to try'}{tried}; start and goal are free, so the "
-        "way between them is blocked or narrow: allow more time or choose another goal")
+        "way between them is blocked or narrow: allow more time or choose another goal",
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests to the planner and its answers, free of messages."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -40,19 +41,26 @@ class JointGoal:
         high = {name: value + self.above.get(name, 0.0) for name, value in targets.items()}
         for name in self.positions.keys() & mimics.keys():
             mimic, value = mimics[name], self.positions[name]
-            ends = sorted(mimic.leads_to(end) for end in (value - self.below.get(name, 0.0),
-                                                          value + self.above.get(name, 0.0)))
+            ends = sorted(
+                mimic.leads_to(end) for end in (value - self.below.get(name, 0.0), value + self.above.get(name, 0.0))
+            )
             leader = mimic.leader
             low[leader], high[leader] = max(low.get(leader, -np.inf), ends[0]), min(high.get(leader, np.inf), ends[1])
             targets.setdefault(leader, mimic.leads_to(value))
             if low[leader] > high[leader] + SAME_POSITION:
-                raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal: joint '{name}' at {value:.4f} asks "
-                                    f"'{leader}', which it mimics, to be at {mimic.leads_to(value):.4f}; the goal asks "
-                                    f"another position of '{leader}', too; give positions that fit, or leave joints "
-                                    "that mimic out")
+                raise PlanningError(
+                    ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                    f"goal: joint '{name}' at {value:.4f} asks "
+                    f"'{leader}', which it mimics, to be at {mimic.leads_to(value):.4f}; the goal asks "
+                    f"another position of '{leader}', too; give positions that fit, or leave joints "
+                    "that mimic out",
+                )
         inside = {name: max(low[name], min(target, high[name])) for name, target in targets.items()}
-        return JointGoal(inside, {name: max(target - low[name], 0.0) for name, target in inside.items()},
-                         {name: max(high[name] - target, 0.0) for name, target in inside.items()})
+        return JointGoal(
+            inside,
+            {name: max(target - low[name], 0.0) for name, target in inside.items()},
+            {name: max(high[name] - target, 0.0) for name, target in inside.items()},
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,8 +135,11 @@ class PipelineSettings:
 
     def default_planner(self, group: str) -> str:
         """Returns the planner of requests that name none; empty where no parameter says."""
-        return str(self.groups.get(group, {}).get("default_planner_config")
-                   or self.parameters.get("default_planner_config") or "")
+        return str(
+            self.groups.get(group, {}).get("default_planner_config")
+            or self.parameters.get("default_planner_config")
+            or ""
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Imports the class that a parameter names as `module/Class`."""
+
 from __future__ import annotations
 
 import importlib

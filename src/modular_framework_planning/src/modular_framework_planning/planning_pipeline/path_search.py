@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The innermost step of a pipeline: the planner's path from a valid start, repaired and shortened."""
+
 from __future__ import annotations
 
 import math
@@ -32,8 +33,11 @@ class PathSearch:
         if self._found is None:
             found = self._planner.plan(problem)
             now = time.monotonic()
-            self._found = (PlannedPath(found.positions, found, found_s=now, is_short=True)
-                           if isinstance(found, Trajectory) else replace(found, found_s=now))
+            self._found = (
+                PlannedPath(found.positions, found, found_s=now, is_short=True)
+                if isinstance(found, Trajectory)
+                else replace(found, found_s=now)
+            )
         path = self._found
         if path.is_short or path.trajectory is not None:
             return path
@@ -48,17 +52,27 @@ def _require_start(problem: PlanningProblem) -> None:
     """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
     faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
     if faults:
-        raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {'; '.join(faults)}; move the robot within "
-                            "its bounds or use the adapter FixStartStateBounds")
+        raise PlanningError(
+            ErrorCode.START_STATE_INVALID,
+            f"start state: {'; '.join(faults)}; move the robot within "
+            "its bounds or use the adapter FixStartStateBounds",
+        )
     if not problem.motion.state_is_free(problem.start_values):
         contacts = problem.checker.contacts(problem.start, include_fixed=False)
-        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state in collision: "
-                            f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
-                            "FixStartStateCollision", contacts)
+        raise PlanningError(
+            ErrorCode.START_STATE_IN_COLLISION,
+            f"start state in collision: "
+            f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
+            "FixStartStateCollision",
+            contacts,
+        )
     if problem.constraints is not None and not problem.constraints.satisfied(problem.start):
-        raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
-                            f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "
-                            "path constraints or use the adapter FixStartStatePathConstraints")
+        raise PlanningError(
+            ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+            "start state: "
+            f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "
+            "path constraints or use the adapter FixStartStatePathConstraints",
+        )
 
 
 def _shortened(problem: PlanningProblem, path: Array) -> Array:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One planning pipeline: a planner, the request adapters around it, and the check every motion has to pass."""
+
 from __future__ import annotations
 
 import logging
@@ -44,9 +45,16 @@ LOGGER = logging.getLogger("rosout.planning_pipeline")
 class PlanningPipeline:
     """Plans for one robot; threads may share it, each plan has its own collision world."""
 
-    def __init__(self, model: RobotModel, kinematics: KinematicsPool, settings: PipelineSettings,
-                 planner: Planner, adapters: Sequence[RequestAdapter] = (), name: str = "ompl",
-                 new_checker: CollisionCheckerFactory = DEFAULT_CHECKER) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        kinematics: KinematicsPool,
+        settings: PipelineSettings,
+        planner: Planner,
+        adapters: Sequence[RequestAdapter] = (),
+        name: str = "ompl",
+        new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
+    ) -> None:
         """Stores the parts; PipelineSpec builds them from their names.
 
         Args:
@@ -140,16 +148,18 @@ class PlanningPipeline:
                 if path.is_short or problem.cancelled() or time.monotonic() > problem.end_s:
                     break
                 if search.repairs:  # what the check saw between two samples of the repair, with finer ones
-                    problem = replace(problem, settings=replace(problem.settings,
-                                                                motion_step=problem.settings.motion_step / 4.0))
+                    problem = replace(
+                        problem, settings=replace(problem.settings, motion_step=problem.settings.motion_step / 4.0)
+                    )
                 else:
                     search = PathSearch(self._planner)
         raise _failed(problem, fault)
 
     def _adapters_for(self, request: PlanningRequest) -> tuple[RequestAdapter, ...]:
         """Returns the adapters; a speed limit that is asked for is kept even where no parameter names its adapter."""
-        if request.max_cartesian_speed == 0.0 or any(isinstance(item, LimitMaxCartesianLinkSpeed)
-                                                     for item in self._adapters):
+        if request.max_cartesian_speed == 0.0 or any(
+            isinstance(item, LimitMaxCartesianLinkSpeed) for item in self._adapters
+        ):
             return self._adapters
         return LimitMaxCartesianLinkSpeed(), *self._adapters
 
@@ -158,22 +168,31 @@ class PlanningPipeline:
         finest = self.settings.finest_step
         return self.settings.search_step, 0.4 * self.settings.search_step, finest, finest
 
-    def _checked(self, problem: PlanningProblem, path: PlannedPath,
-                 begun: float) -> tuple[str, PlanningAnswer | None]:
+    def _checked(self, problem: PlanningProblem, path: PlannedPath, begun: float) -> tuple[str, PlanningAnswer | None]:
         if path.trajectory is None:
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"pipeline '{self.name}': the path was not timed; add "
-                                "default_planner_request_adapters/AddTimeOptimalParameterization to request_adapters")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"pipeline '{self.name}': the path was not timed; add "
+                "default_planner_request_adapters/AddTimeOptimalParameterization to request_adapters",
+            )
         fault = problem.solution_validator.fault(problem, path)
         if fault:
             return fault, None
         start = problem.start.copy()
         start[problem.group.indices] = path.vertices[0]
-        return "", PlanningAnswer(path.trajectory, start, problem.motion.full_positions(path.vertices[-1]),
-                                  path.vertices, path.planner_id or problem.planner_id, path.found_s - begun,
-                                  time.monotonic() - begun)
+        return "", PlanningAnswer(
+            path.trajectory,
+            start,
+            problem.motion.full_positions(path.vertices[-1]),
+            path.vertices,
+            path.planner_id or problem.planner_id,
+            path.found_s - begun,
+            time.monotonic() - begun,
+        )
 
-    def checker(self, scene: PlanningScene, group: JointGroup, start: Array,
-                check_interrupt: Callable[[], None] = lambda: None) -> CollisionChecker:
+    def checker(
+        self, scene: PlanningScene, group: JointGroup, start: Array, check_interrupt: Callable[[], None] = lambda: None
+    ) -> CollisionChecker:
         """Returns the collision world of a motion, with shallow contacts of held bodies tolerated.
 
         Args:
@@ -189,20 +208,28 @@ class PlanningPipeline:
         checker.build(check_interrupt)
         fixed = checker.fixed_contacts(start)
         if fixed:
-            raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, f"start state: {describe_contacts(fixed)}; no "
-                                f"joint of group '{group.name}' can change that; allow the pair or move it", fixed)
+            raise PlanningError(
+                ErrorCode.START_STATE_IN_COLLISION,
+                f"start state: {describe_contacts(fixed)}; no "
+                f"joint of group '{group.name}' can change that; allow the pair or move it",
+                fixed,
+            )
         if checker.is_free(start):
             return checker
-        shallow = [item for item in checker.contacts(start, include_fixed=False)
-                   if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
-                   and item.depth <= self.settings.start_state_contact_tolerance]
+        shallow = [
+            item
+            for item in checker.contacts(start, include_fixed=False)
+            if {item.first.kind, item.second.kind} == {ATTACHED, WORLD}
+            and item.depth <= self.settings.start_state_contact_tolerance
+        ]
         return self._new_checker(scene, group.indices, shallow) if shallow else checker
 
     def _problem(self, request: PlanningRequest, begun: float) -> PlanningProblem:
         """Reads the request; everything that can be refused without planning is refused here."""
         if not request.allowed_time_s > 0.0:
-            raise PlanningError(ErrorCode.TIMED_OUT, f"allowed_planning_time is {request.allowed_time_s} s; "
-                                "it must be above 0")
+            raise PlanningError(
+                ErrorCode.TIMED_OUT, f"allowed_planning_time is {request.allowed_time_s} s; it must be above 0"
+            )
         group = self._model.group(request.group)
         if not group.joints:
             raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group.name}' has no joint that can be moved")
@@ -214,10 +241,25 @@ class PlanningPipeline:
         seed = self.settings.seed if request.seed is None else request.seed
         checker = self.checker(request.scene, group, start, partial(_require_time, request, begun))
         return PlanningProblem(
-            request, request.scene.model, group, start, checker, MotionChecker(checker, group.indices, start),
-            self._kinematics, self.settings, velocity, acceleration, np.random.default_rng(seed),
-            begun, begun + request.allowed_time_s - self._reserved(request.allowed_time_s, planner_id),
-            begun + request.allowed_time_s, TrajectoryValidator(), planner_id, parameters, request.path_constraints)
+            request,
+            request.scene.model,
+            group,
+            start,
+            checker,
+            MotionChecker(checker, group.indices, start),
+            self._kinematics,
+            self.settings,
+            velocity,
+            acceleration,
+            np.random.default_rng(seed),
+            begun,
+            begun + request.allowed_time_s - self._reserved(request.allowed_time_s, planner_id),
+            begun + request.allowed_time_s,
+            TrajectoryValidator(),
+            planner_id,
+            parameters,
+            request.path_constraints,
+        )
 
     def _reserved(self, allowed_time_s: float, planner_id: str) -> float:
         """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""
@@ -230,51 +272,77 @@ class PlanningPipeline:
         kind, parameters = self._kind(_without_group(asked or default), group)
         if asked and known and kind not in known and self._replaces_bad_values:
             kind, parameters = self._kind(_without_group(default), group)
-            LOGGER.warning("planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
-                           "for by the default planner '%s'", asked, self.name, ", ".join(known), group,
-                           kind or known[0])
+            LOGGER.warning(
+                "planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
+                "for by the default planner '%s'",
+                asked,
+                self.name,
+                ", ".join(known),
+                group,
+                kind or known[0],
+            )
         kind = kind or (known[0] if known else "")
         if known and kind not in known:
-            raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{asked}': pipeline '{self.name}' has no "
-                                f"planner '{kind}'; available: {', '.join(known)}")
+            raise PlanningError(
+                ErrorCode.PLANNING_FAILED,
+                f"planner_id '{asked}': pipeline '{self.name}' has no planner '{kind}'; available: {', '.join(known)}",
+            )
         return kind, parameters
 
     def _kind(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner that a name stands for, and its settings with those of the group."""
         own = self.configurations.get(name, group)
         kind = str(own.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
-        return kind, {**{key: value for key, value in self.settings.groups.get(group, {}).items()
-                         if key not in ("planner_configs", "default_planner_config")}, **own}
+        return kind, {
+            **{
+                key: value
+                for key, value in self.settings.groups.get(group, {}).items()
+                if key not in ("planner_configs", "default_planner_config")
+            },
+            **own,
+        }
 
     def _scaled_limits(self, request: PlanningRequest, group: JointGroup) -> tuple[Array, Array]:
         factors = []
         for name, value, default in (
-                ("max_velocity_scaling_factor", request.velocity_scaling,
-                 self.settings.default_velocity_scaling_factor),
-                ("max_acceleration_scaling_factor", request.acceleration_scaling,
-                 self.settings.default_acceleration_scaling_factor)):
+            ("max_velocity_scaling_factor", request.velocity_scaling, self.settings.default_velocity_scaling_factor),
+            (
+                "max_acceleration_scaling_factor",
+                request.acceleration_scaling,
+                self.settings.default_acceleration_scaling_factor,
+            ),
+        ):
             if np.isfinite(value) and not 0.0 <= value <= 1.0 and self._replaces_bad_values:
-                LOGGER.warning("%s is %g; allowed is 0 < factor <= 1, or 0 for the default %g; 1 is used", name, value,
-                               default)
+                LOGGER.warning(
+                    "%s is %g; allowed is 0 < factor <= 1, or 0 for the default %g; 1 is used", name, value, default
+                )
                 value = 1.0
             if not np.isfinite(value) or value < 0.0 or value > 1.0:
-                raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{name} is {value}; allowed is 0 < factor <= 1, "
-                                    f"or 0 for the default {default}")
+                raise PlanningError(
+                    ErrorCode.INVALID_MOTION_PLAN,
+                    f"{name} is {value}; allowed is 0 < factor <= 1, or 0 for the default {default}",
+                )
             factors.append(value if value > 0.0 else default)
-        return (self._model.max_velocity[group.indices] * factors[0],
-                self._model.max_acceleration[group.indices] * factors[1])
+        return (
+            self._model.max_velocity[group.indices] * factors[0],
+            self._model.max_acceleration[group.indices] * factors[1],
+        )
 
 
 def _require_time(request: PlanningRequest, begun_s: float) -> None:
     """Raises PlanningError when a request is over before its search began."""
     spent = time.monotonic() - begun_s
     if request.cancelled():
-        raise PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s, while the collision "
-                            "world was built")
+        raise PlanningError(
+            ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s, while the collision world was built"
+        )
     if spent > request.allowed_time_s:
-        raise PlanningError(ErrorCode.TIMED_OUT, f"the collision world of {len(request.scene.objects)} objects was "
-                            f"not built in {spent:.2f} s (allowed {request.allowed_time_s:.2f} s); allow more time, "
-                            "simplify meshes, or ask again: what was built is kept")
+        raise PlanningError(
+            ErrorCode.TIMED_OUT,
+            f"the collision world of {len(request.scene.objects)} objects was "
+            f"not built in {spent:.2f} s (allowed {request.allowed_time_s:.2f} s); allow more time, "
+            "simplify meshes, or ask again: what was built is kept",
+        )
 
 
 def _with_fault(error: PlanningError, fault: str) -> PlanningError:
@@ -290,10 +358,16 @@ def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled; a path was found, but {fault}")
     spent = time.monotonic() - problem.begun_s
     if problem.interrupted():
-        return PlanningError(ErrorCode.TIMED_OUT, f"a path was found, but {fault}; time ran out after "
-                             f"{spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s): allow more time")
-    return PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion found in {spent:.2f} s fails the last check: "
-                         f"{fault}; move the goal or the start away from contact")
+        return PlanningError(
+            ErrorCode.TIMED_OUT,
+            f"a path was found, but {fault}; time ran out after "
+            f"{spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s): allow more time",
+        )
+    return PlanningError(
+        ErrorCode.INVALID_MOTION_PLAN,
+        f"the motion found in {spent:.2f} s fails the last check: "
+        f"{fault}; move the goal or the start away from contact",
+    )
 
 
 def _without_group(planner_id: str) -> str:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How a pipeline is built from the names of its planner and request adapters."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -39,5 +40,12 @@ class PipelineSpec:
 
     def build(self, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
         """Builds the pipeline; raises PlanningError for an unknown part or a parameter a part refuses."""
-        return PlanningPipeline(model, kinematics, self.settings, make_planner(self.planner, model, self.settings),
-                                make_adapters(self.adapters), self.name, collision_detector(self.collision_detector))
+        return PlanningPipeline(
+            model,
+            kinematics,
+            self.settings,
+            make_planner(self.planner, model, self.settings),
+            make_adapters(self.adapters),
+            self.name,
+            collision_detector(self.collision_detector),
+        )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds planners and request adapters by the names config packages give them: MoveIt's, or `module/Class`."""
+
 from __future__ import annotations
 
 import re
@@ -18,16 +19,32 @@ PLANNERS = {
     "stomp_moveit/StompPlannerManager": f"{PACKAGE}.planners.stomp.planner/StompPlanner",
     "stomp_moveit/StompPlanner": f"{PACKAGE}.planners.stomp.planner/StompPlanner",
 }
-ADAPTERS = ("AddIterativeSplineParameterization", "AddRuckigTrajectorySmoothing", "AddTimeOptimalParameterization",
-            "AddTimeParameterization", "FixStartStateBounds", "FixStartStateCollision",
-            "FixStartStatePathConstraints", "FixWorkspaceBounds", "LimitMaxCartesianLinkSpeed")
+ADAPTERS = (
+    "AddIterativeSplineParameterization",
+    "AddRuckigTrajectorySmoothing",
+    "AddTimeOptimalParameterization",
+    "AddTimeParameterization",
+    "FixStartStateBounds",
+    "FixStartStateCollision",
+    "FixStartStatePathConstraints",
+    "FixWorkspaceBounds",
+    "LimitMaxCartesianLinkSpeed",
+)
 # Names of MoveIt's adapters that have nothing left to do here, and why.
 NOT_NEEDED = {"Empty": "does nothing", "ResolveConstraintFrames": "frames are resolved when a request is read"}
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 MOVEIT_ADAPTERS = "default_planner_request_adapters"
-DEFAULT_ADAPTERS = " ".join(f"{MOVEIT_ADAPTERS}/{name}" for name in (
-    "LimitMaxCartesianLinkSpeed", "AddTimeOptimalParameterization", "FixWorkspaceBounds", "FixStartStateBounds",
-    "FixStartStateCollision", "FixStartStatePathConstraints"))
+DEFAULT_ADAPTERS = " ".join(
+    f"{MOVEIT_ADAPTERS}/{name}"
+    for name in (
+        "LimitMaxCartesianLinkSpeed",
+        "AddTimeOptimalParameterization",
+        "FixWorkspaceBounds",
+        "FixStartStateBounds",
+        "FixStartStateCollision",
+        "FixStartStatePathConstraints",
+    )
+)
 
 
 def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> Planner:
@@ -60,8 +77,10 @@ def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
     Raises:
         ModelError: one is not known; lists those that are.
     """
-    known = f"known are {', '.join(f'{MOVEIT_ADAPTERS}/{name}' for name in sorted({*ADAPTERS, *NOT_NEEDED}))} and " \
-            "module/Class of a class with a method adapt_and_plan"
+    known = (
+        f"known are {', '.join(f'{MOVEIT_ADAPTERS}/{name}' for name in sorted({*ADAPTERS, *NOT_NEEDED}))} and "
+        "module/Class of a class with a method adapt_and_plan"
+    )
     result = []
     for name in names.split():
         short = name.removeprefix(f"{MOVEIT_ADAPTERS}/")

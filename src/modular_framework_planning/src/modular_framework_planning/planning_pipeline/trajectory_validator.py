@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The solution validator of every pipeline: it checks each motion, whatever planner and adapters made it."""
+
 from __future__ import annotations
 
 import time
@@ -30,17 +31,29 @@ class TrajectoryValidator:
         """Returns what is wrong with a timed motion, or nothing; see SolutionValidator."""
         assert path.trajectory is not None
         motion = path.trajectory
-        key = problem.checker, b"".join(rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities,
-                                                                    motion.accelerations))
+        key = (
+            problem.checker,
+            b"".join(
+                rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities, motion.accelerations)
+            ),
+        )
         if key in self._passed:
             return ""
         text = _not_in_order(path)
         if not text:
             curve = path.trajectory.curve(problem.settings.motion_step)
             chords = path.trajectory.chords(_sample_at(path.trajectory.positions, path, path.path_prefix))
-            text = next(filter(None, (_collision(problem, line) for line in (
-                curve[_sample_at(curve, path, path.path_prefix):], *chords))), "")
-            text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained):])
+            text = next(
+                filter(
+                    None,
+                    (
+                        _collision(problem, line)
+                        for line in (curve[_sample_at(curve, path, path.path_prefix) :], *chords)
+                    ),
+                ),
+                "",
+            )
+            text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
         if not text:
             self._passed.add(key)
         return text
@@ -64,7 +77,7 @@ def _collision(problem: PlanningProblem, samples: Array) -> str:
     step = problem.settings.finest_step
     for begin in range(0, max(1, len(samples) - 1), SAMPLES_AT_ONCE):
         _require_time(problem)
-        hit = problem.motion.colliding_state(samples[begin:begin + SAMPLES_AT_ONCE + 1], step)
+        hit = problem.motion.colliding_state(samples[begin : begin + SAMPLES_AT_ONCE + 1], step)
         if hit is not None:
             contacts = problem.checker.contacts(problem.motion.full_positions(hit), include_fixed=False)
             return f"{describe_contacts(contacts)}, at {describe_state(problem, hit)} (checked at {step} rad steps)"
@@ -76,9 +89,11 @@ def _require_time(problem: PlanningProblem) -> None:
     if problem.cancelled() or over > GRACE_S:
         raise PlanningError(
             ErrorCode.PREEMPTED if problem.cancelled() else ErrorCode.TIMED_OUT,
-            "planning was cancelled during the check of the motion found" if problem.cancelled() else
-            f"a motion was found, but its check was not done {over:.2f} s after the allowed "
-            f"{problem.request.allowed_time_s:.2f} s; an unchecked motion is not returned: allow more time")
+            "planning was cancelled during the check of the motion found"
+            if problem.cancelled()
+            else f"a motion was found, but its check was not done {over:.2f} s after the allowed "
+            f"{problem.request.allowed_time_s:.2f} s; an unchecked motion is not returned: allow more time",
+        )
 
 
 def _violation(problem: PlanningProblem, samples: Array) -> str:
@@ -87,6 +102,5 @@ def _violation(problem: PlanningProblem, samples: Array) -> str:
     for number, values in enumerate(samples):
         full = problem.motion.full_positions(values)
         if not problem.constraints.satisfied(full):
-            return (f"sample {number} of {len(samples)} violates a path constraint: "
-                    f"{problem.constraints.describe(full)}")
+            return f"sample {number} of {len(samples)} violates a path constraint: {problem.constraints.describe(full)}"
     return ""

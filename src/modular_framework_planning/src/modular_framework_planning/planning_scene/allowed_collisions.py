@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Says which pairs of bodies may touch: explicit entries first, then defaults of a body."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -58,14 +59,19 @@ def matrix_from_semantics(semantics: SemanticDescription, links: Sequence[str]) 
     and disabled pairs last. Names the robot does not have mean nothing.
     """
     known = frozenset(links)
-    entries = {pair: verdict for pairs, verdict in ((semantics.enabled_pairs, False), (semantics.disabled_pairs, True))
-               for pair in pairs if len(pair) == 2 and pair <= known}
+    entries = {
+        pair: verdict
+        for pairs, verdict in ((semantics.enabled_pairs, False), (semantics.disabled_pairs, True))
+        for pair in pairs
+        if len(pair) == 2 and pair <= known
+    }
     defaults = {link: True for link in semantics.touching_links if link in known}
     return AllowedCollisionMatrix(entries, defaults, tuple(links))
 
 
-def matrix_from_rows(names: Sequence[str], rows: Sequence[Sequence[bool]],
-                     defaults: Mapping[str, bool]) -> AllowedCollisionMatrix:
+def matrix_from_rows(
+    names: Sequence[str], rows: Sequence[Sequence[bool]], defaults: Mapping[str, bool]
+) -> AllowedCollisionMatrix:
     """Builds a matrix from its square form, of which the upper triangle counts.
 
     A verdict that is that of the defaults is no entry: it changes with them, and a matrix that was read, and sent back
@@ -75,8 +81,10 @@ def matrix_from_rows(names: Sequence[str], rows: Sequence[Sequence[bool]],
         ValueError: the matrix is not square, or a name stands twice.
     """
     if len(rows) != len(names) or any(len(row) != len(names) for row in rows):
-        raise ValueError(f"allowed_collision_matrix: {len(names)} names but rows of {[len(row) for row in rows]}; "
-                         "one row per name and one value per name in each row are needed")
+        raise ValueError(
+            f"allowed_collision_matrix: {len(names)} names but rows of {[len(row) for row in rows]}; "
+            "one row per name and one value per name in each row are needed"
+        )
     if len(set(names)) != len(names):
         raise ValueError("allowed_collision_matrix: a name stands twice in entry_names; list each body once")
     place = {name: number for number, name in enumerate(names)}

@@ -5,6 +5,7 @@ Padding is a margin of a pair of bodies, not a changed shape: a pair of a link a
 when it comes closer than the margin. That is the shape swept by a ball of the margin's radius, exactly, meshes too.
 As in MoveIt, pairs of links are never padded.
 """
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
@@ -58,9 +59,11 @@ class Padding:
         return replace(self, links={**self.links, **links}, scales={**self.scales, **scales})
 
 
-def uniform_padding(links: Iterable[str], padding: float, scale: float, objects: float = 0.0,
-                    attached: float = 0.0) -> Padding:
+def uniform_padding(
+    links: Iterable[str], padding: float, scale: float, objects: float = 0.0, attached: float = 0.0
+) -> Padding:
     """Returns the padding in which every link has the same values."""
     names = list(links)
-    return Padding({name: padding for name in names if padding}, {name: scale for name in names if scale != 1.0},
-                   objects, attached)
+    return Padding(
+        {name: padding for name in names if padding}, {name: scale for name in names if scale != 1.0}, objects, attached
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The planning scene as immutable snapshots, so that plans under way never see a half-made change."""
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence, Set
@@ -104,8 +105,9 @@ class PlanningScene:
         """Returns the scene with another padding; raises UnknownNameError for a link the robot does not have."""
         for link in (*padding.links, *padding.scales):
             if not self.model.has_link(link):
-                raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link padding and scale: link", link,
-                                       self.model.frame_ids)
+                raise UnknownNameError(
+                    ErrorCode.INVALID_LINK_NAME, "link padding and scale: link", link, self.model.frame_ids
+                )
         return self._changed(padding=padding)
 
     def with_octomap(self, octree: Octree | None, pose: Transform = None) -> PlanningScene:
@@ -143,8 +145,10 @@ class PlanningScene:
             raise GeometryError(f"collision object '{body.name}': no shape; an object to ADD needs at least one")
         if self.model.has_link(body.name):
             raise GeometryError(f"collision object '{body.name}': a link of the robot has that name; use another id")
-        return self._changed(objects={**self.objects, body.name: body},
-                             attached={key: value for key, value in self.attached.items() if key != body.name})
+        return self._changed(
+            objects={**self.objects, body.name: body},
+            attached={key: value for key, value in self.attached.items() if key != body.name},
+        )
 
     def with_shapes_appended(self, body: CollisionObject) -> PlanningScene:
         """Adds shapes to an object (an unknown object is added); the object keeps its own pose."""
@@ -157,8 +161,7 @@ class PlanningScene:
         subframes = {**old.subframes, **{name: into_old * pose for name, pose in body.subframes.items()}}
         return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes, subframes=subframes)})
 
-    def with_object_moved(self, name: str, pose: Transform,
-                          shape_poses: Sequence[Transform] = ()) -> PlanningScene:
+    def with_object_moved(self, name: str, pose: Transform, shape_poses: Sequence[Transform] = ()) -> PlanningScene:
         """Moves an object to another pose in the planning frame and, if given, its shapes to other poses in the object.
 
         Raises:
@@ -169,8 +172,10 @@ class PlanningScene:
         shapes = body.shapes
         if shape_poses:
             if len(shape_poses) != len(shapes):
-                raise GeometryError(f"moving '{name}': {len(shape_poses)} poses of shapes for {len(shapes)} shapes; "
-                                    "give one for each shape, or none to move the object as a whole")
+                raise GeometryError(
+                    f"moving '{name}': {len(shape_poses)} poses of shapes for {len(shapes)} shapes; "
+                    "give one for each shape, or none to move the object as a whole"
+                )
             shapes = tuple((shape, place) for (shape, _), place in zip(shapes, shape_poses, strict=True))
         return self._changed(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
 
@@ -207,12 +212,15 @@ class PlanningScene:
         """
         for link in (item.link, *sorted(item.touch_links)):
             if not self.model.has_link(link):
-                raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"attaching '{item.name}': link", link,
-                                       self.model.frame_ids)
+                raise UnknownNameError(
+                    ErrorCode.INVALID_LINK_NAME, f"attaching '{item.name}': link", link, self.model.frame_ids
+                )
         if not item.body.shapes:
             raise GeometryError(f"attached object '{item.name}': no shape, and the world has no object of that name")
-        return self._changed(attached={**self.attached, item.name: item},
-                             objects={key: value for key, value in self.objects.items() if key != item.name})
+        return self._changed(
+            attached={**self.attached, item.name: item},
+            objects={key: value for key, value in self.objects.items() if key != item.name},
+        )
 
     def with_detached(self, name: str) -> PlanningScene:
         """Puts an attached body back into the world at the place where it is now; raises UnknownNameError."""

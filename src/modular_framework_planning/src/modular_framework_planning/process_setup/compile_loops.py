@@ -5,6 +5,7 @@ Each loop is called the way the product calls it, with a robot and a scene small
 cache already is only loaded. To be run once after the build:
 python3 -m modular_framework_planning.process_setup.compile_loops
 """
+
 from __future__ import annotations
 
 import time
@@ -45,11 +46,16 @@ def compile_all() -> float:
 
 def _robot() -> RobotModel:
     """A chain of boxes."""
-    links = "".join(f'<link name="l{n}"><collision><geometry><box size="0.1 0.1 0.2"/></geometry></collision></link>'
-                    for n in range(LINKS))
-    joints = "".join(f'<joint name="j{n}" type="revolute"><parent link="l{n}"/><child link="l{n + 1}"/>'
-                     '<origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1" effort="1"/>'
-                     "</joint>" for n in range(LINKS - 1))
+    links = "".join(
+        f'<link name="l{n}"><collision><geometry><box size="0.1 0.1 0.2"/></geometry></collision></link>'
+        for n in range(LINKS)
+    )
+    joints = "".join(
+        f'<joint name="j{n}" type="revolute"><parent link="l{n}"/><child link="l{n + 1}"/>'
+        '<origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1" effort="1"/>'
+        "</joint>"
+        for n in range(LINKS - 1)
+    )
     pairs = "".join(f'<disable_collisions link1="l{n}" link2="l{n + 1}" reason="Adjacent"/>' for n in range(LINKS - 1))
     return RobotModel(f'<robot name="chain">{links}{joints}</robot>', f'<robot name="chain">{pairs}</robot>')
 
@@ -70,12 +76,18 @@ def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
         return CollisionObject(name, Transform(np.eye(3), np.array(position)), ((shape, Transform.Identity()),))
 
     scene = empty_scene(model).with_octomap(Octree(voxels), Transform.Identity())
-    for item in (body("box", Box(0.1, 0.1, 0.1), 0.7, 0.0, 0.3), body("ball", Sphere(0.05), -0.7, 0.0, 0.3),
-                 body("mesh", Mesh(corners, faces), 0.0, 0.6, 0.0),
-                 body("around", Mesh(8.0 * (corners - 0.05), faces), 0.0, 0.0, 10.0)):
+    for item in (
+        body("box", Box(0.1, 0.1, 0.1), 0.7, 0.0, 0.3),
+        body("ball", Sphere(0.05), -0.7, 0.0, 0.3),
+        body("mesh", Mesh(corners, faces), 0.0, 0.6, 0.0),
+        body("around", Mesh(8.0 * (corners - 0.05), faces), 0.0, 0.0, 10.0),
+    ):
         scene = scene.with_object(item)
-    return scene.with_attached(AttachedObject(body("held", Mesh(corners, faces), 0.0, 0.0, 0.2), f"l{LINKS - 1}",
-                                              frozenset((f"l{LINKS - 1}",))))
+    return scene.with_attached(
+        AttachedObject(
+            body("held", Mesh(corners, faces), 0.0, 0.0, 0.2), f"l{LINKS - 1}", frozenset((f"l{LINKS - 1}",))
+        )
+    )
 
 
 def _check_motions(scene: PlanningScene) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Settings of the interpreter and of the C library for a process in which several plans run beside short requests."""
+
 from __future__ import annotations
 
 import ctypes

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sends requests to another process that has the same robot: bytes without the robot and without built geometry."""
+
 from __future__ import annotations
 
 import io

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plans that a seed repeats bit for bit: each runs in a process of its own that starts from the same state."""
+
 from __future__ import annotations
 
 import os
@@ -65,13 +66,26 @@ class SeededPlanning:
             raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; allowed is 0 or more")
         connection = self._connect()
         try:
-            send(connection, to_bytes((pipeline.name, pipeline.settings, pipeline.configurations.snapshot(), seed,
-                                       replace(request, cancelled=_never))))
+            send(
+                connection,
+                to_bytes(
+                    (
+                        pipeline.name,
+                        pipeline.settings,
+                        pipeline.configurations.snapshot(),
+                        seed,
+                        replace(request, cancelled=_never),
+                    )
+                ),
+            )
             self._wait(connection, request)
             found = from_bytes(receive(connection), self._model)
         except (EOFError, OSError) as error:
-            raise PlanningError(ErrorCode.CRASH, f"the process of a seeded plan ended without an answer ({error}); "
-                                "its output is in the log of this node") from error
+            raise PlanningError(
+                ErrorCode.CRASH,
+                f"the process of a seeded plan ended without an answer ({error}); "
+                "its output is in the log of this node",
+            ) from error
         finally:
             connection.close()
         if isinstance(found, Failure):
@@ -88,18 +102,23 @@ class SeededPlanning:
             self._address = str(Path(self._folder.name) / "socket")
             setup = WorkerSetup(self._model.source, self._specs, tuple(sys.path), self._address)
             data = pickle.dumps((tuple(sys.path), pickle.dumps(setup)))
-            self._process = subprocess.Popen([sys.executable, "-m", WORKER], stdin=subprocess.PIPE,
-                                             stdout=subprocess.PIPE,
-                                             env={**os.environ, **ONE_THREAD,
-                                                  "PYTHONPATH": os.pathsep.join(item for item in sys.path if item)})
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", WORKER],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(item for item in sys.path if item)},
+            )
             assert self._process.stdin is not None and self._process.stdout is not None
             self._process.stdin.write(LENGTH.pack(len(data)) + data)
             self._process.stdin.flush()
             ready, _, _ = select.select([self._process.stdout], [], [], START_TIMEOUT_S)
             if not ready or self._process.stdout.readline() != b"ready\n":
                 self._stop()
-                raise PlanningError(ErrorCode.CRASH, "the process for seeded plans did not get ready within "
-                                    f"{START_TIMEOUT_S:.0f} s; its output is in the log of this node")
+                raise PlanningError(
+                    ErrorCode.CRASH,
+                    "the process for seeded plans did not get ready within "
+                    f"{START_TIMEOUT_S:.0f} s; its output is in the log of this node",
+                )
 
     def close(self) -> None:
         """Ends the worker process; may be called twice."""
@@ -137,8 +156,11 @@ class SeededPlanning:
         begun = time.monotonic()
         while not select.select([connection], [], [], POLL_S)[0]:
             if request.cancelled():
-                raise PlanningError(ErrorCode.PREEMPTED,
-                                    f"planning was cancelled after {time.monotonic() - begun:.2f} s")
+                raise PlanningError(
+                    ErrorCode.PREEMPTED, f"planning was cancelled after {time.monotonic() - begun:.2f} s"
+                )
             if time.monotonic() > end:
-                raise PlanningError(ErrorCode.TIMED_OUT, "the process of a seeded plan gave no answer within "
-                                    f"{request.allowed_time_s + GRACE_S:.0f} s")
+                raise PlanningError(
+                    ErrorCode.TIMED_OUT,
+                    f"the process of a seeded plan gave no answer within {request.allowed_time_s + GRACE_S:.0f} s",
+                )

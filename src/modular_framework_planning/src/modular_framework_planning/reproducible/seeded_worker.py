@@ -4,6 +4,7 @@
 OMPL has one random generator a process, and its seed counts only before the first use. This process never plans
 itself, so every child starts from the same state. It has one thread, and lives as long as its standard input is open.
 """
+
 from __future__ import annotations
 
 import contextlib
@@ -143,8 +144,15 @@ def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
         if not group.joints:
             continue
         middle = 0.5 * (model.lower + model.upper)[group.indices]
-        goal = JointGoal(dict(zip(group.joints, (scene.positions[group.indices] + 0.01 * np.sign(
-            middle - scene.positions[group.indices])).tolist(), strict=True)))
+        goal = JointGoal(
+            dict(
+                zip(
+                    group.joints,
+                    (scene.positions[group.indices] + 0.01 * np.sign(middle - scene.positions[group.indices])).tolist(),
+                    strict=True,
+                )
+            )
+        )
         with contextlib.suppress(PlanningError):
             straight.plan(PlanningRequest(scene, group.name, (goal,)))
 

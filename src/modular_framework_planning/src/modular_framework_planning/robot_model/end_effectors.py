@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the gripper of a planning group in the SRDF, and which links are the gripper's."""
+
 from __future__ import annotations
 
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
@@ -24,19 +25,25 @@ def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[Joint
         raise UnknownNameError(ErrorCode.INVALID_GROUP_NAME, "end effector", name, known)
     if not group:
         if not name:
-            raise PlanningError(ErrorCode.INVALID_GROUP_NAME, "neither group_name nor end_effector is given; name one "
-                                f"of the groups {', '.join(model.groups)}")
+            raise PlanningError(
+                ErrorCode.INVALID_GROUP_NAME,
+                f"neither group_name nor end_effector is given; name one of the groups {', '.join(model.groups)}",
+            )
         group = known[name].parent_group
     arm = model.group(group)
     fitting = [item for item in known.values() if item.parent_group == group] or [
-        item for item in known.values() if _moves(model, arm, item.parent_link)]
+        item for item in known.values() if _moves(model, arm, item.parent_link)
+    ]
     if name:
         fitting = [item for item in fitting if item.name == name]
     if len(fitting) != 1:
-        raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group}' has {len(fitting)} end effectors "
-                            f"({', '.join(item.name for item in fitting) or 'none'}"
-                            f"{f' named {name}' if name else ''}); exactly one is needed: name it, or add "
-                            "<end_effector> with this parent_group to the SRDF")
+        raise PlanningError(
+            ErrorCode.INVALID_GROUP_NAME,
+            f"group '{group}' has {len(fitting)} end effectors "
+            f"({', '.join(item.name for item in fitting) or 'none'}"
+            f"{f' named {name}' if name else ''}); exactly one is needed: name it, or add "
+            "<end_effector> with this parent_group to the SRDF",
+        )
     return arm, fitting[0]
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Combines the limits of the URDF with those of joint_limits.yaml; the file may only tighten them."""
+
 from __future__ import annotations
 
 import math
@@ -63,10 +64,15 @@ def tighten(name: str, limits: JointLimits, entry: Mapping[str, Any]) -> JointLi
         raise ModelError(f"joint_limits/{name}/max_deceleration: {deceleration}; it must be below 0")
     jerk = _value(name, entry, "has_jerk_limits", "max_jerk")
     if lower > upper or any(value is not None and value <= 0 for value in (velocity, acceleration, jerk)):
-        raise ModelError(f"joint_limits/{name}: bounds [{lower}, {upper}], velocity {velocity}, acceleration "
-                         f"{acceleration}, jerk {jerk}; the bounds must leave room and the rest must be above 0")
-    return JointLimits(lower, upper,
-                       limits.velocity if velocity is None else min(velocity, limits.velocity),
-                       limits.acceleration if acceleration is None else acceleration,
-                       None if deceleration is None else -deceleration,
-                       DEFAULT_JERK if jerk is None else jerk)
+        raise ModelError(
+            f"joint_limits/{name}: bounds [{lower}, {upper}], velocity {velocity}, acceleration "
+            f"{acceleration}, jerk {jerk}; the bounds must leave room and the rest must be above 0"
+        )
+    return JointLimits(
+        lower,
+        upper,
+        limits.velocity if velocity is None else min(velocity, limits.velocity),
+        limits.acceleration if acceleration is None else acceleration,
+        None if deceleration is None else -deceleration,
+        DEFAULT_JERK if jerk is None else jerk,
+    )

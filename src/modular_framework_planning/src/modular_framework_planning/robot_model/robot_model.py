@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joins URDF, SRDF and joint limits into one immutable model of the robot: joints, groups, frames, geometry."""
+
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
@@ -77,8 +78,9 @@ class RobotModel:
     Position vectors hold one value per movable joint (mimic joints included) in the order of `joint_names`.
     """
 
-    def __init__(self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None,
-                 resolve: MeshResolver = package_resolver) -> None:
+    def __init__(
+        self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None, resolve: MeshResolver = package_resolver
+    ) -> None:
         self.source = (urdf, srdf, dict(limits or {}), resolve)  # makes the same robot in another process
         self.document = load_urdf(urdf, resolve)
         self.semantics: SemanticDescription = parse_srdf(srdf)
@@ -87,29 +89,39 @@ class RobotModel:
         self.joint_names: tuple[str, ...] = tuple(self.pin_model.names)[1:]
         self.index = {name: number for number, name in enumerate(self.joint_names)}
         if self.pin_model.nq != len(self.joint_names):
-            raise ModelError(f"URDF: {self.pin_model.nq} position variables for {len(self.joint_names)} joints; "
-                             "only joints with one degree of freedom are supported")
+            raise ModelError(
+                f"URDF: {self.pin_model.nq} position variables for {len(self.joint_names)} joints; "
+                "only joints with one degree of freedom are supported"
+            )
         self.follower_joints = frozenset(self.document.mimics) | self.semantics.passive_joints
         self.planning_frame = self._planning_frame()
         self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
         self.limits = self._joint_limits(limits or {})
         self.lower, self.upper, self.max_velocity, self.max_acceleration, self.max_jerk = (
             np.array([getattr(self.limits[name], key) for name in self.joint_names])
-            for key in ("lower", "upper", "velocity", "acceleration", "jerk"))
+            for key in ("lower", "upper", "velocity", "acceleration", "jerk")
+        )
         self.max_deceleration = np.array([self.limits[name].braking for name in self.joint_names])
-        self.mimics = [(self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
-                       for name, mimic in self.document.mimics.items()]
+        self.mimics = [
+            (self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
+            for name, mimic in self.document.mimics.items()
+        ]
         self.link_geometries = self._load_geometry()
-        self._tree = {child: (parent, joint) for joint, child in self.document.joint_children.items()
-                      for parent in (self.document.joint_parents[joint],)}
+        self._tree = {
+            child: (parent, joint)
+            for joint, child in self.document.joint_children.items()
+            for parent in (self.document.joint_parents[joint],)
+        }
         self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
 
     def _planning_frame(self) -> str:
         """The root link, as in MoveIt: where a fixed virtual joint's parent frame is, tf says, as of every frame."""
         for joint in self.semantics.virtual_joints:
             if joint.child_link == self.document.root_link and joint.kind != "fixed":
-                raise ModelError(f"SRDF virtual_joint '{joint.name}': type '{joint.kind}'; only 'fixed' is "
-                                 "supported, a moving base needs its own joints in the URDF")
+                raise ModelError(
+                    f"SRDF virtual_joint '{joint.name}': type '{joint.kind}'; only 'fixed' is "
+                    "supported, a moving base needs its own joints in the URDF"
+                )
         return self.document.root_link
 
     def _joint_limits(self, entries: Mapping[str, Any]) -> dict[str, JointLimits]:
@@ -117,9 +129,12 @@ class RobotModel:
         for number, name in enumerate(self.joint_names):
             velocity = float(self.pin_model.upperVelocityLimit[number])
             known = 0.0 < velocity < NO_VELOCITY_LIMIT
-            limits = JointLimits(float(self.pin_model.lowerPositionLimit[number]),
-                                 float(self.pin_model.upperPositionLimit[number]),
-                                 velocity if known else DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
+            limits = JointLimits(
+                float(self.pin_model.lowerPositionLimit[number]),
+                float(self.pin_model.upperPositionLimit[number]),
+                velocity if known else DEFAULT_VELOCITY,
+                DEFAULT_ACCELERATION,
+            )
             result[name] = tighten(name, limits, entries.get(name) or {})
         return result
 
@@ -127,8 +142,10 @@ class RobotModel:
         result = []
         for link, shapes in self.document.collisions.items():
             frame = self.pin_model.frames[self.frame_ids[link]]
-            result += [LinkGeometry(link, frame.parentJoint, self.frame_ids[link], frame.placement * pose, shape)
-                       for shape, pose in shapes]
+            result += [
+                LinkGeometry(link, frame.parentJoint, self.frame_ids[link], frame.placement * pose, shape)
+                for shape, pose in shapes
+            ]
         return tuple(result)
 
     def chain_joints(self, base_link: str, tip_link: str) -> list[str]:
@@ -141,8 +158,9 @@ class RobotModel:
         link = tip_link
         while link != base_link:
             if link not in self._tree:
-                raise ModelError(f"SRDF chain {base_link} -> {tip_link}: '{tip_link}' does not hang below "
-                                 f"'{base_link}' in the URDF")
+                raise ModelError(
+                    f"SRDF chain {base_link} -> {tip_link}: '{tip_link}' does not hang below '{base_link}' in the URDF"
+                )
             link, joint = self._tree[link]
             joints.append(joint)
         return joints[::-1]
@@ -152,8 +170,12 @@ class RobotModel:
             raise ModelError(f"SRDF group '{spec.name}': contains itself through {' -> '.join(seen)}")
         parent_joint = {child: joint for joint, child in self.document.joint_children.items()}
         joints = set(spec.joints) | {parent_joint[link] for link in spec.links if link in parent_joint}
-        unknown = [name for name in spec.joints if name not in self.document.joint_kinds
-                   and name not in {joint.name for joint in self.semantics.virtual_joints}]
+        unknown = [
+            name
+            for name in spec.joints
+            if name not in self.document.joint_kinds
+            and name not in {joint.name for joint in self.semantics.virtual_joints}
+        ]
         unknown += [link for link in spec.links if link not in self.document.links]
         if unknown:
             raise ModelError(f"SRDF group '{spec.name}': {', '.join(unknown)} is not in the URDF")
@@ -171,8 +193,9 @@ class RobotModel:
         links = tuple(self.document.joint_children[name] for name in members if name in self.document.joint_children)
         base, tip = self._chain_ends(spec, joints)
         ordered = tuple(link for link in self.document.links if link in links)
-        return JointGroup(spec.name, joints, np.array([self.index[name] for name in joints], dtype=np.int64), ordered,
-                          base, tip)
+        return JointGroup(
+            spec.name, joints, np.array([self.index[name] for name in joints], dtype=np.int64), ordered, base, tip
+        )
 
     def _chain_ends(self, spec: GroupSpec, joints: tuple[str, ...]) -> tuple[str, str]:
         if len(spec.chains) == 1 and not (spec.joints or spec.links or spec.subgroups):
@@ -254,9 +277,11 @@ class RobotModel:
 
     def bound_violations(self, positions: Array, indices: Iterable[int], tolerance: float = 1e-9) -> list[str]:
         """Returns one sentence per joint that is out of its bounds."""
-        return [f"joint {self.joint_names[i]} at {positions[i]:.4f} is outside [{self.lower[i]:.4f}, "
-                f"{self.upper[i]:.4f}]" for i in indices
-                if not self.lower[i] - tolerance <= positions[i] <= self.upper[i] + tolerance]
+        return [
+            f"joint {self.joint_names[i]} at {positions[i]:.4f} is outside [{self.lower[i]:.4f}, {self.upper[i]:.4f}]"
+            for i in indices
+            if not self.lower[i] - tolerance <= positions[i] <= self.upper[i] + tolerance
+        ]
 
     def link_transforms(self, positions: Array) -> dict[str, Transform]:
         """Computes the pose of every link in the planning frame."""

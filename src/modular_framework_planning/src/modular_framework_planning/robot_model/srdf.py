@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The semantic description (SRDF) of a robot, with the planner's kind of error."""
+
 from __future__ import annotations
 
 from modular_framework_planning.errors import ModelError

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prepares a URDF for Pinocchio: shapes are read, continuous joints become unbounded, mimics are noted."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
@@ -45,12 +46,14 @@ class UrdfDocument:
 
 def directory_resolver(root: Path) -> MeshResolver:
     """Returns a resolver that looks every mesh up below one folder, whatever its package prefix."""
+
     def resolve(uri: str) -> str:
         relative = uri.split("://", 1)[-1]
         for candidate in (root / relative, root / relative.split("/", 1)[-1]):
             if candidate.is_file():
                 return str(candidate)
         raise ModelError(f"mesh '{uri}': no such file below {root}")
+
     return resolve
 
 
@@ -59,12 +62,13 @@ def package_resolver(uri: str) -> str:
     if uri.startswith("package://"):
         import rospkg
 
-        package, _, inner = uri[len("package://"):].partition("/")
+        package, _, inner = uri[len("package://") :].partition("/")
         try:
             path = Path(rospkg.RosPack.get_instance().get_path(package)) / inner  # which has searched once
         except rospkg.ResourceNotFound as error:
-            raise ModelError(f"mesh '{uri}': ROS package '{package}' is not on ROS_PACKAGE_PATH; "
-                             "install it or source the workspace") from error
+            raise ModelError(
+                f"mesh '{uri}': ROS package '{package}' is not on ROS_PACKAGE_PATH; install it or source the workspace"
+            ) from error
     else:
         path = Path(uri.removeprefix("file://"))
     if not path.is_file():
@@ -75,8 +79,10 @@ def package_resolver(uri: str) -> str:
 def _check_kinds(robot: Robot) -> None:
     for joint in robot.joints:
         if joint.kind not in (*MOVABLE_KINDS, "fixed") or not joint.parent or not joint.child:
-            raise ModelError(f"URDF joint '{joint.name}': type '{joint.kind}' with parent and child; allowed types are "
-                             f"{', '.join(MOVABLE_KINDS)} and fixed, and both links must be named")
+            raise ModelError(
+                f"URDF joint '{joint.name}': type '{joint.kind}' with parent and child; allowed types are "
+                f"{', '.join(MOVABLE_KINDS)} and fixed, and both links must be named"
+            )
 
 
 def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
@@ -88,7 +94,10 @@ def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
         raise ModelError(str(error)) from error
     return mimics, tuple(
         f"URDF joint '{joint.name}': <mimic> is ignored, because the joint is fixed; remove it, or make the joint one "
-        "that moves" for joint in robot.joints if joint.kind == "fixed" and joint.mimic is not None)
+        "that moves"
+        for joint in robot.joints
+        if joint.kind == "fixed" and joint.mimic is not None
+    )
 
 
 def _xml_for_pinocchio(text: str) -> str:
@@ -182,9 +191,16 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
     if len(roots) != 1:
         raise ModelError(f"URDF: {len(roots)} links without a parent joint ({', '.join(roots)}); exactly one is needed")
     return UrdfDocument(
-        _xml_for_pinocchio(text), robot.name, roots[0], tuple(link.name for link in robot.links),
-        {joint.name: joint.parent for joint in robot.joints}, {joint.name: joint.child for joint in robot.joints},
-        {joint.name: joint.kind for joint in robot.joints}, mimics,
+        _xml_for_pinocchio(text),
+        robot.name,
+        roots[0],
+        tuple(link.name for link in robot.links),
+        {joint.name: joint.parent for joint in robot.joints},
+        {joint.name: joint.child for joint in robot.joints},
+        {joint.name: joint.kind for joint in robot.joints},
+        mimics,
         {link.name: tuple(_visual_meshes(link)) for link in robot.links},
         {link.name: tuple(_visual_shapes(link)) for link in robot.links},
-        {link.name: tuple(_collisions(link, resolve)) for link in robot.links}, notes)
+        {link.name: tuple(_collisions(link, resolve)) for link in robot.links},
+        notes,
+    )

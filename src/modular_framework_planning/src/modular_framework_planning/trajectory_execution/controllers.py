@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which controllers execute a motion: reads controller_list and chooses controllers that cover the motion's joints."""
+
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -62,8 +63,9 @@ class ControllerSpec:
         return f"{self.name}/{self.action_ns}" if self.action_ns else self.name
 
 
-def parse_controllers(entries: Any, kinds: Sequence[str], default_kind: str = "") -> tuple[list[ControllerSpec],
-                                                                                           list[str]]:
+def parse_controllers(
+    entries: Any, kinds: Sequence[str], default_kind: str = ""
+) -> tuple[list[ControllerSpec], list[str]]:
     """Reads controller_list.
 
     Args:
@@ -109,16 +111,26 @@ def _fault(entry: Any, kinds: Sequence[str], default_kind: str) -> str:
 def _controller(entry: Mapping[str, Any], default_kind: str) -> ControllerSpec:
     joints = tuple(str(joint) for joint in entry["joints"])
     command = joints if "parallel" in entry else (str(entry.get("command_joint", joints[0])),)
-    scaling, margin = (None if entry.get(key) is None else float(entry[key]) for key in
-                       ("allowed_execution_duration_scaling", "allowed_goal_duration_margin"))
+    scaling, margin = (
+        None if entry.get(key) is None else float(entry[key])
+        for key in ("allowed_execution_duration_scaling", "allowed_goal_duration_margin")
+    )
     return ControllerSpec(
-        name=str(entry["name"]), action_ns=str(entry.get("action_ns", "")), kind=str(entry.get("type", default_kind)),
-        joints=joints, is_default=bool(entry.get("default", False)), max_effort=float(entry.get("max_effort", 0.0)),
-        command_joints=command, allow_failure="allow_failure" in entry and bool(entry["allow_failure"]),
-        duration_scaling=scaling, duration_margin=margin,
+        name=str(entry["name"]),
+        action_ns=str(entry.get("action_ns", "")),
+        kind=str(entry.get("type", default_kind)),
+        joints=joints,
+        is_default=bool(entry.get("default", False)),
+        max_effort=float(entry.get("max_effort", 0.0)),
+        command_joints=command,
+        allow_failure="allow_failure" in entry and bool(entry["allow_failure"]),
+        duration_scaling=scaling,
+        duration_margin=margin,
         path_tolerances=_tolerances(entry.get("path_tolerance"), joints),
         goal_tolerances=_tolerances(entry.get("goal_tolerance"), joints),
-        goal_time_tolerance=float(entry.get("goal_time_tolerance", 0.0)), rate=float(entry.get("rate", 0.0)))
+        goal_time_tolerance=float(entry.get("goal_time_tolerance", 0.0)),
+        rate=float(entry.get("rate", 0.0)),
+    )
 
 
 def _tolerances(given: Any, joints: tuple[str, ...]) -> tuple[JointTolerance, ...]:
@@ -126,16 +138,21 @@ def _tolerances(given: Any, joints: tuple[str, ...]) -> tuple[JointTolerance, ..
     if not given:
         return ()
     if isinstance(given, list):
-        return tuple(JointTolerance(str(item["name"]), *(float(item.get(key, 0.0)) for key in TOLERANCE_KEYS))
-                     for item in given)
-    columns = [value if isinstance(value := given.get(key, 0.0), list) else [value] * len(joints)
-               for key in TOLERANCE_KEYS]
-    return tuple(JointTolerance(joint, *(float(value) for value in values))
-                 for joint, *values in zip(joints, *columns, strict=True))
+        return tuple(
+            JointTolerance(str(item["name"]), *(float(item.get(key, 0.0)) for key in TOLERANCE_KEYS)) for item in given
+        )
+    columns = [
+        value if isinstance(value := given.get(key, 0.0), list) else [value] * len(joints) for key in TOLERANCE_KEYS
+    ]
+    return tuple(
+        JointTolerance(joint, *(float(value) for value in values))
+        for joint, *values in zip(joints, *columns, strict=True)
+    )
 
 
-def choose_controllers(joints: Collection[str], controllers: Iterable[ControllerSpec],
-                       may_switch: bool = False) -> tuple[ControllerSpec, ...]:
+def choose_controllers(
+    joints: Collection[str], controllers: Iterable[ControllerSpec], may_switch: bool = False
+) -> tuple[ControllerSpec, ...]:
     """Returns controllers that move the joints and share none of theirs.
 
     Few controllers are better than many, default ones than others, running ones than stopped ones, and those with few
@@ -165,20 +182,33 @@ def _covers(option: Sequence[ControllerSpec], wanted: set[str]) -> bool:
 
 
 def _rank(option: Sequence[ControllerSpec]) -> tuple[int, int, int]:
-    return (-sum(spec.is_default for spec in option), -sum(spec.is_active for spec in option),
-            sum(len(spec.joints) for spec in option))
+    return (
+        -sum(spec.is_default for spec in option),
+        -sum(spec.is_active for spec in option),
+        sum(len(spec.joints) for spec in option),
+    )
 
 
 def _reason(wanted: set[str], known: Sequence[ControllerSpec], useful: Sequence[ControllerSpec]) -> str:
-    listed = "; ".join(f"{spec.name}{'' if spec.is_active else ' (stopped)'} moves {', '.join(spec.joints)}"
-                       for spec in known) or "none"
+    listed = (
+        "; ".join(
+            f"{spec.name}{'' if spec.is_active else ' (stopped)'} moves {', '.join(spec.joints)}" for spec in known
+        )
+        or "none"
+    )
     unmoved = sorted(wanted - {joint for spec in known for joint in spec.joints})
     if unmoved:
-        return (f"no controller moves {', '.join(unmoved)}; known controllers: {listed}. Add one to the config "
-                "package's controllers file, or load one where ros_control is asked")
+        return (
+            f"no controller moves {', '.join(unmoved)}; known controllers: {listed}. Add one to the config "
+            "package's controllers file, or load one where ros_control is asked"
+        )
     stopped = sorted(wanted - {joint for spec in useful for joint in spec.joints})
     if stopped:
-        return (f"the controllers of {', '.join(stopped)} are stopped; known controllers: {listed}. Start one, or set "
-                "moveit_manage_controllers")
-    return (f"controllers of {', '.join(sorted(wanted))} share joints, so no set of them can move all at a time; known "
-            f"controllers: {listed}")
+        return (
+            f"the controllers of {', '.join(stopped)} are stopped; known controllers: {listed}. Start one, or set "
+            "moveit_manage_controllers"
+        )
+    return (
+        f"controllers of {', '.join(sorted(wanted))} share joints, so no set of them can move all at a time; known "
+        f"controllers: {listed}"
+    )

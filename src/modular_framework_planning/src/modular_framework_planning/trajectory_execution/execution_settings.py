@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters of trajectory execution, under MoveIt's names."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping

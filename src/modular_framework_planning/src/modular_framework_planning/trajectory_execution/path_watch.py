@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Says whether what is left of a motion is still free when the scene changes while the robot moves along it."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -18,8 +19,13 @@ CHECK_STEP = 0.01  # [rad or m, any joint]
 class PathWatch:
     """Follows the robot along one motion. Not for use from two threads at a time."""
 
-    def __init__(self, joint_names: Sequence[str], rows: Array, planned_in: PlanningScene,
-                 new_checker: CollisionCheckerFactory = DEFAULT_CHECKER) -> None:
+    def __init__(
+        self,
+        joint_names: Sequence[str],
+        rows: Array,
+        planned_in: PlanningScene,
+        new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
+    ) -> None:
         """Takes a motion.
 
         Args:
@@ -46,7 +52,7 @@ class PathWatch:
         (a start in contact, a held object on its table).
         """
         checker, motion = self._checkers(scene)
-        rest = self._rows[self._reached:]
+        rest = self._rows[self._reached :]
         if motion.colliding_state(rest, CHECK_STEP) is None:
             return ""
         _, before = self._checkers(self._planned_in.with_positions(scene.positions))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A polyline whose corners are replaced by parabolas: smooth enough to pass without stopping, near the line."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -96,8 +97,11 @@ def choose_blends(vertices: Array, deviation: float, is_free: Callable[[Array], 
             if size < SMALLEST_BLEND:
                 break
             share = np.linspace(0.0, 2.0 * size, max(8, int(2.0 * size / 0.01)))[:, None]
-            curve = (vertices[number + 1] - size * before) + share * before + (
-                share * share * (after - before) / (4.0 * size))
+            curve = (
+                (vertices[number + 1] - size * before)
+                + share * before
+                + (share * share * (after - before) / (4.0 * size))
+            )
             if is_free(curve):
                 result[number] = size
                 break

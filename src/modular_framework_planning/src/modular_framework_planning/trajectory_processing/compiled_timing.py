@@ -8,6 +8,7 @@ linear over the interval, so that bounding it at both ends bounds it everywhere.
 Source: H. Pham, Q.-C. Pham, "A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis",
 IEEE Transactions on Robotics 34 (2018).
 """
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -124,8 +125,9 @@ def _constrain(rows: Array, tangent: Array, end_tangent: Array, curvature: Array
 
 
 @njit(cache=True, nogil=True)
-def optimal_speeds(steps: Array, tangents: Array, end_tangents: Array, curvatures: Array, velocity: Array,
-                   acceleration: Array) -> tuple[Array, Array]:
+def optimal_speeds(
+    steps: Array, tangents: Array, end_tangents: Array, curvatures: Array, velocity: Array, acceleration: Array
+) -> tuple[Array, Array]:
     """Returns path speeds at the n + 1 ends of the intervals and path accelerations in the n intervals.
 
     Args:
@@ -164,8 +166,11 @@ def _trapezoid(length: float, top: float, rate: float) -> tuple[Array, Array, Ar
     speed = np.sqrt(2.0 * rate * ramp)
     if length - 2.0 * ramp <= 1e-9 * length:
         return np.array([0.0, 0.5 * length, length]), np.array([0.0, speed, 0.0]), np.array([rate, -rate])
-    return (np.array([0.0, ramp, length - ramp, length]), np.array([0.0, speed, speed, 0.0]),
-            np.array([rate, 0.0, -rate]))
+    return (
+        np.array([0.0, ramp, length - ramp, length]),
+        np.array([0.0, speed, speed, 0.0]),
+        np.array([rate, 0.0, -rate]),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -196,8 +201,7 @@ def _tangents(pieces: PathPieces, positions: Array, numbers: NDArray[np.int64]) 
 
 
 @njit(cache=True, nogil=True)
-def fastest_motion(pieces: PathPieces, velocity: Array, acceleration: Array, longest: float,
-                   fewest: int) -> PathMotion:
+def fastest_motion(pieces: PathPieces, velocity: Array, acceleration: Array, longest: float, fewest: int) -> PathMotion:
     """Returns the fastest motion; intervals are at most `longest` long, and at least `fewest` a piece."""
     joints = pieces.points.shape[1]
     if len(pieces.breaks) == 2:
@@ -232,17 +236,25 @@ def _point(pieces: PathPieces, motion: PathMotion, interval: int, offset: float,
     speed = motion.speeds[interval] + offset * rate
     along = (motion.grid[interval] - pieces.breaks[piece]) + offset * (speed - 0.5 * offset * rate)
     tangent, curvature = pieces.tangents[piece, joint], pieces.curvatures[piece, joint]
-    return (pieces.points[piece, joint] + along * (tangent + 0.5 * along * curvature),
-            (tangent + along * curvature) * speed)
+    return (
+        pieces.points[piece, joint] + along * (tangent + 0.5 * along * curvature),
+        (tangent + along * curvature) * speed,
+    )
 
 
 @njit(cache=True, nogil=True)
 def _area(pieces: PathPieces, motion: PathMotion, interval: int, offset: float, joint: int) -> float:
     """Integral of a joint's position over the first `offset` seconds of an interval."""
     half = 0.5 * offset
-    return offset / 18.0 * (5.0 * _point(pieces, motion, interval, half * (1.0 - _NODE), joint)[0]
-                            + 8.0 * _point(pieces, motion, interval, half, joint)[0]
-                            + 5.0 * _point(pieces, motion, interval, half * (1.0 + _NODE), joint)[0])
+    return (
+        offset
+        / 18.0
+        * (
+            5.0 * _point(pieces, motion, interval, half * (1.0 - _NODE), joint)[0]
+            + 8.0 * _point(pieces, motion, interval, half, joint)[0]
+            + 5.0 * _point(pieces, motion, interval, half * (1.0 + _NODE), joint)[0]
+        )
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -274,8 +286,9 @@ def averaged(pieces: PathPieces, motion: PathMotion, times: Array, window: float
 
 
 @njit(cache=True, nogil=True)
-def largest_shares(times: Array, coefficients: Array, velocity: Array, acceleration: Array,
-                   samples: int) -> tuple[float, float]:
+def largest_shares(
+    times: Array, coefficients: Array, velocity: Array, acceleration: Array, samples: int
+) -> tuple[float, float]:
     """Returns the largest share of the velocity and of the acceleration limits along a curve of quintics.
 
     Args: times of the points, shape (n,); coefficients, lowest power first, shape (n - 1, 6, joints); limits of shape

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Timings that also keep limits of jerk: Ruckig's along straight lines, averages or slower runs of curved motions."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -27,8 +28,9 @@ def _largest_jerks(trajectory: Trajectory) -> Array:
     c3, c4, c5 = np.moveaxis(trajectory.coefficients(), 1, 0)[3:]
     spans = np.diff(trajectory.times)[:, None]
     turns = np.clip(-0.2 * c4 / np.where(c5 == 0.0, np.inf, c5), 0.0, spans)
-    return np.max([np.abs(6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5)) for t in (0.0 * spans, turns, spans)],
-                  axis=(0, 1))
+    return np.max(
+        [np.abs(6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5)) for t in (0.0 * spans, turns, spans)], axis=(0, 1)
+    )
 
 
 def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Array, jerk: Array) -> Trajectory:
@@ -37,8 +39,9 @@ def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Arra
     return trajectory.slowed(jerk_overrun(trajectory, velocity * kept, acceleration * kept, jerk * kept))
 
 
-def _straight_line(joint_names: tuple[str, ...], start: Array, end: Array, velocity: Array, acceleration: Array,
-                   jerk: Array) -> Trajectory:
+def _straight_line(
+    joint_names: tuple[str, ...], start: Array, end: Array, velocity: Array, acceleration: Array, jerk: Array
+) -> Trajectory:
     """Ruckig's fastest motion from rest to rest along one line."""
     length = float(np.linalg.norm(end - start))
     direction = (end - start) / length
@@ -46,21 +49,27 @@ def _straight_line(joint_names: tuple[str, ...], start: Array, end: Array, veloc
     query = ruckig.InputParameter(1)
     query.current_position, query.target_position = [0.0], [length]
     query.max_velocity, query.max_acceleration, query.max_jerk = (
-        [float((limit / share).min())] for limit in (velocity, acceleration, jerk))
+        [float((limit / share).min())] for limit in (velocity, acceleration, jerk)
+    )
     found = ruckig.Trajectory(1)
     result = ruckig.Ruckig(1).calculate(query, found)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"Ruckig found no motion over {length} rad within velocity "
-                            f"{query.max_velocity}, acceleration {query.max_acceleration}, jerk {query.max_jerk}: "
-                            f"{result}")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"Ruckig found no motion over {length} rad within velocity "
+            f"{query.max_velocity}, acceleration {query.max_acceleration}, jerk {query.max_jerk}: "
+            f"{result}",
+        )
     times = point_times(np.cumsum(found.profiles[0][0].t)[:-1], float(found.duration))
     states = np.array([[item[0] for item in found.at_time(time)] for time in times.tolist()])
-    return Trajectory(joint_names, times, start + states[:, :1] * direction, states[:, 1:2] * direction,
-                      states[:, 2:] * direction)
+    return Trajectory(
+        joint_names, times, start + states[:, :1] * direction, states[:, 1:2] * direction, states[:, 2:] * direction
+    )
 
 
-def along_straight_lines(joint_names: tuple[str, ...], vertices: Array, velocity: Array, acceleration: Array,
-                         jerk: Array) -> Trajectory:
+def along_straight_lines(
+    joint_names: tuple[str, ...], vertices: Array, velocity: Array, acceleration: Array, jerk: Array
+) -> Trajectory:
     """Returns Ruckig's motion along a polyline with a stop at each of its vertices, shape (n, joints).
 
     Raises:
@@ -70,8 +79,12 @@ def along_straight_lines(joint_names: tuple[str, ...], vertices: Array, velocity
     if len(kept) < 2:
         still = np.zeros_like(kept)
         return Trajectory(joint_names, np.zeros(1), kept, still, still)
-    parts = [slowed_to_limits(_straight_line(joint_names, start, end, velocity, acceleration, jerk), velocity,
-                              acceleration, jerk) for start, end in zip(kept[:-1], kept[1:], strict=True)]
+    parts = [
+        slowed_to_limits(
+            _straight_line(joint_names, start, end, velocity, acceleration, jerk), velocity, acceleration, jerk
+        )
+        for start, end in zip(kept[:-1], kept[1:], strict=True)
+    ]
     return joined(parts)
 
 
@@ -108,5 +121,6 @@ def averaged_curve(trajectory: Trajectory, velocity: Array, acceleration: Array,
     positions = (_integrals(slower, times) - _integrals(slower, times - window)) / window
     velocities, accelerations = ((after[order] - before[order]) / window for order in (0, 1))
     positions[0], positions[-1] = trajectory.positions[0], trajectory.positions[-1]
-    return slowed_to_limits(Trajectory(trajectory.joint_names, times, positions, velocities, accelerations), velocity,
-                            acceleration, jerk)
+    return slowed_to_limits(
+        Trajectory(trajectory.joint_names, times, positions, velocities, accelerations), velocity, acceleration, jerk
+    )

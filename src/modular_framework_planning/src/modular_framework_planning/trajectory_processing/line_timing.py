@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Times the joint positions of straight lines: as fast as the joints can, with a stop only at sharp corners."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -16,8 +17,9 @@ CHECK_STEP = 0.01  # [rad or m] between the checked states of the curve
 SAME_POSITION = 1.0e-7  # [rad or m]
 
 
-def time_line(joints: tuple[str, ...], rows: Array, velocity: Array, acceleration: Array,
-              is_free: Callable[[Array], bool]) -> Trajectory:
+def time_line(
+    joints: tuple[str, ...], rows: Array, velocity: Array, acceleration: Array, is_free: Callable[[Array], bool]
+) -> Trajectory:
     """Times dense joint positions.
 
     Args:
@@ -35,8 +37,10 @@ def time_line(joints: tuple[str, ...], rows: Array, velocity: Array, acceleratio
         trajectory = parameterize(joints, vertices, corner_distances(vertices, sharpest), velocity, acceleration)
         if is_free(trajectory.curve(CHECK_STEP)):
             return trajectory
-    raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "the timed motion along the lines touches something; keep the "
-                        "lines further away from it")
+    raise PlanningError(
+        ErrorCode.INVALID_MOTION_PLAN,
+        "the timed motion along the lines touches something; keep the lines further away from it",
+    )
 
 
 def corner_distances(vertices: Array, sharpest: float) -> Array:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Slows a timed motion down where a link would move faster in space than allowed; elsewhere it keeps its pace."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -18,8 +19,9 @@ EASE_S = 0.1  # over which the pace changes, on both sides of a fast stretch
 LONGEST_SLOWED_PERIOD_S = 2.5 * LONGEST_PERIOD_S
 
 
-def link_speeds(model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array], link: str,
-                times: Array) -> Array:
+def link_speeds(
+    model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array], link: str, times: Array
+) -> Array:
     """Returns speeds of a link's origin [m/s] at some times, shape (m,).
 
     Args:
@@ -38,8 +40,9 @@ def link_speeds(model: RobotModel, trajectory: Trajectory, full_positions: Calla
         all_rates[indices] = rates
         for follower, leader, multiplier, _ in model.mimics:
             all_rates[follower] = multiplier * all_rates[leader]
-        jacobian = pin.computeFrameJacobian(model.pin_model, data, full_positions(values), frame,
-                                            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        jacobian = pin.computeFrameJacobian(
+            model.pin_model, data, full_positions(values), frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
         result[number] = np.linalg.norm(jacobian[:3] @ all_rates)
     return result
 
@@ -50,7 +53,7 @@ def _envelope(values: Array, reach: int) -> Array:
     highest = np.lib.stride_tricks.sliding_window_view(np.pad(padded, reach, mode="edge"), 2 * reach + 1).max(axis=1)
     half = reach // 2
     kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    return np.convolve(np.convolve(highest, kernel, mode="same"), kernel, mode="same")[reach:reach + len(values)]
+    return np.convolve(np.convolve(highest, kernel, mode="same"), kernel, mode="same")[reach : reach + len(values)]
 
 
 def _eased(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
@@ -59,17 +62,31 @@ def _eased(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
     pace = CubicSpline(times, _envelope(np.maximum(slowing, 1.0), reach))
     clock = pace.antiderivative()
     counts = np.ceil(np.diff(clock(trajectory.times)) / LONGEST_SLOWED_PERIOD_S).astype(int)
-    pieces = [np.linspace(low, high, max(1, count), endpoint=False)
-              for low, high, count in zip(trajectory.times[:-1], trajectory.times[1:], counts, strict=True)]
+    pieces = [
+        np.linspace(low, high, max(1, count), endpoint=False)
+        for low, high, count in zip(trajectory.times[:-1], trajectory.times[1:], counts, strict=True)
+    ]
     old = np.append(np.concatenate(pieces), trajectory.duration_s)
     positions, velocities, accelerations, _ = trajectory.at(old)
     factor, change = pace(old)[:, None], pace(old, 1)[:, None]
-    return Trajectory(trajectory.joint_names, clock(old), positions, velocities / factor,
-                      (accelerations - velocities * change / factor) / factor**2)
+    return Trajectory(
+        trajectory.joint_names,
+        clock(old),
+        positions,
+        velocities / factor,
+        (accelerations - velocities * change / factor) / factor**2,
+    )
 
 
-def with_limited_link_speed(model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array],
-                            link: str, highest: float, velocity: Array, acceleration: Array) -> Trajectory:
+def with_limited_link_speed(
+    model: RobotModel,
+    trajectory: Trajectory,
+    full_positions: Callable[[Array], Array],
+    link: str,
+    highest: float,
+    velocity: Array,
+    acceleration: Array,
+) -> Trajectory:
     """Returns the motion along the same curve with the link at or below a speed at every sample.
 
     Args:

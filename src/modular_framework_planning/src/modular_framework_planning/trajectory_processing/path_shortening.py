@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes a planner's path short and straight: leaves out vertices, cuts corners, while the motion stays free."""
+
 from __future__ import annotations
 
 import time
@@ -41,8 +42,14 @@ def _point_at(path: Array, lengths: Array, position: float) -> tuple[int, Array]
     return number, path[number] + share * (path[number + 1] - path[number])
 
 
-def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator,
-                attempts: int = 60, patience: int = 20) -> Array:
+def cut_corners(
+    path: Array,
+    edge_is_free: EdgeTest,
+    deadline: float,
+    rng: np.random.Generator,
+    attempts: int = 60,
+    patience: int = 20,
+) -> Array:
     """Joins random pairs of points of the path directly where that is shorter and free.
 
     Args:
@@ -65,7 +72,7 @@ def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.ra
         if first == last or gain < 0.01 * lengths[-1] or not edge_is_free(start, end):
             failures += 1
             continue
-        path = np.vstack([path[:first + 1], start, end, path[last + 1:]])
+        path = np.vstack([path[: first + 1], start, end, path[last + 1 :]])
         failures = 0
     return without_repeats(path)
 

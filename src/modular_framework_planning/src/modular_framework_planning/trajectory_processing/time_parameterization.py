@@ -6,6 +6,7 @@ without swinging over the limits. So the motion is averaged over a short time wi
 are within limits, and the acceleration becomes continuous. Points are set where its slope jumps, so that the
 controller's quintics follow it exactly on straight pieces and nearly so in rounded corners.
 """
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -42,13 +43,15 @@ def point_times(wanted: Array, end: float, longest_period_s: float = LONGEST_PER
 
 def overrun(trajectory: Trajectory, velocity: Array, acceleration: Array) -> float:
     """Returns how many times slower the curve through the points must run to keep the limits; 1 where it keeps them."""
-    fastest, hardest = largest_shares(trajectory.times, trajectory.coefficients(), velocity, acceleration,
-                                      SAMPLES_PER_SEGMENT)
+    fastest, hardest = largest_shares(
+        trajectory.times, trajectory.coefficients(), velocity, acceleration, SAMPLES_PER_SEGMENT
+    )
     return max(1.0, fastest, float(np.sqrt(hardest)))
 
 
-def _section(joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, acceleration: Array,
-             longest_period_s: float) -> Trajectory:
+def _section(
+    joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, acceleration: Array, longest_period_s: float
+) -> Trajectory:
     """Times one section from rest to rest."""
     pieces = path.pieces()
     motion = fastest_motion(pieces, velocity, acceleration, GRID_STEP, MIN_INTERVALS)
@@ -65,12 +68,20 @@ def _section(joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, a
 def _sections(vertices: Array, blends: Array) -> list[BlendedPath]:
     """Cuts the polyline at the corners where the motion stops."""
     stops = [0, *(number + 1 for number, blend in enumerate(blends) if blend <= 0.0), len(vertices) - 1]
-    return [BlendedPath(vertices[low:high + 1], blends[low:high - 1])
-            for low, high in zip(stops[:-1], stops[1:], strict=True)]
+    return [
+        BlendedPath(vertices[low : high + 1], blends[low : high - 1])
+        for low, high in zip(stops[:-1], stops[1:], strict=True)
+    ]
 
 
-def parameterize(joint_names: tuple[str, ...], vertices: Array, blends: Array, velocity: Array,
-                 acceleration: Array, longest_period_s: float = LONGEST_PERIOD_S) -> Trajectory:
+def parameterize(
+    joint_names: tuple[str, ...],
+    vertices: Array,
+    blends: Array,
+    velocity: Array,
+    acceleration: Array,
+    longest_period_s: float = LONGEST_PERIOD_S,
+) -> Trajectory:
     """Times a polyline with blended corners.
 
     Args:
@@ -88,25 +99,39 @@ def parameterize(joint_names: tuple[str, ...], vertices: Array, blends: Array, v
     Raises:
         PlanningError: a limit is not above 0.
     """
-    if not (np.isfinite(velocity).all() and np.isfinite(acceleration).all() and (velocity > 0).all()
-            and (acceleration > 0).all()):
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"velocity limits {velocity.tolist()} and acceleration "
-                            f"limits {acceleration.tolist()}: all must be finite and above 0")
+    if not (
+        np.isfinite(velocity).all()
+        and np.isfinite(acceleration).all()
+        and (velocity > 0).all()
+        and (acceleration > 0).all()
+    ):
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"velocity limits {velocity.tolist()} and acceleration "
+            f"limits {acceleration.tolist()}: all must be finite and above 0",
+        )
     if len(vertices) < 2:
         still = np.zeros_like(vertices)
         return Trajectory(joint_names, np.zeros(1), vertices.copy(), still, still.copy())
     kept = 1.0 - MARGIN
-    return joined([_section(joint_names, section, velocity * kept, acceleration * kept, longest_period_s)
-                   for section in _sections(vertices, blends)])
+    return joined(
+        [
+            _section(joint_names, section, velocity * kept, acceleration * kept, longest_period_s)
+            for section in _sections(vertices, blends)
+        ]
+    )
 
 
 def joined(parts: Sequence[Trajectory]) -> Trajectory:
     """Returns one trajectory of several that follow each other, from rest to rest each."""
     ends = np.cumsum([0.0, *(part.duration_s for part in parts)])
-    times = np.concatenate([parts[0].times, *(part.times[1:] + end
-                                              for part, end in zip(parts[1:], ends[1:-1], strict=True))])
-    columns = [np.concatenate([getattr(parts[0], name), *(getattr(part, name)[1:] for part in parts[1:])])
-               for name in ("positions", "velocities", "accelerations")]
+    times = np.concatenate(
+        [parts[0].times, *(part.times[1:] + end for part, end in zip(parts[1:], ends[1:-1], strict=True))]
+    )
+    columns = [
+        np.concatenate([getattr(parts[0], name), *(getattr(part, name)[1:] for part in parts[1:])])
+        for name in ("positions", "velocities", "accelerations")
+    ]
     return Trajectory(parts[0].joint_names, np.round(times, 9), *columns)
 
 

@@ -4,6 +4,7 @@
 A JointTrajectoryController joins points that give positions, velocities and accelerations by quintic polynomials:
 limits hold for the robot only if they hold along that curve, not just at the points.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -43,10 +44,17 @@ class Trajectory:
         way = np.diff(self.positions, axis=0) / span
         v0, v1 = self.velocities[:-1], self.velocities[1:]
         a0, a1 = self.accelerations[:-1] * span, self.accelerations[1:] * span
-        return np.stack([self.positions[:-1], v0, 0.5 * a0 / span,
-                         (10.0 * way - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1) / span**2,
-                         (-15.0 * way + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1) / span**3,
-                         (6.0 * way - 3.0 * v0 - 3.0 * v1 - 0.5 * a0 + 0.5 * a1) / span**4], axis=1)
+        return np.stack(
+            [
+                self.positions[:-1],
+                v0,
+                0.5 * a0 / span,
+                (10.0 * way - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1) / span**2,
+                (-15.0 * way + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1) / span**3,
+                (6.0 * way - 3.0 * v0 - 3.0 * v1 - 0.5 * a0 + 0.5 * a1) / span**4,
+            ],
+            axis=1,
+        )
 
     def at(self, times: Array) -> tuple[Array, Array, Array, Array]:
         """Returns positions, velocities, accelerations and jerks of the curve at some times, shape (m, joints) each."""
@@ -54,10 +62,12 @@ class Trajectory:
             still = np.zeros((len(times), self.positions.shape[1]))
             return still + self.positions[0], still, still, still
         t, (c0, c1, c2, c3, c4, c5) = self._pieces_at(times)
-        return (c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
-                c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
-                2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
-                6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
+        return (
+            c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
+            c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
+            2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
+            6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5),
+        )
 
     def positions_at(self, times: Array) -> Array:
         """Returns positions of the curve at some times, shape (m, joints); the motion has two points at least."""
@@ -78,9 +88,11 @@ class Trajectory:
         """Returns positions along the curve, neighbours about `step` [rad or m, any joint] apart or nearer."""
         if len(self.times) < 2:
             return self.positions
-        reach = np.maximum(np.abs(np.diff(self.positions, axis=0)).max(axis=1),
-                           np.diff(self.times) * np.maximum(np.abs(self.velocities[:-1]).max(axis=1),
-                                                            np.abs(self.velocities[1:]).max(axis=1)))
+        reach = np.maximum(
+            np.abs(np.diff(self.positions, axis=0)).max(axis=1),
+            np.diff(self.times)
+            * np.maximum(np.abs(self.velocities[:-1]).max(axis=1), np.abs(self.velocities[1:]).max(axis=1)),
+        )
         counts = np.maximum(1, np.ceil(reach / step)).astype(int)
         places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         times = np.repeat(self.times[:-1], counts) + places * np.repeat(np.diff(self.times) / counts, counts)
@@ -102,7 +114,7 @@ class Trajectory:
             is_bent |= np.abs(offsets - along).max(axis=1, initial=0.0) > STRAIGHT
         bent = first + np.flatnonzero(is_bent[first:])
         runs = np.split(bent, np.flatnonzero(np.diff(bent) > 1) + 1) if len(bent) else []
-        return [self.positions[run[0]:run[-1] + 2] for run in runs]
+        return [self.positions[run[0] : run[-1] + 2] for run in runs]
 
     def slowed(self, factor: float) -> Trajectory:
         """Returns the same curve run `factor` times slower; its times are whole nanoseconds, as messages carry them."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The marker in RViz by which a user drags the goal of the tip, and the menu on it."""
+
 from __future__ import annotations
 
 import math
@@ -65,8 +66,9 @@ class GoalMarker:
 
         def tick(feedback: Any) -> None:
             for handle in handles:
-                menu.setCheckState(handle, MenuHandler.CHECKED if handle == feedback.menu_entry_id
-                                   else MenuHandler.UNCHECKED)
+                menu.setCheckState(
+                    handle, MenuHandler.CHECKED if handle == feedback.menu_entry_id else MenuHandler.UNCHECKED
+                )
             menu.reApply(self._server)
             self._server.applyChanges()
             choice.select(handles[feedback.menu_entry_id])
@@ -80,13 +82,19 @@ class GoalMarker:
         ball = Marker(type=Marker.SPHERE)
         ball.scale.x = ball.scale.y = ball.scale.z = 0.25 * scale_m
         ball.color.r, ball.color.g, ball.color.b, ball.color.a = 0.2, 0.6, 1.0, 0.6
-        marker.controls.append(InteractiveMarkerControl(
-            name="menu", interaction_mode=InteractiveMarkerControl.MENU, always_visible=True, markers=[ball]))
+        marker.controls.append(
+            InteractiveMarkerControl(
+                name="menu", interaction_mode=InteractiveMarkerControl.MENU, always_visible=True, markers=[ball]
+            )
+        )
         for axis, turn in AXES.items():
-            for name, mode in (("move", InteractiveMarkerControl.MOVE_AXIS),
-                               ("rotate", InteractiveMarkerControl.ROTATE_AXIS)):
-                marker.controls.append(InteractiveMarkerControl(name=f"{name}_{axis}", orientation=turn,
-                                                                interaction_mode=mode))
+            for name, mode in (
+                ("move", InteractiveMarkerControl.MOVE_AXIS),
+                ("rotate", InteractiveMarkerControl.ROTATE_AXIS),
+            ):
+                marker.controls.append(
+                    InteractiveMarkerControl(name=f"{name}_{axis}", orientation=turn, interaction_mode=mode)
+                )
         self._server.insert(marker, self._on_feedback)
         self._menu.apply(self._server, NAME)
         self._server.applyChanges()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Drag a goal in RViz, see whether the robot can be there, plan and execute: MoveIt's panel by stock displays."""
+
 from __future__ import annotations
 
 import textwrap
@@ -52,14 +53,21 @@ class InteractiveGoal:
         self._groups = [group.name for group in model.groups.values() if group.is_chain]
         wanted = str(rospy.get_param("~group", "") or next(iter(self._groups), ""))
         if wanted not in self._groups:
-            raise ModelError(f"{rospy.resolve_name('~group')} is '{wanted}'; groups with a tip to drag: "
-                             f"{', '.join(self._groups) or 'none'}")
+            raise ModelError(
+                f"{rospy.resolve_name('~group')} is '{wanted}'; groups with a tip to drag: "
+                f"{', '.join(self._groups) or 'none'}"
+            )
         self._group: JointGroup = model.group(wanted)
-        self._options = MotionOptions(*(float(rospy.get_param(f"~{name}", default)) for name, default in (
-            ("planning_time", 5.0), ("velocity_scaling", 0.0), ("acceleration_scaling", 0.0))))
+        self._options = MotionOptions(
+            *(
+                float(rospy.get_param(f"~{name}", default))
+                for name, default in (("planning_time", 5.0), ("velocity_scaling", 0.0), ("acceleration_scaling", 0.0))
+            )
+        )
         self._marker = GoalMarker(rospy.resolve_name("~marker"), self._on_drag)
-        self._ghosts = {name: rospy.Publisher(f"~{name}_ghost", MarkerArray, queue_size=1, latch=True)
-                        for name in ("goal", "start")}
+        self._ghosts = {
+            name: rospy.Publisher(f"~{name}_ghost", MarkerArray, queue_size=1, latch=True) for name in ("goal", "start")
+        }
         self._goal: Array = model.default_positions()
         self._start: RobotState | None = None
         self._trajectory: Any = None
@@ -77,24 +85,38 @@ class InteractiveGoal:
         self._fill_menu()
         self._show_goal()
         self._marker.show(self._model.planning_frame, self._tip_pose(), float(rospy.get_param("~marker_scale", 0.25)))
-        for topic, command in (("plan", self.plan), ("execute", self.execute), ("stop", self.stop),
-                               ("update_start_state", self.set_start_to_current),
-                               ("update_goal_state", self.set_goal_to_current)):
+        for topic, command in (
+            ("plan", self.plan),
+            ("execute", self.execute),
+            ("stop", self.stop),
+            ("update_start_state", self.set_start_to_current),
+            ("update_goal_state", self.set_goal_to_current),
+        ):
             rospy.Subscriber(f"/rviz/moveit/{topic}", Empty, lambda _, run=command: run(), queue_size=5)
-        for topic, take in (("update_custom_start_state", self._take_start), ("update_custom_goal_state",
-                                                                              self._take_goal)):
+        for topic, take in (
+            ("update_custom_start_state", self._take_start),
+            ("update_custom_goal_state", self._take_goal),
+        ):
             rospy.Subscriber(f"/rviz/moveit/{topic}", RobotState, self._on_state, callback_args=take, queue_size=5)
         threading.Thread(target=self._follow_drags, daemon=True).start()
 
     # ---------------------------------------------------------------- what the menu does
     def _fill_menu(self) -> None:
         """Offers commands, the planners of the group and the groups."""
-        planners = [f"{pipeline}: {planner}" if pipeline else planner
-                    for pipeline, planner in self._client.planners(self._group.name)]
-        commands = {"Plan": self.plan, "Execute": self.execute, "Plan and execute": self.plan_and_execute,
-                    "Stop": self.stop, "Random valid goal": self.set_random_goal,
-                    "Goal: current state": self.set_goal_to_current, "Start: current state": self.set_start_to_current,
-                    "Start: follow the robot": self.follow_robot}
+        planners = [
+            f"{pipeline}: {planner}" if pipeline else planner
+            for pipeline, planner in self._client.planners(self._group.name)
+        ]
+        commands = {
+            "Plan": self.plan,
+            "Execute": self.execute,
+            "Plan and execute": self.plan_and_execute,
+            "Stop": self.stop,
+            "Random valid goal": self.set_random_goal,
+            "Goal: current state": self.set_goal_to_current,
+            "Start: current state": self.set_start_to_current,
+            "Start: follow the robot": self.follow_robot,
+        }
         choices = [Choice("Planner", [DEFAULT_PLANNER, *planners], self._choose_planner)]
         if len(self._groups) > 1:
             order = [self._group.name, *(name for name in self._groups if name != self._group.name)]
@@ -136,8 +158,9 @@ class InteractiveGoal:
 
     def _choose_planner(self, entry: str) -> None:
         pipeline, _, planner = entry.rpartition(": ")
-        self._options = replace(self._options, pipeline_id=pipeline,
-                                planner_id="" if entry == DEFAULT_PLANNER else planner)
+        self._options = replace(
+            self._options, pipeline_id=pipeline, planner_id="" if entry == DEFAULT_PLANNER else planner
+        )
         self._set_status(f"planner: {entry}")
 
     def _choose_group(self, name: str) -> None:
@@ -175,8 +198,9 @@ class InteractiveGoal:
             self._drag_changed.wait_for(lambda: self._dragged is None and not self._solving, DRAG_TIMEOUT_S)
         goal = {name: float(self._goal[self._model.index[name]]) for name in self._group.joints}
         self._trajectory = None
-        self._trajectory = self._client.plan(self._group.name, self._start or RobotState(is_diff=True), goal,
-                                             self._options)
+        self._trajectory = self._client.plan(
+            self._group.name, self._start or RobotState(is_diff=True), goal, self._options
+        )
         points = self._trajectory.joint_trajectory.points
         self._set_status(f"planned: {points[-1].time_from_start.to_sec() if points else 0.0:.1f} s")
         return True
@@ -231,8 +255,9 @@ class InteractiveGoal:
         for avoid in (True, False):
             found = self._client.solve_ik(self._group.name, self._group.tip_link, target, seed, avoid)
             if found is not None:
-                positions = self._model.merge(self._goal, {name: value for name, value in found.items()
-                                                           if name in self._model.index})
+                positions = self._model.merge(
+                    self._goal, {name: value for name, value in found.items() if name in self._model.index}
+                )
                 problem = "" if avoid else self._client.problem_of(self._group.name, self._state_of(positions))
                 self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
                 return
@@ -250,8 +275,10 @@ class InteractiveGoal:
     def _take_start(self, state: RobotState) -> None:
         positions = self._positions_of(state)
         self._start, self._trajectory = state, None
-        publish(self._ghosts["start"], _numbered([
-            Marker(action=Marker.DELETEALL), *robot_markers(self._model, positions, "start", START_COLOR)]))
+        publish(
+            self._ghosts["start"],
+            _numbered([Marker(action=Marker.DELETEALL), *robot_markers(self._model, positions, "start", START_COLOR)]),
+        )
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
         self._goal, self._goal_color, self._trajectory = positions, color, None
@@ -265,10 +292,13 @@ class InteractiveGoal:
         self._show_goal()
 
     def _show_goal(self) -> None:
-        markers = [Marker(action=Marker.DELETEALL),
-                   *robot_markers(self._model, self._goal, "goal", self._goal_color)]
-        text = Marker(type=Marker.TEXT_VIEW_FACING, ns="status",
-                      text="\n".join(textwrap.wrap(self._status, TEXT_WIDTH)[:TEXT_LINES]), pose=self._tip_pose())
+        markers = [Marker(action=Marker.DELETEALL), *robot_markers(self._model, self._goal, "goal", self._goal_color)]
+        text = Marker(
+            type=Marker.TEXT_VIEW_FACING,
+            ns="status",
+            text="\n".join(textwrap.wrap(self._status, TEXT_WIDTH)[:TEXT_LINES]),
+            pose=self._tip_pose(),
+        )
         text.header.frame_id = self._model.planning_frame
         text.pose.position.z += TEXT_ABOVE_TIP_M
         text.scale.z = 0.04
@@ -280,8 +310,9 @@ class InteractiveGoal:
         return pose_message(self._model.link_transforms(self._goal)[self._group.tip_link])
 
     def _positions_of(self, state: RobotState) -> Array:
-        values: Mapping[str, float] = joint_values(self._model, state.joint_state.name, state.joint_state.position,
-                                                   "robot state")
+        values: Mapping[str, float] = joint_values(
+            self._model, state.joint_state.name, state.joint_state.position, "robot state"
+        )
         return self._model.merge(self._goal, values)
 
     def _state_of(self, positions: Array) -> RobotState:

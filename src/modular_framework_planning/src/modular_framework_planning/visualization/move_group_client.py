@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a user interface asks of a move_group node, over the wire only, so that any move_group will do."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -48,7 +49,7 @@ def planners_of_group(planner_ids: Sequence[str], group: str) -> list[str]:
 
     They are those of entries `group[planner]` or, where the group has none, the entries for any group.
     """
-    own = [name[len(group) + 1:-1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")]
+    own = [name[len(group) + 1 : -1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")]
     return own or [name for name in planner_ids if not name.endswith("]")]
 
 
@@ -75,29 +76,46 @@ class MoveGroupClient:
             try:
                 service.wait_for_service(timeout_s)
             except rospy.ROSException as error:
-                raise PlanningError(ErrorCode.COMMUNICATION_FAILURE, f"service {service.resolved_name} was not offered "
-                                    f"within {timeout_s:.0f} s; is move_group running?") from error
+                raise PlanningError(
+                    ErrorCode.COMMUNICATION_FAILURE,
+                    f"service {service.resolved_name} was not offered within {timeout_s:.0f} s; is move_group running?",
+                ) from error
         for name, client in ((names.MOVE_ACTION, self._move), (names.EXECUTE_ACTION, self._execute)):
             if not client.wait_for_server(rospy.Duration(timeout_s)):
-                raise PlanningError(ErrorCode.COMMUNICATION_FAILURE, f"action {rospy.resolve_name(name)} was not "
-                                    f"offered within {timeout_s:.0f} s; is move_group running?")
+                raise PlanningError(
+                    ErrorCode.COMMUNICATION_FAILURE,
+                    f"action {rospy.resolve_name(name)} was not "
+                    f"offered within {timeout_s:.0f} s; is move_group running?",
+                )
 
     def state(self) -> RobotState:
         """Returns the current state."""
-        parts = PlanningSceneComponents(PlanningSceneComponents.ROBOT_STATE
-                                        | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
+        parts = PlanningSceneComponents(
+            PlanningSceneComponents.ROBOT_STATE | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
+        )
         return self._scene(parts).scene.robot_state
 
     def planners(self, group: str) -> list[tuple[str, str]]:
         """Returns pairs of pipeline_id and planner_id that a group may ask for."""
-        return [(item.pipeline_id, planner) for item in self._planners().planner_interfaces
-                for planner in planners_of_group(item.planner_ids, group)]
+        return [
+            (item.pipeline_id, planner)
+            for item in self._planners().planner_interfaces
+            for planner in planners_of_group(item.planner_ids, group)
+        ]
 
-    def solve_ik(self, group: str, link: str, target: PoseStamped, seed: RobotState,
-                 avoid_collisions: bool) -> dict[str, float] | None:
+    def solve_ik(
+        self, group: str, link: str, target: PoseStamped, seed: RobotState, avoid_collisions: bool
+    ) -> dict[str, float] | None:
         """Returns the joint positions that bring a link to a pose, nearest to the seed; None where there are none."""
-        answer = self._ik(PositionIKRequest(group_name=group, ik_link_name=link, pose_stamped=target, robot_state=seed,
-                                            avoid_collisions=avoid_collisions))
+        answer = self._ik(
+            PositionIKRequest(
+                group_name=group,
+                ik_link_name=link,
+                pose_stamped=target,
+                robot_state=seed,
+                avoid_collisions=avoid_collisions,
+            )
+        )
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             return None
         return dict(zip(answer.solution.joint_state.name, answer.solution.joint_state.position, strict=True))
@@ -122,8 +140,14 @@ class MoveGroupClient:
         request.num_planning_attempts, request.allowed_planning_time = 1, options.allowed_time_s
         request.max_velocity_scaling_factor = options.velocity_scaling
         request.max_acceleration_scaling_factor = options.acceleration_scaling
-        request.goal_constraints = [Constraints(name="goal", joint_constraints=[
-            JointConstraint(name, value, GOAL_TOLERANCE, GOAL_TOLERANCE, 1.0) for name, value in goal.items()])]
+        request.goal_constraints = [
+            Constraints(
+                name="goal",
+                joint_constraints=[
+                    JointConstraint(name, value, GOAL_TOLERANCE, GOAL_TOLERANCE, 1.0) for name, value in goal.items()
+                ],
+            )
+        ]
         result = self._ask(self._move, message, options.allowed_time_s + EXECUTION_MARGIN_S)
         return result.planned_trajectory
 

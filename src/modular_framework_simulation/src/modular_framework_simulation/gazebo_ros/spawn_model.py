@@ -79,8 +79,10 @@ def _wait_for_model(model: str) -> None:
     _wait_for_service(ros_names.GET_WORLD_PROPERTIES)
     world = rospy.ServiceProxy(ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties)
     if not wait_for_start(lambda: model in world().model_names, f"model '{model}' of the simulation"):
-        raise SpawnError(f"model '{model}' did not appear within {start_timeout():g} s (parameter /start_timeout); "
-                         "spawn it first, or correct the name after -wait")
+        raise SpawnError(
+            f"model '{model}' did not appear within {start_timeout():g} s (parameter /start_timeout); "
+            "spawn it first, or correct the name after -wait"
+        )
 
 
 def _wait_for_service(name: str) -> None:
@@ -92,8 +94,10 @@ def _wait_for_service(name: str) -> None:
         return True
 
     if not wait_for_start(advertised, f"service '{name}' of the simulation"):
-        raise SpawnError(f"service '{name}' was not advertised within {start_timeout():g} s (parameter "
-                         "/start_timeout); start the simulation")
+        raise SpawnError(
+            f"service '{name}' was not advertised within {start_timeout():g} s (parameter "
+            "/start_timeout); start the simulation"
+        )
 
 
 def _call(name: str, kind: Any, *values: Any) -> Any:

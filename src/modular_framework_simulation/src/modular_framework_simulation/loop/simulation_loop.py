@@ -188,8 +188,9 @@ class SimulationLoop:
         for finger in robot.fingers:
             contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
             # The engine also lists bodies that are near each other and do not press.
-            touched.append({each.model for each in contacts
-                            if each.force > 0.0 and not self.world.body(each.model).static})
+            touched.append(
+                {each.model for each in contacts if each.force > 0.0 and not self.world.body(each.model).static}
+            )
         self.grasp_watch.update(self._time_s(), touched)
 
     def held_object(self) -> HeldObject | None:

@@ -114,8 +114,11 @@ class ConvexParts:
             scratch.rename(folder)
         except OSError as error:
             if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
-                raise DescriptionError(str(folder), f"cannot be written ({error.strerror})",
-                                       "free space, or set ROS_HOME to a folder that has some") from error
+                raise DescriptionError(
+                    str(folder),
+                    f"cannot be written ({error.strerror})",
+                    "free space, or set ROS_HOME to a folder that has some",
+                ) from error
         finally:
             shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
 

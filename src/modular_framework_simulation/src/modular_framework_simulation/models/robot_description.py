@@ -106,8 +106,9 @@ def read_robot(
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
     """Lets every mimic joint follow the joint that drives its chain of mimic joints."""
     try:
-        mimics = resolved({joint.name: joint.mimic for joint in joints if joint.mimic is not None},
-                          [joint.name for joint in joints])
+        mimics = resolved(
+            {joint.name: joint.mimic for joint in joints if joint.mimic is not None}, [joint.name for joint in joints]
+        )
     except ValueError as error:
         where, _, problem = str(error).partition(": ")
         raise DescriptionError(f"robot_description: {where}", *problem.split("; ", 1)) from error
@@ -120,8 +121,9 @@ def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
     for transmission in robot.transmissions:
         for joint in transmission.joints:
             if not joint.interfaces:
-                where = (f"robot_description:{joint.line}: <transmission name='{transmission.name}'>, "
-                         f"joint '{joint.name}'")
+                where = (
+                    f"robot_description:{joint.line}: <transmission name='{transmission.name}'>, joint '{joint.name}'"
+                )
                 raise DescriptionError(where, "has no <hardwareInterface>", "name the position, velocity or effort one")
             interfaces[joint.name] = interfaces.get(joint.name, ()) + tuple(each.text for each in joint.interfaces)
     return interfaces
@@ -151,9 +153,7 @@ def _joint(joint: Joint, interfaces: tuple[str, ...]) -> RobotJoint:
     )
 
 
-def _rewrite_meshes(
-    root: Element, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool
-) -> None:
+def _rewrite_meshes(root: Element, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool) -> None:
     for link in root.findall("link"):
         if not with_visuals:
             for visual in link.findall("visual"):

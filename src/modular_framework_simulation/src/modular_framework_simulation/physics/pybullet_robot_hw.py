@@ -169,5 +169,3 @@ def _limits(joint: RobotJoint) -> JointLimits:
         max_effort=joint.effort,
         continuous=joint.lower == float("-inf"),
     )
-
-

@@ -188,8 +188,10 @@ class RobotBody:
                 target = joint.mimic.multiplier * leader + joint.mimic.offset
                 effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
             # The drive adds the velocity that corrects the position to the one fed forward; the sum stays in bounds.
-            ahead, behind = (max(0.0, speed) * step_s / _POSITION_GAIN
-                             for speed in (joint.velocity - velocity, joint.velocity + velocity))
+            ahead, behind = (
+                max(0.0, speed) * step_s / _POSITION_GAIN
+                for speed in (joint.velocity - velocity, joint.velocity + velocity)
+            )
             indices.append(self._indices[rank])
             targets.append(max(position - behind, min(position + ahead, target)))
             velocities.append(velocity)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task say what the manipulator may touch while the next motions are planned."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -14,11 +15,15 @@ from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.manager_clients import ManagerError
 
-MODIFICATIONS = {"": GetModifiedACMRequest.NOTHING,
-                 "self-collision": GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION,
-                 "object-collision": GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION}
-OF_LINKS = {"self-collision": ModifyACMRequest.ROBOT_SELF_COLLISION,
-            "object-collision": ModifyACMRequest.ROBOT_OBJECT_COLLISION}
+MODIFICATIONS = {
+    "": GetModifiedACMRequest.NOTHING,
+    "self-collision": GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION,
+    "object-collision": GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION,
+}
+OF_LINKS = {
+    "self-collision": ModifyACMRequest.ROBOT_SELF_COLLISION,
+    "object-collision": ModifyACMRequest.ROBOT_OBJECT_COLLISION,
+}
 Objects = Annotated[Sequence[str] | str, Key("input", "selected_grasp", when=FROM_USERDATA)]
 SERVICE_TIMEOUT_S = 10.0
 
@@ -38,10 +43,17 @@ class AllowManipulatorCollisions(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, allow: bool, collision_type: Literal["", "self-collision", "object-collision"] = "",
-                 objects: Objects = (), links: Sequence[str] = (),
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        allow: bool,
+        collision_type: Literal["", "self-collision", "object-collision"] = "",
+        objects: Objects = (),
+        links: Sequence[str] = (),
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if links and not collision_type:
             raise ValueError("AllowManipulatorCollisions: links are of use with a collision_type only; give one")
@@ -53,11 +65,17 @@ class AllowManipulatorCollisions(FrameworkState):
         try:
             objects = self._named_objects(userdata)
             if self._links:
-                _ask("modify_acm", ModifyACM, ModifyACMRequest(OF_LINKS[self._type], self._links, objects, self._allow,
-                                                               True))
+                _ask(
+                    "modify_acm",
+                    ModifyACM,
+                    ModifyACMRequest(OF_LINKS[self._type], self._links, objects, self._allow, True),
+                )
                 return self.succeed()
-            answer = _ask("get_modified_acm", GetModifiedACM,
-                          GetModifiedACMRequest(MODIFICATIONS[self._type], objects, self._allow))
+            answer = _ask(
+                "get_modified_acm",
+                GetModifiedACM,
+                GetModifiedACMRequest(MODIFICATIONS[self._type], objects, self._allow),
+            )
             apply_matrix(answer.acm, SERVICE_TIMEOUT_S)
         except (ManagerError, CallError) as error:
             return self.fail(str(error))
@@ -67,12 +85,16 @@ class AllowManipulatorCollisions(FrameworkState):
         if self._objects != [FROM_USERDATA]:
             return self._objects
         if "selected_grasp" not in self.get_registered_input_keys():
-            raise ManagerError("the object is to be taken from userdata, but 'selected_grasp' is not among the input "
-                               f"keys {sorted(self.get_registered_input_keys())}")
+            raise ManagerError(
+                "the object is to be taken from userdata, but 'selected_grasp' is not among the input "
+                f"keys {sorted(self.get_registered_input_keys())}"
+            )
         name = userdata.selected_grasp.object_id if userdata.selected_grasp is not None else ""
         if not name:
-            raise ManagerError("userdata 'selected_grasp' names no object; select a grasp with an object_id first, or "
-                               "give the objects by name")
+            raise ManagerError(
+                "userdata 'selected_grasp' names no object; select a grasp with an object_id first, or "
+                "give the objects by name"
+            )
         return [name]
 
 

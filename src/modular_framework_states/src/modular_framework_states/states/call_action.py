@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task send a goal to any action server."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -45,11 +46,21 @@ class CallAction(FrameworkState):
             ``result`` receives the result when it is listed.
     """
 
-    def __init__(self, action_name: str, goal: MessageFields | None = None, expect: MessageFields | None = None,
-                 timeout: NotNegative = 60.0, server_timeout: NotNegative = 10.0, outcome_field: str = "",
-                 outcome_values: OutcomeValues | None = None, keep: KeptFields | None = None,
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        action_name: str,
+        goal: MessageFields | None = None,
+        expect: MessageFields | None = None,
+        timeout: NotNegative = 60.0,
+        server_timeout: NotNegative = 10.0,
+        outcome_field: str = "",
+        outcome_values: OutcomeValues | None = None,
+        keep: KeptFields | None = None,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._name, self._goal, self._expected = str(action_name), dict(goal or {}), dict(expect or {})
         self._timeout_s, self._server_timeout_s = float(timeout), float(server_timeout)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task call any service."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -41,11 +42,20 @@ class CallService(FrameworkState):
             ``response`` receives the answer when it is listed.
     """
 
-    def __init__(self, service_name: str, request: MessageFields | None = None, expect: MessageFields | None = None,
-                 timeout: NotNegative = 10.0, outcome_field: str = "", outcome_values: OutcomeValues | None = None,
-                 keep: KeptFields | None = None,
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        service_name: str,
+        request: MessageFields | None = None,
+        expect: MessageFields | None = None,
+        timeout: NotNegative = 10.0,
+        outcome_field: str = "",
+        outcome_values: OutcomeValues | None = None,
+        keep: KeptFields | None = None,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._name, self._request, self._expected = str(service_name), dict(request or {}), dict(expect or {})
         self._timeout_s = float(timeout)
@@ -56,10 +66,12 @@ class CallService(FrameworkState):
         """Calls the service and checks the answer."""
         name = rospy.resolve_name(self._name)
         try:
-            if not wait_until(lambda: rosservice.get_service_type(name) is not None or self.preempt_requested(),
-                              self._timeout_s, 0.1):
-                return self.fail(f"service '{name}' was not advertised within {self._timeout_s} s; start the node that "
-                                 "offers it")
+            if not wait_until(
+                lambda: rosservice.get_service_type(name) is not None or self.preempt_requested(), self._timeout_s, 0.1
+            ):
+                return self.fail(
+                    f"service '{name}' was not advertised within {self._timeout_s} s; start the node that offers it"
+                )
             if self.preempt_requested():
                 return self.stopped()
             service_type = rosservice.get_service_class_by_name(name)
@@ -81,5 +93,7 @@ class CallService(FrameworkState):
 
 def _reason_in(answer: Any) -> str:
     """Returns the reason an answer gives in its fields."""
-    return next((str(getattr(answer, text)) for text in ("message", "status_message") if getattr(answer, text, "")),
-                "it gave no reason")
+    return next(
+        (str(getattr(answer, text)) for text in ("message", "status_message") if getattr(answer, text, "")),
+        "it gave no reason",
+    )

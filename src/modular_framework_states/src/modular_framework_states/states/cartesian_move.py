@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task move the tip of the arm along a straight line."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -38,18 +39,27 @@ class CartesianMove(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, pose_name: Annotated[str, Named("pose")] = "", offset: Vector | None = None,
-                 offset_in_tip: bool = False,
-                 max_step: Annotated[float, Limits(above=0.0, at_most=1000.0)] = 0.01, min_fraction: Share = 1.0,
-                 speed: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 0.0, avoid_collisions: bool = True,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
+    def __init__(
+        self,
+        pose_name: Annotated[str, Named("pose")] = "",
+        offset: Vector | None = None,
+        offset_in_tip: bool = False,
+        max_step: Annotated[float, Limits(above=0.0, at_most=1000.0)] = 0.01,
+        min_fraction: Share = 1.0,
+        speed: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 0.0,
+        avoid_collisions: bool = True,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("arm_commander",),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if bool(pose_name) == (offset is not None):
             raise ValueError("CartesianMove: give either pose_name or offset")
         self._pose_name, self._offset, self._in_tip = pose_name, offset, offset_in_tip
-        self._request = GetCartesianPathRequest(max_step=float(max_step), avoid_collisions=bool(avoid_collisions),
-                                                max_cartesian_speed=float(speed))
+        self._request = GetCartesianPathRequest(
+            max_step=float(max_step), avoid_collisions=bool(avoid_collisions), max_cartesian_speed=float(speed)
+        )
         self._min_fraction = float(min_fraction)
 
     def execute(self, userdata: Any) -> str:
@@ -63,9 +73,11 @@ class CartesianMove(FrameworkState):
         if self.preempt_requested():
             return self.stopped()
         if answer.fraction < self._min_fraction - 1e-9 or not answer.solution.joint_trajectory.points:
-            return self.fail(f"straight line: only {answer.fraction:.1%} of it can be moved "
-                             f"({error_name(answer.error_code.val)}), needed are {self._min_fraction:.1%}; the log of "
-                             "move_group says where it ends and why")
+            return self.fail(
+                f"straight line: only {answer.fraction:.1%} of it can be moved "
+                f"({error_name(answer.error_code.val)}), needed are {self._min_fraction:.1%}; the log of "
+                "move_group says where it ends and why"
+            )
         result = commander.execute_plan(answer.solution, stop_requested=self.preempt_requested)
         if self.preempt_requested():
             return self.stopped()
@@ -78,8 +90,10 @@ class CartesianMove(FrameworkState):
         request = GetPositionFKRequest(fk_link_names=[link], robot_state=robot_state(commander.current_joints()))
         answer = _call("compute_fk", GetPositionFK, request)
         if not answer.pose_stamped:
-            raise CallError(f"'{rospy.resolve_name('compute_fk')}' does not know where link '{link}' is: "
-                            f"{error_name(answer.error_code.val)}")
+            raise CallError(
+                f"'{rospy.resolve_name('compute_fk')}' does not know where link '{link}' is: "
+                f"{error_name(answer.error_code.val)}"
+            )
         return moved(answer.pose_stamped[0], self._offset, self._in_tip)
 
     def _path(self, commander: Any, target: PoseStamped) -> Any:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task remove an object from the simulation."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -21,8 +22,14 @@ class DeleteObject(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, object_name: str, outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        object_name: str,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._object_name = object_name
 

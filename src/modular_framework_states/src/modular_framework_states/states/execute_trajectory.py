@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task run a trajectory that was written down, not planned."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -40,10 +41,16 @@ class ExecuteTrajectory(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, trajectory_name: Annotated[str, Named("trajectory")] = "", step: NotNegative = 0.05,
-                 goal_tolerance: Positive = 0.03,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
+    def __init__(
+        self,
+        trajectory_name: Annotated[str, Named("trajectory")] = "",
+        step: NotNegative = 0.05,
+        goal_tolerance: Positive = 0.03,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("arm_commander",),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._name, self._step, self._goal_tolerance = trajectory_name, float(step), float(goal_tolerance)
 
@@ -83,8 +90,10 @@ class ExecuteTrajectory(FrameworkState):
             answer = call_service(proxy, request, TIMEOUT_S)
             if not answer.valid:
                 pairs = sorted({f"'{item.contact_body_1}' with '{item.contact_body_2}'" for item in answer.contacts})
-                return (f"on the way to point {number} the robot would be in collision "
-                        f"({', '.join(pairs[:3]) or 'move_group says only that the state is not valid'})")
+                return (
+                    f"on the way to point {number} the robot would be in collision "
+                    f"({', '.join(pairs[:3]) or 'move_group says only that the state is not valid'})"
+                )
         return ""
 
 
@@ -97,13 +106,16 @@ def from_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> J
     unknown = [joint for joint in trajectory.joint_names if joint not in current]
     lengths = {len(point.positions) for point in trajectory.points}
     if not trajectory.points or unknown or lengths != {len(trajectory.joint_names)}:
-        raise ValueError(f"it has {len(trajectory.points)} points of {sorted(lengths)} positions for "
-                         f"{len(trajectory.joint_names)} joints, and the joints {unknown} are none of the arm's: "
-                         f"{', '.join(current)}")
+        raise ValueError(
+            f"it has {len(trajectory.points)} points of {sorted(lengths)} positions for "
+            f"{len(trajectory.joint_names)} joints, and the joints {unknown} are none of the arm's: "
+            f"{', '.join(current)}"
+        )
     if trajectory.points[0].time_from_start.to_sec() <= 0.0:
         return trajectory
-    start = JointTrajectoryPoint(positions=[current[joint] for joint in trajectory.joint_names],
-                                 time_from_start=rospy.Duration(0))
+    start = JointTrajectoryPoint(
+        positions=[current[joint] for joint in trajectory.joint_names], time_from_start=rospy.Duration(0)
+    )
     return JointTrajectory(joint_names=trajectory.joint_names, points=[start, *trajectory.points])
 
 
@@ -120,8 +132,10 @@ def too_fast(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
         needed = {joint: way / limits[joint] for joint, way in zip(trajectory.joint_names, ways, strict=True)}
         slowest = max(needed, key=needed.__getitem__)
         if needed[slowest] > time_s:
-            return (f"joint '{slowest}' has {time_s:.2f} s to get to point {number} and needs {needed[slowest]:.2f} s "
-                    f"at its greatest velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time")
+            return (
+                f"joint '{slowest}' has {time_s:.2f} s to get to point {number} and needs {needed[slowest]:.2f} s "
+                f"at its greatest velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time"
+            )
     return ""
 
 

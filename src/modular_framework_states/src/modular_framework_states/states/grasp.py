@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task open, close or keep the manipulator as a grasp message says."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -25,10 +26,16 @@ class Grasp(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, grasp_type: Stage, grasp_name: str = "", timeout: Positive = 60.0,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (),
-                 io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
+    def __init__(
+        self,
+        grasp_type: Stage,
+        grasp_name: str = "",
+        timeout: Positive = 60.0,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque"),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._type, self._name, self._timeout_s = grasp_type, grasp_name, float(timeout)
 
@@ -36,8 +43,14 @@ class Grasp(FrameworkState):
         """Sends the goal and waits for its end."""
         try:
             grasp = self._grasp(userdata)
-            send(userdata.manipulator_controller_client, self._type, grasp, userdata.max_torque, self._timeout_s,
-                 self.preempt_requested)
+            send(
+                userdata.manipulator_controller_client,
+                self._type,
+                grasp,
+                userdata.max_torque,
+                self._timeout_s,
+                self.preempt_requested,
+            )
         except (ManagerError, GraspGoalError) as error:
             return self.fail(f"{self._type} of grasp '{self._name or 'selected'}' was not reached: {error}")
         return self.succeed()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task open or close the manipulator without a grasp message."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -28,11 +29,18 @@ class Gripper(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, posture: Annotated[str, Named("posture")] = "",
-                 positions: Mapping[str, Finite] | None = None, grip: bool = False,
-                 torque: Share = 1.0, timeout: Positive = 30.0, outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
-                 io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
+    def __init__(
+        self,
+        posture: Annotated[str, Named("posture")] = "",
+        positions: Mapping[str, Finite] | None = None,
+        grip: bool = False,
+        torque: Share = 1.0,
+        timeout: Positive = 30.0,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque"),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if bool(posture) == bool(positions):
             raise ValueError("Gripper: give either posture or positions")
@@ -46,8 +54,14 @@ class Gripper(FrameworkState):
         try:
             positions = self._positions or posture_positions(self._posture)
             grasp = posture_grasp(positions, self._torque)
-            send(userdata.manipulator_controller_client, self._stage, grasp, userdata.max_torque, self._timeout_s,
-                 self.preempt_requested)
+            send(
+                userdata.manipulator_controller_client,
+                self._stage,
+                grasp,
+                userdata.max_torque,
+                self._timeout_s,
+                self.preempt_requested,
+            )
         except (RobotModelError, GraspGoalError) as error:
             return self.fail(f"gripper to {wanted}: {error}")
         return self.succeed()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task note a figure of its run."""
+
 from __future__ import annotations
 
 import json
@@ -31,16 +32,25 @@ class LogMetric(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, name_of_metric: str, value: Finite | None = None, from_key: Annotated[str, Key("input")] = "",
-                 unit: str = "",
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        name_of_metric: str,
+        value: Finite | None = None,
+        from_key: Annotated[str, Key("input")] = "",
+        unit: str = "",
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         if (value is None) == (not from_key):
             raise ValueError("LogMetric: give either value or from_key")
         if from_key and from_key not in self.get_registered_input_keys():
-            raise ValueError(f"LogMetric: from_key is '{from_key}', which is none of the input keys "
-                             f"{sorted(self.get_registered_input_keys())}; add it to input_keys")
+            raise ValueError(
+                f"LogMetric: from_key is '{from_key}', which is none of the input keys "
+                f"{sorted(self.get_registered_input_keys())}; add it to input_keys"
+            )
         self._metric, self._value, self._key, self._unit = str(name_of_metric), value, from_key, unit
         self._publisher = rospy.Publisher(TOPIC, String, queue_size=100, latch=True)
 
@@ -49,7 +59,8 @@ class LogMetric(FrameworkState):
         value = userdata[self._key] if self._key else self._value
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             return self.fail(f"metric '{self._metric}' is {value!r}; a finite number is needed")
-        self._publisher.publish(String(json.dumps(
-            {"name": self._metric, "value": value, "unit": self._unit, "time": rospy.get_time()})))
+        self._publisher.publish(
+            String(json.dumps({"name": self._metric, "value": value, "unit": self._unit, "time": rospy.get_time()}))
+        )
         rospy.loginfo("metric %s = %s %s", self._metric, value, self._unit)
         return self.succeed()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task execute a plan, and makes sure that the arm got where the plan ends."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -26,10 +27,16 @@ class Move(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, plan_name: Annotated[str, Named("plan")] = "", start_tolerance: NotNegative = 0.02,
-                 goal_tolerance: NotNegative = 0.03,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
+    def __init__(
+        self,
+        plan_name: Annotated[str, Named("plan")] = "",
+        start_tolerance: NotNegative = 0.02,
+        goal_tolerance: NotNegative = 0.03,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("arm_commander",),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._plan_name = plan_name
         self._start_tolerance, self._goal_tolerance = float(start_tolerance), float(goal_tolerance)
@@ -47,8 +54,10 @@ class Move(FrameworkState):
         first = dict(zip(trajectory.joint_names, trajectory.points[0].positions, strict=False))
         away = worst_joint(commander.positions_of(first), first)
         if away[1] > self._start_tolerance:
-            return self.fail(f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
-                             f"its first point, allowed is {self._start_tolerance}; plan again from the current state")
+            return self.fail(
+                f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
+                f"its first point, allowed is {self._start_tolerance}; plan again from the current state"
+            )
         return run_to_end(self, commander, plan, self._goal_tolerance, f"plan '{self._plan_name}'")
 
     def _plan(self, userdata: Any) -> Any:

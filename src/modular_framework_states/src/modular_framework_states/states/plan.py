@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task plan an arm motion now and execute it later."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -41,12 +42,19 @@ class Plan(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, target_state_type: StateType, target_state_name: TargetName = "",
-                 plan_name: Annotated[str, Named("plan", made=True)] = "",
-                 starting_state_type: StateType | Literal[""] = "", starting_state_name: StartName = "",
-                 group: Annotated[str, Named("group")] = "",
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ("arm_commander",)) -> None:
+    def __init__(
+        self,
+        target_state_type: StateType,
+        target_state_name: TargetName = "",
+        plan_name: Annotated[str, Named("plan", made=True)] = "",
+        starting_state_type: StateType | Literal[""] = "",
+        starting_state_name: StartName = "",
+        group: Annotated[str, Named("group")] = "",
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("arm_commander",),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._target_type, self._target_name = target_state_type, target_state_name
         self._start_type, self._start_name = starting_state_type, starting_state_name
@@ -102,11 +110,14 @@ class Plan(FrameworkState):
         kind = kind_of(state_type)
         if name != FROM_USERDATA:
             return fetch(kind, name)
-        keys = [key for key in (f"selected_{state_type}", f"selected_{kind}")
-                if key in self.get_registered_input_keys()]
+        keys = [
+            key for key in (f"selected_{state_type}", f"selected_{kind}") if key in self.get_registered_input_keys()
+        ]
         if not keys:
-            raise ManagerError(f"the {state_type} is to be taken from userdata, but 'selected_{kind}' is not among the "
-                               f"input keys {sorted(self.get_registered_input_keys())}")
+            raise ManagerError(
+                f"the {state_type} is to be taken from userdata, but 'selected_{kind}' is not among the "
+                f"input keys {sorted(self.get_registered_input_keys())}"
+            )
         message = getattr(userdata, keys[0])
         if message is None:
             raise ManagerError(f"userdata '{keys[0]}' is empty; select a message before planning with it")
@@ -124,8 +135,10 @@ def joint_values(message: Any, name: str) -> dict[str, float]:
         ManagerError: The message has no positions, or not one for each name.
     """
     if not message.name or len(message.name) != len(message.position):
-        raise ManagerError(f"joint state '{name}' has {len(message.name)} names and {len(message.position)} positions; "
-                           "it needs as many of each, at least one")
+        raise ManagerError(
+            f"joint state '{name}' has {len(message.name)} names and {len(message.position)} positions; "
+            "it needs as many of each, at least one"
+        )
     return dict(zip(message.name, message.position, strict=True))
 
 

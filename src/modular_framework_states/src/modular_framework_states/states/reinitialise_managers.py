@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task reset the managers to the configuration."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -20,8 +21,14 @@ class ReinitialiseManagers(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, kinds: Sequence[Kind] = (), outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        kinds: Sequence[Kind] = (),
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._kinds = tuple(kinds) or all_kinds()
 

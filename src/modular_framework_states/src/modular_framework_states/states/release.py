@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task let go of what the manipulator holds."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -35,10 +36,15 @@ class Release(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
     """
 
-    def __init__(self, posture: Annotated[str, Named("posture")] = "open", timeout: Positive = 30.0,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (),
-                 io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque")) -> None:
+    def __init__(
+        self,
+        posture: Annotated[str, Named("posture")] = "open",
+        timeout: Positive = 30.0,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque"),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._posture, self._timeout_s = posture, float(timeout)
 
@@ -46,8 +52,14 @@ class Release(FrameworkState):
         """Opens the fingers and detaches what they held."""
         try:
             grasp = posture_grasp(posture_positions(self._posture), 1.0)
-            send(userdata.manipulator_controller_client, "pregrasp", grasp, userdata.max_torque, self._timeout_s,
-                 self.preempt_requested)
+            send(
+                userdata.manipulator_controller_client,
+                "pregrasp",
+                grasp,
+                userdata.max_torque,
+                self._timeout_s,
+                self.preempt_requested,
+            )
             if rospy.get_param(SIMULATION_PARAMETER, False):
                 wait_until(lambda: self.preempt_requested() or not held_objects(), self._timeout_s, SCENE_PERIOD_S)
             elif held := held_objects():
@@ -58,7 +70,9 @@ class Release(FrameworkState):
         except (RobotModelError, GraspGoalError, CallError) as error:
             return self.fail(f"release by the posture '{self._posture}': {error}")
         if left:
-            return self.fail(f"the fingers are open ('{self._posture}'), but the planning scene still has "
-                             f"{', '.join(left)} attached to {', '.join(sorted(set(left.values())))} after "
-                             f"{self._timeout_s:g} s; check what keeps it between the fingers")
+            return self.fail(
+                f"the fingers are open ('{self._posture}'), but the planning scene still has "
+                f"{', '.join(left)} attached to {', '.join(sorted(set(left.values())))} after "
+                f"{self._timeout_s:g} s; check what keeps it between the fingers"
+            )
         return self.succeed()

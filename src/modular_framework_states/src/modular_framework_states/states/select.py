@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task choose the message its next states work with."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -9,8 +10,9 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_uses import Key, Named, kind_of
 from modular_framework_states.manager_clients import ManagerError, fetch
 
-MessageType = Annotated[Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"],
-                        Key("output", "selected_{}")]
+MessageType = Annotated[
+    Literal["joint_state", "trajectory", "plan", "pose", "pregrasp", "grasp", "postgrasp"], Key("output", "selected_{}")
+]
 Names = Annotated[Sequence[str] | str | None, Named("option:message_type")]
 
 
@@ -30,9 +32,15 @@ class Select(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, message_type: MessageType, message_names: Names = None,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        message_type: MessageType,
+        message_names: Names = None,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._kind = kind_of(message_type)
         self._key = f"selected_{self._kind}"
@@ -43,8 +51,10 @@ class Select(FrameworkState):
     def execute(self, userdata: Any) -> str:
         """Takes the next message."""
         if self._key not in self.get_registered_output_keys():
-            return self.fail(f"the key '{self._key}' is not among the output keys {sorted(self._output_keys)}; add it, "
-                             "or the message goes nowhere")
+            return self.fail(
+                f"the key '{self._key}' is not among the output keys {sorted(self._output_keys)}; add it, "
+                "or the message goes nowhere"
+            )
         if self._next >= len(self._names):
             self._next = 0
             return self.fail(f"all {len(self._names)} names were used: {', '.join(self._names)}")

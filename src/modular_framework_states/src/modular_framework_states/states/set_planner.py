@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task choose how its next motions are planned."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -25,17 +26,25 @@ class SetPlanner(FrameworkState):
         io_keys: Userdata that is read and written; must hold ``arm_commander``.
     """
 
-    def __init__(self, planner_id: str = "",
-                 planning_time: Annotated[float, Limits(above=0.0, at_most=86400.0)] | None = None,
-                 attempts: Annotated[int, Limits(at_least=1)] | None = None, speed_factor: Share | None = None,
-                 group: Annotated[str, Named("group")] = "",
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
-                 io_keys: Sequence[str] = ("arm_commander",)) -> None:
+    def __init__(
+        self,
+        planner_id: str = "",
+        planning_time: Annotated[float, Limits(above=0.0, at_most=86400.0)] | None = None,
+        attempts: Annotated[int, Limits(at_least=1)] | None = None,
+        speed_factor: Share | None = None,
+        group: Annotated[str, Named("group")] = "",
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = ("arm_commander",),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._planner_id, self._group = planner_id, group
-        self._settings = {"set_planning_time": planning_time, "set_num_planning_attempts": attempts,
-                          "set_max_velocity_scaling_factor": speed_factor}
+        self._settings = {
+            "set_planning_time": planning_time,
+            "set_num_planning_attempts": attempts,
+            "set_max_velocity_scaling_factor": speed_factor,
+        }
 
     def execute(self, userdata: Any) -> str:
         """Sets what was given, if there is such a planner."""

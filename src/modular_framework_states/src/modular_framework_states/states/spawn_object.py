@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task add an object to the simulation."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -28,10 +29,18 @@ class SpawnObject(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, object_type: str, object_name: str = "", position: Vector = (0.0, 0.0, 0.0),
-                 orientation: Vector = (0.0, 0.0, 0.0), reference_frame: str = "world",
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        object_type: str,
+        object_name: str = "",
+        position: Vector = (0.0, 0.0, 0.0),
+        orientation: Vector = (0.0, 0.0, 0.0),
+        reference_frame: str = "world",
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._object_type, self._object_name = object_type, object_name or object_type
         self._position, self._orientation = tuple(position), tuple(orientation)
@@ -40,8 +49,16 @@ class SpawnObject(FrameworkState):
     def execute(self, userdata: Any) -> str:
         """Spawns the object."""
         try:
-            spawn(request_to_spawn(self._object_name, self._object_type, self._position, self._orientation, self._frame,
-                                   str(rospy.get_param("gazebo_model_path", ""))))
+            spawn(
+                request_to_spawn(
+                    self._object_name,
+                    self._object_type,
+                    self._position,
+                    self._orientation,
+                    self._frame,
+                    str(rospy.get_param("gazebo_model_path", "")),
+                )
+            )
         except (ObjectRequestError, RefusedError) as error:
             return self.fail(f"object '{self._object_name}': {error}")
         return self.succeed()

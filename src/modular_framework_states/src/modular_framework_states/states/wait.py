@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task pause."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -24,9 +25,15 @@ class Wait(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, duration: NotNegative, timeout: Positive | None = None,
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        duration: NotNegative,
+        timeout: Positive | None = None,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._duration_s = float(duration)
         self._timeout_s = 3.0 * self._duration_s + 10.0 if timeout is None else float(timeout)
@@ -39,5 +46,7 @@ class Wait(FrameworkState):
         if self.preempt_requested():
             return self.stopped()
         passed = (rospy.Time.now() - begun).to_sec()
-        return self.fail(f"only {passed:.2f} of {self._duration_s} s passed on the robot's clock within "
-                         f"{self._timeout_s:.1f} s; is the simulation paused or slow?")
+        return self.fail(
+            f"only {passed:.2f} of {self._duration_s} s passed on the robot's clock within "
+            f"{self._timeout_s:.1f} s; is the simulation paused or slow?"
+        )

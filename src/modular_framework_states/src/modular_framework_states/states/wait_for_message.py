@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task wait for a message of any type."""
+
 from __future__ import annotations
 
 import time
@@ -32,9 +33,16 @@ class WaitForMessage(FrameworkState):
             ``message`` receives the message when it is listed.
     """
 
-    def __init__(self, topic_name: str, timeout: Positive | None = None, expect: MessageFields | None = None,
-                 outcomes: Sequence[str] = ("success", "fail"),
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        topic_name: str,
+        timeout: Positive | None = None,
+        expect: MessageFields | None = None,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)

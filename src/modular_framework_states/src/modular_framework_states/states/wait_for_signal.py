@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lets a task wait until another component says that it has done its part."""
+
 from __future__ import annotations
 
 import threading
@@ -30,26 +31,38 @@ class WaitForSignal(FrameworkState):
         io_keys: Userdata that is read and written.
     """
 
-    def __init__(self, topic_name: str, timeout: Positive | None = None,
-                 outcomes: Sequence[str] = ("success", "fail"), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), io_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        topic_name: str,
+        timeout: Positive | None = None,
+        outcomes: Sequence[str] = ("success", "fail"),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
+    ) -> None:
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._lock = threading.Lock()
         self._signal: bool | None = None
         self._explanation = ""
-        self._subscribers = [rospy.Subscriber(self._topic, Bool, self._on_signal, queue_size=10),
-                             rospy.Subscriber(f"{self._topic}/reason", String, self._on_reason, queue_size=10)]
+        self._subscribers = [
+            rospy.Subscriber(self._topic, Bool, self._on_signal, queue_size=10),
+            rospy.Subscriber(f"{self._topic}/reason", String, self._on_reason, queue_size=10),
+        ]
 
     def execute(self, userdata: Any) -> str:
         """Waits for a signal that was not read yet."""
         if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
             publishers = self._subscribers[0].get_num_connections()
-            hint = (f"the log of its {publishers} publishers says what they wait for" if publishers else
-                    "no node publishes it, start the one that does")
-            return self.fail(f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s; "
-                             f"{hint}")
+            hint = (
+                f"the log of its {publishers} publishers says what they wait for"
+                if publishers
+                else "no node publishes it, start the one that does"
+            )
+            return self.fail(
+                f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s; {hint}"
+            )
         with self._lock:
             signal, self._signal = self._signal, None
         if signal:

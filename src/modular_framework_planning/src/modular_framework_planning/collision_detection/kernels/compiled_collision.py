@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The bodies of a robot and around it as compiled loops see them: where they are and how far apart."""
+
 from __future__ import annotations
 
 from typing import Any, NamedTuple
@@ -92,11 +93,14 @@ def place_bodies(world, placements, out, centres, still=True):  # type: ignore[n
             else:
                 a, b, c = placements[joint, row, 0], placements[joint, row, 1], placements[joint, row, 2]
                 for column in range(4):
-                    out[body, row, column] = (a * at[body, 0, column] + b * at[body, 1, column]
-                                              + c * at[body, 2, column])
+                    out[body, row, column] = a * at[body, 0, column] + b * at[body, 1, column] + c * at[body, 2, column]
                 out[body, row, 3] += placements[joint, row, 3]
-            centres[body, row] = (out[body, row, 0] * spheres[body, 0] + out[body, row, 1] * spheres[body, 1]
-                                  + out[body, row, 2] * spheres[body, 2] + out[body, row, 3])
+            centres[body, row] = (
+                out[body, row, 0] * spheres[body, 0]
+                + out[body, row, 1] * spheres[body, 1]
+                + out[body, row, 2] * spheres[body, 2]
+                + out[body, row, 3]
+            )
 
 
 @njit(cache=True, nogil=True)
@@ -116,22 +120,48 @@ def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no
     """Returns (status, lower bound of the pair's distance less its margin, at most `limit`)."""
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     margin = world.margins[pair]
-    gap = np.sqrt((centres[first, 0] - centres[second, 0]) ** 2 + (centres[first, 1] - centres[second, 1]) ** 2
-                  + (centres[first, 2] - centres[second, 2]) ** 2)
+    gap = np.sqrt(
+        (centres[first, 0] - centres[second, 0]) ** 2
+        + (centres[first, 1] - centres[second, 1]) ** 2
+        + (centres[first, 2] - centres[second, 2]) ** 2
+    )
     if gap - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
         return CLEAR, limit
     relative_pose(poses[first], poses[second], relative)
     surface = world.scene if world.is_environment[first] else world.robot
     if world.kinds[second] != SURFACE:
         size = world.sizes[second]
-        status, bound = surface_to_solid(surface.spheres, surface.boxes, surface.links, surface.triangles,
-                                         world.roots[first], relative, world.kinds[second], size[0], size[1], size[2],
-                                         margin, limit)
+        status, bound = surface_to_solid(
+            surface.spheres,
+            surface.boxes,
+            surface.links,
+            surface.triangles,
+            world.roots[first],
+            relative,
+            world.kinds[second],
+            size[0],
+            size[1],
+            size[2],
+            margin,
+            limit,
+        )
     else:
         other = world.scene if world.is_environment[second] else world.robot
         status, bound = surface_to_surface(
-            surface.spheres, surface.boxes, surface.links, surface.triangles, world.roots[first],
-            other.spheres, other.boxes, other.links, other.triangles, world.roots[second], relative, margin, limit)
+            surface.spheres,
+            surface.boxes,
+            surface.links,
+            surface.triangles,
+            world.roots[first],
+            other.spheres,
+            other.boxes,
+            other.links,
+            other.triangles,
+            world.roots[second],
+            relative,
+            margin,
+            limit,
+        )
     if status == TOUCHING and not world.exact[pair]:
         status = TOO_CLOSE
     return status, bound
@@ -154,19 +184,22 @@ def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
     for row in range(3):
         local[row] = 0.0
         for axis in range(3):
-            value = (one[axis, 0] * corner[0] + one[axis, 1] * corner[1] + one[axis, 2] * corner[2] + one[axis, 3]
-                     - two[axis, 3])
+            value = (
+                one[axis, 0] * corner[0]
+                + one[axis, 1] * corner[1]
+                + one[axis, 2] * corner[2]
+                + one[axis, 3]
+                - two[axis, 3]
+            )
             local[row] += two[axis, row] * value
     if world.kinds[outer] != SURFACE:
         size = world.sizes[outer]
         return solid_distance(world.kinds[outer], size[0], size[1], size[2], local[0], local[1], local[2]) < -ROUNDING
     sphere = world.spheres[outer]
-    if ((local[0] - sphere[0]) ** 2 + (local[1] - sphere[1]) ** 2 + (local[2] - sphere[2]) ** 2
-            > sphere[3] * sphere[3]):
+    if (local[0] - sphere[0]) ** 2 + (local[1] - sphere[1]) ** 2 + (local[2] - sphere[2]) ** 2 > sphere[3] * sphere[3]:
         return False
     surface = world.scene if world.is_environment[outer] else world.robot
-    return encloses(surface.spheres, surface.links, surface.triangles, world.roots[outer],
-                    local[0], local[1], local[2])
+    return encloses(surface.spheres, surface.links, surface.triangles, world.roots[outer], local[0], local[1], local[2])
 
 
 @njit(cache=True, nogil=True)
@@ -175,10 +208,16 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
     pairs, exact, spheres = world.pairs, world.exact, world.spheres
     for pair in range(len(pairs)):
         first, second = pairs[pair, 0], pairs[pair, 1]
-        x, y, z = (centres[first, 0] - centres[second, 0], centres[first, 1] - centres[second, 1],
-                   centres[first, 2] - centres[second, 2])
-        if (exact[pair] and np.sqrt(x * x + y * y + z * z) < spheres[first, 3] + spheres[second, 3]
-                and (_contains(world, first, second, poses) or _contains(world, second, first, poses))):
+        x, y, z = (
+            centres[first, 0] - centres[second, 0],
+            centres[first, 1] - centres[second, 1],
+            centres[first, 2] - centres[second, 2],
+        )
+        if (
+            exact[pair]
+            and np.sqrt(x * x + y * y + z * z) < spheres[first, 3] + spheres[second, 3]
+            and (_contains(world, first, second, poses) or _contains(world, second, first, poses))
+        ):
             return pair
     return -1
 
@@ -189,15 +228,54 @@ def arguments(world: World) -> tuple[NDArray[Any], ...]:
 
 
 @njit(cache=True, nogil=True)
-def world_of(parents, placements, axes, prismatic, joints, poses, roots, is_environment,  # type: ignore[no-untyped-def]
-             kinds, sizes, spheres, closed, robot_spheres, robot_boxes, robot_links, robot_triangles,
-             scene_spheres, scene_boxes, scene_links, scene_triangles, pairs, margins, exact,
-             tables, table_joints, table_of):
+def world_of(  # type: ignore[no-untyped-def]
+    parents,
+    placements,
+    axes,
+    prismatic,
+    joints,
+    poses,
+    roots,
+    is_environment,
+    kinds,
+    sizes,
+    spheres,
+    closed,
+    robot_spheres,
+    robot_boxes,
+    robot_links,
+    robot_triangles,
+    scene_spheres,
+    scene_boxes,
+    scene_links,
+    scene_triangles,
+    pairs,
+    margins,
+    exact,
+    tables,
+    table_joints,
+    table_of,
+):
     """Puts the arrays that `arguments` gives together again."""
-    return World(Tree(parents, placements, axes, prismatic), joints, poses, roots, is_environment, kinds, sizes,
-                 spheres, closed, Surfaces(robot_spheres, robot_boxes, robot_links, robot_triangles),
-                 Surfaces(scene_spheres, scene_boxes, scene_links, scene_triangles), pairs, margins, exact, tables,
-                 table_joints, table_of)
+    return World(
+        Tree(parents, placements, axes, prismatic),
+        joints,
+        poses,
+        roots,
+        is_environment,
+        kinds,
+        sizes,
+        spheres,
+        closed,
+        Surfaces(robot_spheres, robot_boxes, robot_links, robot_triangles),
+        Surfaces(scene_spheres, scene_boxes, scene_links, scene_triangles),
+        pairs,
+        margins,
+        exact,
+        tables,
+        table_joints,
+        table_of,
+    )
 
 
 @njit(cache=True, nogil=True)

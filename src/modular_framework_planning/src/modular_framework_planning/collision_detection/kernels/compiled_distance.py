@@ -5,6 +5,7 @@ A body is a tree of spheres over its triangles, or a solid whose distance to a p
 answer is a lower bound of the true distance; an answer of 0 says whether a common point was found or the bodies are
 merely too close to tell.
 """
+
 from __future__ import annotations
 
 import numpy as np
@@ -91,8 +92,11 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
     for corner in range(3):
         for row in range(3):
             pieces[0, 3 * corner + row] = (
-                pose[row, 0] * triangle[3 * corner] + pose[row, 1] * triangle[3 * corner + 1]
-                + pose[row, 2] * triangle[3 * corner + 2] + pose[row, 3])
+                pose[row, 0] * triangle[3 * corner]
+                + pose[row, 1] * triangle[3 * corner + 1]
+                + pose[row, 2] * triangle[3 * corner + 2]
+                + pose[row, 3]
+            )
     depth, work, status = 1, 0, CLEAR
     while depth > 0:
         depth -= 1
@@ -103,8 +107,9 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
         cx, cy, cz = (t[0] + t[3] + t[6]) / 3.0, (t[1] + t[4] + t[7]) / 3.0, (t[2] + t[5] + t[8]) / 3.0
         radius = 0.0
         for corner in range(3):
-            radius = max(radius, (t[3 * corner] - cx) ** 2 + (t[3 * corner + 1] - cy) ** 2
-                         + (t[3 * corner + 2] - cz) ** 2)
+            radius = max(
+                radius, (t[3 * corner] - cx) ** 2 + (t[3 * corner + 1] - cy) ** 2 + (t[3 * corner + 2] - cz) ** 2
+            )
         radius = np.sqrt(radius)
         centre = solid_distance(kind, p0, p1, p2, cx, cy, cz) - margin
         if centre - radius >= limit:
@@ -171,8 +176,20 @@ def _box_to_box(box, other, pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def surface_to_solid(spheres, boxes, links, triangles, root, pose,  # type: ignore[no-untyped-def]
-                     kind, p0, p1, p2, margin, limit):
+def surface_to_solid(  # type: ignore[no-untyped-def]
+    spheres,
+    boxes,
+    links,
+    triangles,
+    root,
+    pose,
+    kind,
+    p0,
+    p1,
+    p2,
+    margin,
+    limit,
+):
     """Bounds the distance of a surface from a solid.
 
     Args:
@@ -219,9 +236,15 @@ def surface_to_solid(spheres, boxes, links, triangles, root, pose,  # type: igno
 @njit(cache=True, nogil=True)
 def _centre_distance(spheres, node, pose, kind, p0, p1, p2):  # type: ignore[no-untyped-def]
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
-    return solid_distance(kind, p0, p1, p2, pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
-                          pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
-                          pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3])
+    return solid_distance(
+        kind,
+        p0,
+        p1,
+        p2,
+        pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
+        pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
+        pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3],
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -230,12 +253,26 @@ def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-u
     return np.sqrt(
         (pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_spheres[other, 0]) ** 2
         + (pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3] - other_spheres[other, 1]) ** 2
-        + (pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3] - other_spheres[other, 2]) ** 2)
+        + (pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3] - other_spheres[other, 2]) ** 2
+    )
 
 
 @njit(cache=True, nogil=True)
-def surface_to_surface(spheres, boxes, links, triangles, root,  # type: ignore[no-untyped-def]
-                       other_spheres, other_boxes, other_links, other_triangles, other_root, pose, margin, limit):
+def surface_to_surface(  # type: ignore[no-untyped-def]
+    spheres,
+    boxes,
+    links,
+    triangles,
+    root,
+    other_spheres,
+    other_boxes,
+    other_links,
+    other_triangles,
+    other_root,
+    pose,
+    margin,
+    limit,
+):
     """Bounds the distance of two surfaces; `pose` (3, 4) is the first one's in the frame of the other."""
     stack = np.empty((STACK, 2), np.int32)
     bounds = np.empty(STACK)
@@ -248,8 +285,9 @@ def surface_to_surface(spheres, boxes, links, triangles, root,  # type: ignore[n
             continue
         leaf, other_leaf = links[node, 0] < 0, other_links[other, 0] < 0
         if leaf and other_leaf:
-            distance = _triangle_to_triangle(triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]],
-                                             margin)
+            distance = _triangle_to_triangle(
+                triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]], margin
+            )
             if distance <= ROUNDING:
                 return (TOUCHING if distance <= 0.0 else TOO_CLOSE), 0.0
             limit = min(limit, distance)
@@ -285,15 +323,31 @@ def _triangle_to_triangle(triangle, pose, other, margin):  # type: ignore[no-unt
     for corner in range(3):
         for row in range(3):
             corners[3 * corner + row] = (
-                pose[row, 0] * triangle[3 * corner] + pose[row, 1] * triangle[3 * corner + 1]
-                + pose[row, 2] * triangle[3 * corner + 2] + pose[row, 3])
+                pose[row, 0] * triangle[3 * corner]
+                + pose[row, 1] * triangle[3 * corner + 1]
+                + pose[row, 2] * triangle[3 * corner + 2]
+                + pose[row, 3]
+            )
     return triangle_distance(corners, other) - margin
 
 
 @njit(cache=True, nogil=True)
-def surfaces_stay_apart(spheres, boxes, links, triangles, root,  # type: ignore[no-untyped-def]
-                        other_spheres, other_boxes, other_links, other_triangles, other_root,
-                        pose, origins, axes, change):
+def surfaces_stay_apart(  # type: ignore[no-untyped-def]
+    spheres,
+    boxes,
+    links,
+    triangles,
+    root,
+    other_spheres,
+    other_boxes,
+    other_links,
+    other_triangles,
+    other_root,
+    pose,
+    origins,
+    axes,
+    change,
+):
     """Whether two surfaces stay apart while the first one turns about some axes; False also where it is too near.
 
     Args:
@@ -319,13 +373,17 @@ def surfaces_stay_apart(spheres, boxes, links, triangles, root,  # type: ignore[
             reach = np.sqrt((ay * wz - az * wy) ** 2 + (az * wx - ax * wz) ** 2 + (ax * wy - ay * wx) ** 2)
             needed += change[turn] * (reach + radius + needed)
         gap = _sphere_gap(spheres, node, other_spheres, other, pose)
-        if gap - radius - other_spheres[other, 3] >= needed or _box_to_box(
-                boxes[node], other_boxes[other], pose) >= needed:
+        if (
+            gap - radius - other_spheres[other, 3] >= needed
+            or _box_to_box(boxes[node], other_boxes[other], pose) >= needed
+        ):
             continue
         leaf, other_leaf = links[node, 0] < 0, other_links[other, 0] < 0
         if leaf and other_leaf:
-            if _triangle_to_triangle(triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]],
-                                     0.0) < needed:
+            if (
+                _triangle_to_triangle(triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]], 0.0)
+                < needed
+            ):
                 return False
             continue
         if depth > STACK - 3 or work > MOST_PAIRS:

@@ -6,6 +6,7 @@ by less than c. How far they can move is bounded by each joint's change times th
 Samples along a path are numbers until one is looked at, so that a fine step costs no more than a coarse one where the
 path is far from everything.
 """
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -102,8 +103,19 @@ def _write_reach(vertices, numbers, low, high, first, last, reach):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def _reach_of(parents, prismatic, axes, joint, until, radius,  # type: ignore[no-untyped-def]
-              centre_x, centre_y, centre_z, placements, change):
+def _reach_of(  # type: ignore[no-untyped-def]
+    parents,
+    prismatic,
+    axes,
+    joint,
+    until,
+    radius,
+    centre_x,
+    centre_y,
+    centre_z,
+    placements,
+    change,
+):
     """Bounds how far a point of a body moves [m], seen from the joint `until`, when every joint changes by `change`.
 
     Going from the body's joint to the base, the distance of the body (a sphere) from each axis can grow by what the
@@ -119,8 +131,11 @@ def _reach_of(parents, prismatic, axes, joint, until, radius,  # type: ignore[no
                 ax = placements[joint, 0, 0] * a + placements[joint, 0, 1] * b + placements[joint, 0, 2] * c
                 ay = placements[joint, 1, 0] * a + placements[joint, 1, 1] * b + placements[joint, 1, 2] * c
                 az = placements[joint, 2, 0] * a + placements[joint, 2, 1] * b + placements[joint, 2, 2] * c
-                x, y, z = (centre_x - placements[joint, 0, 3], centre_y - placements[joint, 1, 3],
-                           centre_z - placements[joint, 2, 3])
+                x, y, z = (
+                    centre_x - placements[joint, 0, 3],
+                    centre_y - placements[joint, 1, 3],
+                    centre_z - placements[joint, 2, 3],
+                )
                 reach = np.sqrt((ay * z - az * y) ** 2 + (az * x - ax * z) ** 2 + (ax * y - ay * x) ** 2)
                 moved += change[joint] * (reach + radius + moved)
         joint = parents[joint]
@@ -229,8 +244,19 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         place_bodies(world, placements, poses, centres, looked_at == 0)
         for body in range(bodies):
             if low < high and hangs_on[body] >= 0:
-                motions[body] = _reach_of(parents, prismatic, axes, hangs_on[body], -1, spheres[body, 3],
-                                          centres[body, 0], centres[body, 1], centres[body, 2], placements, change)
+                motions[body] = _reach_of(
+                    parents,
+                    prismatic,
+                    axes,
+                    hangs_on[body],
+                    -1,
+                    spheres[body, 3],
+                    centres[body, 0],
+                    centres[body, 1],
+                    centres[body, 2],
+                    placements,
+                    change,
+                )
         looked_at += 1
         if used + end - begin > len(active):
             larger = np.empty(2 * len(active), active.dtype)
@@ -256,19 +282,41 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
                     needed += motions[one] + motions[two]
                 else:
                     for body in (one, two):
-                        needed += _reach_of(parents, prismatic, axes, hangs_on[body], common, spheres[body, 3],
-                                            centres[body, 0], centres[body, 1], centres[body, 2], placements, change)
-            x, y, z = (centres[one, 0] - centres[two, 0], centres[one, 1] - centres[two, 1],
-                       centres[one, 2] - centres[two, 2])
+                        needed += _reach_of(
+                            parents,
+                            prismatic,
+                            axes,
+                            hangs_on[body],
+                            common,
+                            spheres[body, 3],
+                            centres[body, 0],
+                            centres[body, 1],
+                            centres[body, 2],
+                            placements,
+                            change,
+                        )
+            x, y, z = (
+                centres[one, 0] - centres[two, 0],
+                centres[one, 1] - centres[two, 1],
+                centres[one, 2] - centres[two, 2],
+            )
             if np.sqrt(x * x + y * y + z * z) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
                 continue
             if kinds[two] != SURFACE:
-                x, y, z = (centres[one, 0] - poses[two, 0, 3], centres[one, 1] - poses[two, 1, 3],
-                           centres[one, 2] - poses[two, 2, 3])
-                gap = solid_distance(kinds[two], sizes[two, 0], sizes[two, 1], sizes[two, 2],
-                                     poses[two, 0, 0] * x + poses[two, 1, 0] * y + poses[two, 2, 0] * z,
-                                     poses[two, 0, 1] * x + poses[two, 1, 1] * y + poses[two, 2, 1] * z,
-                                     poses[two, 0, 2] * x + poses[two, 1, 2] * y + poses[two, 2, 2] * z)
+                x, y, z = (
+                    centres[one, 0] - poses[two, 0, 3],
+                    centres[one, 1] - poses[two, 1, 3],
+                    centres[one, 2] - poses[two, 2, 3],
+                )
+                gap = solid_distance(
+                    kinds[two],
+                    sizes[two, 0],
+                    sizes[two, 1],
+                    sizes[two, 2],
+                    poses[two, 0, 0] * x + poses[two, 1, 0] * y + poses[two, 2, 0] * z,
+                    poses[two, 0, 1] * x + poses[two, 1, 1] * y + poses[two, 2, 1] * z,
+                    poses[two, 0, 2] * x + poses[two, 1, 2] * y + poses[two, 2, 2] * z,
+                )
                 if gap - spheres[one, 3] - margins[pair] >= needed:
                     continue
             status, bound = pair_bound(world, pair, poses, centres, needed, relative)

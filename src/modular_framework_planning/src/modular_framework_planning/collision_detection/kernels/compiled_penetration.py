@@ -4,6 +4,7 @@
 Each body is covered by spheres taken from its sphere tree. Where the bounds of the collision check say that a pair of
 bodies may touch, its penetration is that of the deepest sphere.
 """
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -68,10 +69,15 @@ def _pair_depth(world, cover, placed, poses, middle, first, second, reach):  # t
             continue
         if world.kinds[second] != SURFACE:
             dx, dy, dz = x - pose[0, 3], y - pose[1, 3], z - pose[2, 3]
-            distance = solid_distance(world.kinds[second], size[0], size[1], size[2],
-                                      pose[0, 0] * dx + pose[1, 0] * dy + pose[2, 0] * dz,
-                                      pose[0, 1] * dx + pose[1, 1] * dy + pose[2, 1] * dz,
-                                      pose[0, 2] * dx + pose[1, 2] * dy + pose[2, 2] * dz)
+            distance = solid_distance(
+                world.kinds[second],
+                size[0],
+                size[1],
+                size[2],
+                pose[0, 0] * dx + pose[1, 0] * dy + pose[2, 0] * dz,
+                pose[0, 1] * dx + pose[1, 1] * dy + pose[2, 1] * dz,
+                pose[0, 2] * dx + pose[1, 2] * dy + pose[2, 2] * dz,
+            )
             deepest = max(deepest, reach + radius - distance)
             continue
         for j in range(cover.starts[second], cover.starts[second + 1]):
@@ -109,6 +115,7 @@ def penetrations(world, cover, states):  # type: ignore[no-untyped-def]
                     for i in range(cover.starts[body], cover.starts[body + 1]):
                         _place(poses[body], cover.spheres[i], placed[i])
             first, second = world.pairs[pair, 0], world.pairs[pair, 1]
-            result[number] += TOUCH_COST_M + _pair_depth(world, cover, placed, poses, middles[second], first, second,
-                                                  world.margins[pair])
+            result[number] += TOUCH_COST_M + _pair_depth(
+                world, cover, placed, poses, middles[second], first, second, world.margins[pair]
+            )
     return result

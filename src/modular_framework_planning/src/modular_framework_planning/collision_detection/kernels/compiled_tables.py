@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables of what two joints do to a pair of links: filled cell by cell when a path first passes, true for good."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -48,12 +49,25 @@ def _fill_cell(world, table, pair, row, column):  # type: ignore[no-untyped-def]
             for inner in range(3):
                 origins[turn, line] += base[inner, line] * (placement[inner, 3] - base[inner, 3])
                 axes[turn, line] += base[inner, line] * (
-                    placement[inner, 0] * axis[0] + placement[inner, 1] * axis[1] + placement[inner, 2] * axis[2])
+                    placement[inner, 0] * axis[0] + placement[inner, 1] * axis[1] + placement[inner, 2] * axis[2]
+                )
     surfaces = world.robot
     apart = surfaces_stay_apart(
-        surfaces.spheres, surfaces.boxes, surfaces.links, surfaces.triangles, world.roots[first],
-        surfaces.spheres, surfaces.boxes, surfaces.links, surfaces.triangles, world.roots[second],
-        relative, origins, axes, np.full(turns, 0.5 * width * (1.0 + 1e-9)))
+        surfaces.spheres,
+        surfaces.boxes,
+        surfaces.links,
+        surfaces.triangles,
+        world.roots[first],
+        surfaces.spheres,
+        surfaces.boxes,
+        surfaces.links,
+        surfaces.triangles,
+        world.roots[second],
+        relative,
+        origins,
+        axes,
+        np.full(turns, 0.5 * width * (1.0 + 1e-9)),
+    )
     world.tables[table, row, column] = APART if apart else NEAR
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled work on triangle meshes: trees of bounding spheres, and the exact distance of two triangles."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -125,8 +126,11 @@ def _enclose(triangles, members, sphere):  # type: ignore[no-untyped-def]
         squared, far, corner = -1.0, 0, 0
         for member in members:
             for index in range(0, 9, 3):
-                distance = ((triangles[member, index] - x) ** 2 + (triangles[member, index + 1] - y) ** 2
-                            + (triangles[member, index + 2] - z) ** 2)
+                distance = (
+                    (triangles[member, index] - x) ** 2
+                    + (triangles[member, index + 1] - y) ** 2
+                    + (triangles[member, index + 2] - z) ** 2
+                )
                 if distance > squared:
                     squared, far, corner = distance, member, index
         if squared < best:
@@ -181,8 +185,11 @@ def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
         low, high = np.inf, -np.inf
         for member in members:
             for index in range(0, 9, 3):
-                value = (dx * triangles[member, index] + dy * triangles[member, index + 1]
-                         + dz * triangles[member, index + 2])
+                value = (
+                    dx * triangles[member, index]
+                    + dy * triangles[member, index + 1]
+                    + dz * triangles[member, index + 2]
+                )
                 low, high = min(low, value), max(high, value)
         box[12 + axis] = 0.5 * (high - low) + 1e-12
         middle = 0.5 * (low + high)
@@ -213,8 +220,11 @@ def _faces_distance(face, other):  # type: ignore[no-untyped-def]
     best = np.inf
     heights = np.empty(3)
     for corner in range(3):
-        heights[corner] = ((other[3 * corner] - face[0]) * nx + (other[3 * corner + 1] - face[1]) * ny
-                           + (other[3 * corner + 2] - face[2]) * nz)
+        heights[corner] = (
+            (other[3 * corner] - face[0]) * nx
+            + (other[3 * corner + 1] - face[1]) * ny
+            + (other[3 * corner + 2] - face[2]) * nz
+        )
     for corner in range(3):
         following = (corner + 1) % 3
         span = heights[corner] - heights[following]
@@ -222,9 +232,15 @@ def _faces_distance(face, other):  # type: ignore[no-untyped-def]
             continue
         share = heights[corner] / span if span != 0.0 else 0.0
         p, q = 3 * corner, 3 * following
-        if _above(face, nx, ny, nz, other[p] + share * (other[q] - other[p]),
-                  other[p + 1] + share * (other[q + 1] - other[p + 1]),
-                  other[p + 2] + share * (other[q + 2] - other[p + 2])):
+        if _above(
+            face,
+            nx,
+            ny,
+            nz,
+            other[p] + share * (other[q] - other[p]),
+            other[p + 1] + share * (other[q + 1] - other[p + 1]),
+            other[p + 2] + share * (other[q + 2] - other[p + 2]),
+        ):
             return 0.0
     for corner in range(3):
         p = 3 * corner
@@ -260,8 +276,11 @@ def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
     if across < 0.0 or across > 1.0:
         across = min(max(across, 0.0), 1.0)
         along = min(max((ab * across - aw) / aa, 0.0), 1.0) if aa > 0.0 else 0.0
-    return ((wx + along * ax - across * bx) ** 2 + (wy + along * ay - across * by) ** 2
-            + (wz + along * az - across * bz) ** 2)
+    return (
+        (wx + along * ax - across * bx) ** 2
+        + (wy + along * ay - across * by) ** 2
+        + (wz + along * az - across * bz) ** 2
+    )
 
 
 @njit(cache=True, nogil=True)

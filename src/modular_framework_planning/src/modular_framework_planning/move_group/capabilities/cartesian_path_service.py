@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Service compute_cartesian_path: straight lines through waypoints, timed, with the reason where they end early."""
+
 from __future__ import annotations
 
 import math
@@ -68,10 +69,18 @@ class CartesianPathService:
         details: dict[str, Any] = {"group": request.group_name, "fraction": 0.0}
         try:
             lines = self._read(request)
-            found = straight_line(lines.solver, lines.link, lines.scene.positions, lines.waypoints, request.max_step,
-                                  JumpThresholds(request.jump_threshold, request.prismatic_jump_threshold,
-                                                 request.revolute_jump_threshold), self._objection(lines, request),
-                                  lines.carried)
+            found = straight_line(
+                lines.solver,
+                lines.link,
+                lines.scene.positions,
+                lines.waypoints,
+                request.max_step,
+                JumpThresholds(
+                    request.jump_threshold, request.prismatic_jump_threshold, request.revolute_jump_threshold
+                ),
+                self._objection(lines, request),
+                lines.carried,
+            )
             trajectory = self._timed(lines, found, request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             response.error_code.val = self._context.reporter.failure("cartesian_path", error, **details)
@@ -81,10 +90,15 @@ class CartesianPathService:
         response.fraction = found.fraction
         response.error_code.val = ErrorCode.SUCCESS
         if found.stop:
-            rospy.logwarn("cartesian_path: %.1f %% of the lines were followed, until %s", 100.0 * found.fraction,
-                          found.stop)
-        self._context.reporter.report("cartesian_path", ErrorCode.SUCCESS, found.stop,
-                                      **{**details, "fraction": found.fraction, "points": len(trajectory.times)})
+            rospy.logwarn(
+                "cartesian_path: %.1f %% of the lines were followed, until %s", 100.0 * found.fraction, found.stop
+            )
+        self._context.reporter.report(
+            "cartesian_path",
+            ErrorCode.SUCCESS,
+            found.stop,
+            **{**details, "fraction": found.fraction, "points": len(trajectory.times)},
+        )
         return response
 
     def _read(self, request: Any) -> _Lines:
@@ -97,8 +111,9 @@ class CartesianPathService:
         name = (request.link_name or group.tip_link).removeprefix("/")
         link = holding_link(scene, name)
         if not link:
-            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link_name", name,
-                                   [*scene.model.frame_ids, *scene.attached])
+            raise UnknownNameError(
+                ErrorCode.INVALID_LINK_NAME, "link_name", name, [*scene.model.frame_ids, *scene.attached]
+            )
         carried = scene.frame_transform(link).actInv(scene.frame_transform(name))
         checker = None
         if request.avoid_collisions:
@@ -109,12 +124,12 @@ class CartesianPathService:
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:
         """Returns what is asked about each step: path constraints, then collisions."""
-        constraints = constraints_from_message(lines.scene, request.path_constraints, "path_constraints",
-                                               tip=lines.link)
+        constraints = constraints_from_message(
+            lines.scene, request.path_constraints, "path_constraints", tip=lines.link
+        )
         collides = no_objection
         if lines.checker is not None:
-            collides = collision_objection(lines.checker, lines.motion,
-                                           self._context.pipeline("").settings.motion_step)
+            collides = collision_objection(lines.checker, lines.motion, self._context.pipeline("").settings.motion_step)
 
         def objection(before: Array, after: Array) -> str:
             if not constraints.is_empty and not constraints.satisfied(lines.motion.full_positions(after)):
@@ -138,8 +153,9 @@ class CartesianPathService:
         link = request.cartesian_speed_limited_link or lines.link
         if not model.has_link(link):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "cartesian_speed_limited_link", link, model.frame_ids)
-        return with_limited_link_speed(model, trajectory, lines.motion.full_positions, link,
-                                       request.max_cartesian_speed, velocity, acceleration)
+        return with_limited_link_speed(
+            model, trajectory, lines.motion.full_positions, link, request.max_cartesian_speed, velocity, acceleration
+        )
 
 
 def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Transform, ...]:
@@ -148,8 +164,10 @@ def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Trans
     Args: the scene, the link or held object that follows the lines, the message.
     """
     if not math.isfinite(request.max_cartesian_speed):
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_cartesian_speed is {request.max_cartesian_speed}; a "
-                            "finite number is needed, 0 for no limit")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"max_cartesian_speed is {request.max_cartesian_speed}; a finite number is needed, 0 for no limit",
+        )
     poses = [transform_from_pose(pose, f"waypoints[{number}]") for number, pose in enumerate(request.waypoints)]
     frame = request.header.frame_id.removeprefix("/")
     base = scene.frame_transform(frame)

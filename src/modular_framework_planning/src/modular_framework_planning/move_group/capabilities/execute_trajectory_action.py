@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Action execute_trajectory: sends a planned motion to the controllers."""
+
 from __future__ import annotations
 
 import threading
@@ -25,8 +26,9 @@ class ExecuteTrajectory:
         """Starts the action server."""
         self._runner.connect()
 
-    def _work(self, goal: Any, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[ExecuteTrajectoryResult, bool, str]:
+    def _work(
+        self, goal: Any, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[ExecuteTrajectoryResult, bool, str]:
         result = ExecuteTrajectoryResult()
         feedback(ExecuteTrajectoryFeedback("MONITOR"))
         joints = list(goal.trajectory.joint_trajectory.joint_names)

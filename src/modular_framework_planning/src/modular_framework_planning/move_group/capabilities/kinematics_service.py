@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Services compute_ik and compute_fk."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -52,16 +53,19 @@ class _Wanted:
         The orientation is left open where the group's settings ask for the position only.
         """
         if solver.settings.position_only:
-            return solver.position_solutions(self.link, self.placed.translation, self.target.translation, seed,
-                                             timeout_s)
+            return solver.position_solutions(
+                self.link, self.placed.translation, self.target.translation, seed, timeout_s
+            )
         return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
 
     def failure_reason(self, solver: InverseKinematics, seed: Array) -> str:
         """Says why there is no solution."""
         if solver.settings.position_only:
             where = np.array2string(self.target.translation, precision=3, separator=", ")
-            return (f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
-                    f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)")
+            return (
+                f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
+                f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)"
+            )
         return solver.explain_unreachable(self.link, self.target * self.placed.inverse(), seed)
 
 
@@ -116,8 +120,10 @@ class KinematicsService:
         if free:
             return clearest(free, scene.positions, checker.distance)
         contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
-        raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(kept)} inverse kinematics solutions for '{link}' "
-                            f"collide; the nearest: {contacts}")
+        raise PlanningError(
+            ErrorCode.NO_IK_SOLUTION,
+            f"all {len(kept)} inverse kinematics solutions for '{link}' collide; the nearest: {contacts}",
+        )
 
     @staticmethod
     def _timeout(request: Any) -> float | None:
@@ -130,26 +136,32 @@ class KinematicsService:
         """Reads what is to be placed where; raises PlanningError."""
         links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
         if len(links) > 1 or len(poses) > 1:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"{len(links)} ik_link_names and {len(poses)} poses in "
-                                "pose_stamped_vector; several tips at once are not supported: ask for one link with "
-                                "ik_link_name and pose_stamped")
+            raise PlanningError(
+                ErrorCode.NO_IK_SOLUTION,
+                f"{len(links)} ik_link_names and {len(poses)} poses in "
+                "pose_stamped_vector; several tips at once are not supported: ask for one link with "
+                "ik_link_name and pose_stamped",
+            )
         name = ((links[0] if links else request.ik_link_name) or group.tip_link).removeprefix("/")
         target = stamped_in_scene(scene, poses[0] if poses else request.pose_stamped, "pose_stamped")
         link = holding_link(scene, name)
         if not link:
-            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name,
-                                   [*scene.model.frame_ids, *scene.attached])
+            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name, [*scene.model.frame_ids, *scene.attached])
         return _Wanted(link, scene.frame_transform(link).actInv(scene.frame_transform(name)), target)
 
     @staticmethod
     def _constrained(scene: PlanningScene, request: Any, found: list[Array], link: str) -> list[Array]:
         """Returns the solutions that satisfy the request's constraints; raises PlanningError where none does."""
-        constraints = constraints_from_message(scene, request.constraints, "ik_request.constraints",
-                                               ErrorCode.NO_IK_SOLUTION, link)
+        constraints = constraints_from_message(
+            scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, link
+        )
         kept = [positions for positions in found if constraints.satisfied(positions)]
         if not kept:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"none of {len(found)} inverse kinematics solutions for "
-                                f"'{link}' satisfies the constraints; the nearest: {constraints.describe(found[0])}")
+            raise PlanningError(
+                ErrorCode.NO_IK_SOLUTION,
+                f"none of {len(found)} inverse kinematics solutions for "
+                f"'{link}' satisfies the constraints; the nearest: {constraints.describe(found[0])}",
+            )
         return kept
 
     def _serve_fk(self, request: Any) -> GetPositionFKResponse:

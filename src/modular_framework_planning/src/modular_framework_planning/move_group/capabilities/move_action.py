@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Action move_group: plans and, unless plan_only is set, executes, watching the scene, and plans again if it must."""
+
 from __future__ import annotations
 
 import copy
@@ -21,18 +22,26 @@ from modular_framework_planning.move_group.motion_watch import WatchedMotion
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
 SHORTEST_DELAY_S = 0.05  # between two attempts: a plan that fails at once must not fill the log
-WORTH_ANOTHER_TRY = (ErrorCode.PLANNING_FAILED, ErrorCode.INVALID_MOTION_PLAN, ErrorCode.TIMED_OUT,
-                     ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE)
+WORTH_ANOTHER_TRY = (
+    ErrorCode.PLANNING_FAILED,
+    ErrorCode.INVALID_MOTION_PLAN,
+    ErrorCode.TIMED_OUT,
+    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+)
 
 
 def check_options(options: Any) -> None:
     """Refuses planning_options that cannot be honoured; raises PlanningError."""
     if options.look_around:
-        raise PlanningError(ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, "planning_options.look_around: there is no sensor "
-                            "to point; ask with look_around false")
+        raise PlanningError(
+            ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+            "planning_options.look_around: there is no sensor to point; ask with look_around false",
+        )
     if not (math.isfinite(options.replan_delay) and options.replan_delay >= 0.0):
-        raise PlanningError(ErrorCode.FAILURE, f"planning_options.replan_delay is {options.replan_delay} s; a finite "
-                            "number of at least 0 is needed")
+        raise PlanningError(
+            ErrorCode.FAILURE,
+            f"planning_options.replan_delay is {options.replan_delay} s; a finite number of at least 0 is needed",
+        )
 
 
 def scene_change(options: Any, keep_state: bool) -> Callable[[PlanningScene], PlanningScene]:
@@ -46,8 +55,9 @@ def scene_change(options: Any, keep_state: bool) -> Callable[[PlanningScene], Pl
     if keep_state and (diff.robot_state.joint_state.name or diff.robot_state.attached_collision_objects):
         rospy.logwarn("planning_scene_diff.robot_state is ignored: a motion to execute starts where the robot is")
     if keep_state or not diff.robot_state.joint_state.name:
-        diff.robot_state = RobotState(is_diff=True, attached_collision_objects=[] if keep_state else
-                                      diff.robot_state.attached_collision_objects)
+        diff.robot_state = RobotState(
+            is_diff=True, attached_collision_objects=[] if keep_state else diff.robot_state.attached_collision_objects
+        )
     return lambda scene: apply_scene(scene, diff)
 
 
@@ -62,8 +72,9 @@ class MoveAction:
         """Starts the action server."""
         self._runner.connect()
 
-    def _work(self, goal: Any, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[MoveGroupResult, bool, str]:
+    def _work(
+        self, goal: Any, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[MoveGroupResult, bool, str]:
         options = goal.planning_options
         attempts = self._context.settings.plan_execution.attempts(options)
         result, text = MoveGroupResult(), ""
@@ -81,8 +92,9 @@ class MoveAction:
         feedback(MoveGroupFeedback("IDLE"))
         return result, result.error_code.val == ErrorCode.SUCCESS, text
 
-    def _once(self, goal: Any, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[MoveGroupResult, str]:
+    def _once(
+        self, goal: Any, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[MoveGroupResult, str]:
         """Plans once and executes once; failures come back as a code with their reason."""
         moves = not goal.planning_options.plan_only
         request = self._from_here(goal.request) if moves else goal.request
@@ -98,8 +110,12 @@ class MoveAction:
         if cancelled.is_set():  # a planner that goes on improving has a path by then, but the client has cancelled
             result.error_code.val = ErrorCode.PREEMPTED
             return result, "cancelled while planning"
-        result = MoveGroupResult(error_code=response.error_code, trajectory_start=response.trajectory_start,
-                                 planned_trajectory=response.trajectory, planning_time=response.planning_time)
+        result = MoveGroupResult(
+            error_code=response.error_code,
+            trajectory_start=response.trajectory_start,
+            planned_trajectory=response.trajectory,
+            planning_time=response.planning_time,
+        )
         if not moves:
             return result, "planned"
         feedback(MoveGroupFeedback("MONITOR"))

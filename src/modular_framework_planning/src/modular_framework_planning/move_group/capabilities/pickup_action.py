@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Action pickup: takes an object by the best of several grasps that can be done."""
+
 from __future__ import annotations
 
 import threading
@@ -30,8 +31,9 @@ class PickupAction:
         """Starts the action server."""
         self._runner.connect()
 
-    def _work(self, goal: PickupGoal, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[PickupResult, bool, str]:
+    def _work(
+        self, goal: PickupGoal, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[PickupResult, bool, str]:
         result = PickupResult()
         order = sorted(range(len(goal.possible_grasps)), key=lambda number: -goal.possible_grasps[number].grasp_quality)
 
@@ -41,10 +43,10 @@ class PickupAction:
         def accept(number: int) -> None:
             result.grasp = goal.possible_grasps[number]
 
-        task = Task("pickup", goal, goal.group_name, goal.end_effector, lambda scene: _check(scene, goal), order,
-                    read, accept)
-        text = Manipulation(self._context, task, cancelled, lambda state: feedback(PickupFeedback(state))
-                            ).run(result)
+        task = Task(
+            "pickup", goal, goal.group_name, goal.end_effector, lambda scene: _check(scene, goal), order, read, accept
+        )
+        text = Manipulation(self._context, task, cancelled, lambda state: feedback(PickupFeedback(state))).run(result)
         feedback(PickupFeedback("IDLE"))
         return result, result.error_code.val == ErrorCode.SUCCESS, text
 
@@ -56,5 +58,7 @@ def _check(scene: PlanningScene, goal: PickupGoal) -> None:
         if name:
             scene.find_object(name)
     if not goal.possible_grasps:
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, "possible_grasps is empty and nobody here plans "
-                            "grasps; give at least one")
+        raise PlanningError(
+            ErrorCode.INVALID_GOAL_CONSTRAINTS,
+            "possible_grasps is empty and nobody here plans grasps; give at least one",
+        )

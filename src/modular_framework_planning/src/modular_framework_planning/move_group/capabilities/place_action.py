@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Action place: puts a held object down at the best of several places that can be reached."""
+
 from __future__ import annotations
 
 import threading
@@ -30,8 +31,9 @@ class PlaceAction:
         """Starts the action server."""
         self._runner.connect()
 
-    def _work(self, goal: PlaceGoal, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[PlaceResult, bool, str]:
+    def _work(
+        self, goal: PlaceGoal, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[PlaceResult, bool, str]:
         result = PlaceResult()
         order = sorted(range(len(goal.place_locations)), key=lambda number: -goal.place_locations[number].quality)
 
@@ -43,8 +45,7 @@ class PlaceAction:
             result.place_location = goal.place_locations[number]
 
         task = Task("place", goal, goal.group_name, "", lambda scene: _check(scene, goal), order, read, accept)
-        text = Manipulation(self._context, task, cancelled, lambda state: feedback(PlaceFeedback(state))
-                            ).run(result)
+        text = Manipulation(self._context, task, cancelled, lambda state: feedback(PlaceFeedback(state))).run(result)
         feedback(PlaceFeedback("IDLE"))
         return result, result.error_code.val == ErrorCode.SUCCESS, text
 
@@ -55,5 +56,6 @@ def _check(scene: PlanningScene, goal: PlaceGoal) -> None:
         if name:
             scene.find_object(name)
     if not goal.place_locations:
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, "place_locations is empty; give at least one place for "
-                            "the object")
+        raise PlanningError(
+            ErrorCode.INVALID_GOAL_CONSTRAINTS, "place_locations is empty; give at least one place for the object"
+        )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Service plan_kinematic_path: plans a motion without moving."""
+
 from __future__ import annotations
 
 import rospy

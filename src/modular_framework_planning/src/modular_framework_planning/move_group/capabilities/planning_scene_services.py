@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Services get_planning_scene, apply_planning_scene and clear_octomap."""
+
 from __future__ import annotations
 
 from typing import Any

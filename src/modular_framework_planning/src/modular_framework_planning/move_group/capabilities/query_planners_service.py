@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Services that list pipelines and planners, and read and change the planners' settings."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -34,14 +35,21 @@ class QueryPlannersService:
         rospy.Service(names.SET_PLANNER_PARAMS_SERVICE, SetPlannerParams, self._set)
 
     def _query(self, _: Any) -> QueryPlannerInterfacesResponse:
-        return QueryPlannerInterfacesResponse([
-            PlannerInterfaceDescription(name=pipeline.description, pipeline_id=name, planner_ids=self._ids(pipeline))
-            for name, pipeline in self._context.pipelines.items()])
+        return QueryPlannerInterfacesResponse(
+            [
+                PlannerInterfaceDescription(
+                    name=pipeline.description, pipeline_id=name, planner_ids=self._ids(pipeline)
+                )
+                for name, pipeline in self._context.pipelines.items()
+            ]
+        )
 
     def _ids(self, pipeline: PlanningPipeline) -> list[str]:
         """Names that any group takes, then group[name] for those a group lists."""
-        return [*pipeline.planner_ids, *(f"{group}[{name}]" for group in self._context.model.groups
-                                         for name in pipeline.group_planners(group))]
+        return [
+            *pipeline.planner_ids,
+            *(f"{group}[{name}]" for group in self._context.model.groups for name in pipeline.group_planners(group)),
+        ]
 
     def _get(self, request: Any) -> GetPlannerParamsResponse | None:
         """Returns the settings; none where no planner or group of that name has any, as in MoveIt."""
@@ -51,15 +59,21 @@ class QueryPlannersService:
             rospy.logerr("%s", error.reason)
             return None
         values = pipeline.configurations.get(request.planner_config, request.group)
-        return GetPlannerParamsResponse(PlannerParams(keys=list(values), values=[_text(v) for v in values.values()],
-                                                      descriptions=[""] * len(values)))
+        return GetPlannerParamsResponse(
+            PlannerParams(
+                keys=list(values), values=[_text(v) for v in values.values()], descriptions=[""] * len(values)
+            )
+        )
 
     def _set(self, request: Any) -> SetPlannerParamsResponse | None:
         try:
             pipeline = self._named(request)
             if len(request.params.keys) != len(request.params.values):
-                raise PlanningError(ErrorCode.FAILURE, f"set_planner_params: {len(request.params.keys)} keys and "
-                                    f"{len(request.params.values)} values; one value a key is needed")
+                raise PlanningError(
+                    ErrorCode.FAILURE,
+                    f"set_planner_params: {len(request.params.keys)} keys and "
+                    f"{len(request.params.values)} values; one value a key is needed",
+                )
         except PlanningError as error:
             rospy.logerr("%s", error.reason)
             return None

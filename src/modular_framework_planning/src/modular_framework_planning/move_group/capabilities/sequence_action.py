@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Action sequence_move_group: plans a sequence of motions together and, unless plan_only is set, executes it."""
+
 from __future__ import annotations
 
 import copy
@@ -41,8 +42,9 @@ class SequenceAction:
         """Starts the action server."""
         self._runner.connect()
 
-    def _work(self, goal: Any, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[MoveGroupSequenceResult, bool, str]:
+    def _work(
+        self, goal: Any, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[MoveGroupSequenceResult, bool, str]:
         options = goal.planning_options
         attempts = self._context.settings.plan_execution.attempts(options)
         result, text = MoveGroupSequenceResult(), ""
@@ -60,8 +62,9 @@ class SequenceAction:
         feedback(MoveGroupSequenceFeedback("IDLE"))
         return result, result.response.error_code.val == ErrorCode.SUCCESS, text
 
-    def _once(self, goal: Any, cancelled: threading.Event,
-              feedback: Callable[[Any], None]) -> tuple[MoveGroupSequenceResult, str]:
+    def _once(
+        self, goal: Any, cancelled: threading.Event, feedback: Callable[[Any], None]
+    ) -> tuple[MoveGroupSequenceResult, str]:
         """Plans once and executes once; failures come back as a code with their reason."""
         moves = not goal.planning_options.plan_only
         request = _from_here(goal.request) if moves else goal.request
@@ -81,8 +84,13 @@ class SequenceAction:
         self._context.reporter.report("execute", ErrorCode.SUCCESS, "", parts=len(solved.parts))
         return result, "planned and executed"
 
-    def _execute(self, solved: SolvedSequence, planned_in: PlanningScene,
-                 change: Callable[[PlanningScene], PlanningScene], cancelled: threading.Event) -> None:
+    def _execute(
+        self,
+        solved: SolvedSequence,
+        planned_in: PlanningScene,
+        change: Callable[[PlanningScene], PlanningScene],
+        cancelled: threading.Event,
+    ) -> None:
         """Runs one part after the other; raises PlanningError."""
         for part, trajectory in zip(solved.parts, solved.response.planned_trajectories, strict=True):
             if cancelled.is_set():

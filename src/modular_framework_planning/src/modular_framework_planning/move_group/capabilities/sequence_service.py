@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Service plan_sequence_path: plans a sequence of motions, blended where asked, without moving."""
+
 from __future__ import annotations
 
 from typing import Any

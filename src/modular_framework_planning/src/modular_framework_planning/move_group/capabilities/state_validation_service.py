@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Service check_state_validity: says whether a state is free, within bounds and keeps constraints, and what is off."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -51,23 +52,31 @@ class StateValidationService:
         moving = [int(number) for number in (group.indices if group else range(len(model.joint_names)))]
         contacts = self._context.new_checker(scene, moving).contacts(scene.positions, include_fixed=group is None)
         problems = model.bound_violations(scene.positions, moving, 1e-6)
-        results, refused = evaluated_one_by_one(scene, request.constraints, "constraints",
-                                                group.tip_link if group else "")
+        results, refused = evaluated_one_by_one(
+            scene, request.constraints, "constraints", group.tip_link if group else ""
+        )
         if refused:
-            self._context.reporter.report("validity", ErrorCode.INVALID_GOAL_CONSTRAINTS, "; ".join(refused),
-                                          group=request.group_name)
+            self._context.reporter.report(
+                "validity", ErrorCode.INVALID_GOAL_CONSTRAINTS, "; ".join(refused), group=request.group_name
+            )
         problems += [item.text for item in results if not item.satisfied]
         if problems:
             rospy.logdebug("state not valid: %s", "; ".join(problems))
-        return GetStateValidityResponse(valid=not contacts and not problems,
-                                        contacts=[self._contact(item, model.planning_frame) for item in contacts],
-                                        constraint_result=result_messages(results))
+        return GetStateValidityResponse(
+            valid=not contacts and not problems,
+            contacts=[self._contact(item, model.planning_frame) for item in contacts],
+            constraint_result=result_messages(results),
+        )
 
     @staticmethod
     def _contact(contact: Contact, frame: str) -> ContactInformation:
-        message = ContactInformation(depth=contact.depth, contact_body_1=contact.first.name,
-                                     body_type_1=BODY_TYPES[contact.first.kind], contact_body_2=contact.second.name,
-                                     body_type_2=BODY_TYPES[contact.second.kind])
+        message = ContactInformation(
+            depth=contact.depth,
+            contact_body_1=contact.first.name,
+            body_type_1=BODY_TYPES[contact.first.kind],
+            contact_body_2=contact.second.name,
+            body_type_2=BODY_TYPES[contact.second.kind],
+        )
         message.header.frame_id = frame
         message.position.x, message.position.y, message.position.z = (float(v) for v in contact.position)
         message.normal.x, message.normal.y, message.normal.z = (float(v) for v in contact.normal)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes tf of the objects in the planning scene, so that other nodes can ask where they are."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -38,8 +39,9 @@ class TfPublisher:
         bodies += [(held.body, held.link) for held in scene.attached.values()]
         for body, parent in bodies:
             frames.append(self._frame(parent, body.name, body.pose))
-            frames += [self._frame(parent, f"{body.name}/{name}", body.pose * pose)
-                       for name, pose in body.subframes.items()]
+            frames += [
+                self._frame(parent, f"{body.name}/{name}", body.pose * pose) for name, pose in body.subframes.items()
+            ]
         if frames:
             self._broadcaster.sendTransform(frames)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of a robot as the executor sees them: which there are, and how one is commanded."""
+
 from __future__ import annotations
 
 import time
@@ -103,9 +104,12 @@ class ActionControllers:
             deadline = time.monotonic() + self._timeout_s
             while not _is_connected(self._client(spec).action_client):
                 if time.monotonic() > deadline or rospy.is_shutdown():
-                    raise PlanningError(ErrorCode.CONTROL_FAILED, f"action {rospy.resolve_name(spec.action)} of "
-                                        f"controller '{spec.name}' did not answer within {self._timeout_s:.1f} s; is "
-                                        "the controller running?")
+                    raise PlanningError(
+                        ErrorCode.CONTROL_FAILED,
+                        f"action {rospy.resolve_name(spec.action)} of "
+                        f"controller '{spec.name}' did not answer within {self._timeout_s:.1f} s; is "
+                        "the controller running?",
+                    )
                 rospy.rostime.wallsleep(POLL_S)
 
     def begin(self, part: MotionPart) -> RunningMotion:
@@ -136,9 +140,11 @@ class ActionMotion:
             return True
         code = getattr(result, "error_code", None)
         text = getattr(result, "error_string", "") or self._client.get_goal_status_text()
-        raise PlanningError(ErrorCode.PREEMPTED if state == GoalStatus.PREEMPTED else ErrorCode.CONTROL_FAILED,
-                            f"controller '{self._spec.name}' ended with {GoalStatus.to_string(state)}"
-                            f"{'' if code is None else f', error_code {code}'}: {text or 'no text'}")
+        raise PlanningError(
+            ErrorCode.PREEMPTED if state == GoalStatus.PREEMPTED else ErrorCode.CONTROL_FAILED,
+            f"controller '{self._spec.name}' ended with {GoalStatus.to_string(state)}"
+            f"{'' if code is None else f', error_code {code}'}: {text or 'no text'}",
+        )
 
     def cancel(self) -> None:
         """Cancels the goal."""

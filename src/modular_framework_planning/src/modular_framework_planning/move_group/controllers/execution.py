@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Executes trajectories: chooses controllers, checks the start, watches the time, listens for a stop."""
+
 from __future__ import annotations
 
 import math
@@ -73,8 +74,11 @@ class TrajectoryExecution:
             rospy.loginfo("trajectory_execution_event: stopping the motion")
             self._stop.set()
         else:
-            rospy.logwarn("%s: event '%s' is not known; known: stop", rospy.resolve_name(names.EXECUTION_EVENT_TOPIC),
-                          message.data)
+            rospy.logwarn(
+                "%s: event '%s' is not known; known: stop",
+                rospy.resolve_name(names.EXECUTION_EVENT_TOPIC),
+                message.data,
+            )
 
     def describe(self) -> str:
         """Says whose controllers execute motions."""
@@ -87,8 +91,10 @@ class TrajectoryExecution:
             PlanningError: what went wrong, with the controller's own message where it sent one.
         """
         if self.manager is None:
-            raise PlanningError(ErrorCode.CONTROL_FAILED, f"{rospy.resolve_name('~allow_trajectory_execution')} is "
-                                "false: this move_group plans only")
+            raise PlanningError(
+                ErrorCode.CONTROL_FAILED,
+                f"{rospy.resolve_name('~allow_trajectory_execution')} is false: this move_group plans only",
+            )
         if trajectory.multi_dof_joint_trajectory.points:
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "multi_dof_joint_trajectory is not supported")
         check_trajectory(trajectory.joint_trajectory)
@@ -113,8 +119,9 @@ class TrajectoryExecution:
     def _parts(self, motion: JointTrajectory, manager: ControllerManager) -> list[MotionPart]:
         followers = self._monitor.model.follower_joints
         joints = [joint for joint in motion.joint_names if joint not in followers]
-        return split(motion, choose_controllers(joints or motion.joint_names, manager.controllers(),
-                                                manager.may_switch))
+        return split(
+            motion, choose_controllers(joints or motion.joint_names, manager.controllers(), manager.may_switch)
+        )
 
     def _check_start(self, motion: JointTrajectory) -> None:
         if not any(self.settings.start_tolerance(joint) > 0.0 for joint in motion.joint_names):
@@ -138,8 +145,10 @@ class TrajectoryExecution:
             gap = abs(math.remainder(gap, math.tau) if model.is_continuous(number) else gap)
             if gap > max(worst, tolerance):
                 worst = gap
-                sentence = (f"joint '{joint}' is {gap:.4f} from the trajectory's first point (allowed_start_tolerance "
-                            f"{tolerance}); plan again from the current state")
+                sentence = (
+                    f"joint '{joint}' is {gap:.4f} from the trajectory's first point (allowed_start_tolerance "
+                    f"{tolerance}); plan again from the current state"
+                )
         return sentence
 
     def _is_there_already(self, motion: JointTrajectory, parts: list[MotionPart]) -> bool:
@@ -147,12 +156,15 @@ class TrajectoryExecution:
 
         Controllers refuse such a motion: its only point is due at once. Grippers do not: their goal is also a force.
         """
-        return (motion.points[-1].time_from_start.to_sec() <= 0.0
-                and all(self.settings.start_tolerance(joint) > 0.0 for joint in motion.joint_names)
-                and all(part.controller.kind != GRIPPER for part in parts))
+        return (
+            motion.points[-1].time_from_start.to_sec() <= 0.0
+            and all(self.settings.start_tolerance(joint) > 0.0 for joint in motion.joint_names)
+            and all(part.controller.kind != GRIPPER for part in parts)
+        )
 
-    def _run(self, parts: list[MotionPart], manager: ControllerManager, delay_s: float,
-             cancelled: threading.Event) -> None:
+    def _run(
+        self, parts: list[MotionPart], manager: ControllerManager, delay_s: float, cancelled: threading.Event
+    ) -> None:
         begun = rospy.Time.now()
         running: list[tuple[MotionPart, RunningMotion]] = []
         try:
@@ -171,13 +183,17 @@ class TrajectoryExecution:
     def _check_time(self, parts: list[MotionPart], elapsed_s: float) -> None:
         for part in parts if self.settings.execution_duration_monitoring else ():
             scaling, margin_s = part.controller.duration_scaling, part.controller.duration_margin
-            allowed_s = part.duration_s * (self.settings.allowed_execution_duration_scaling if scaling is None
-                                           else scaling)
+            allowed_s = part.duration_s * (
+                self.settings.allowed_execution_duration_scaling if scaling is None else scaling
+            )
             allowed_s += self.settings.allowed_goal_duration_margin if margin_s is None else margin_s
             if elapsed_s > allowed_s:
-                raise PlanningError(ErrorCode.TIMED_OUT, f"the motion should take {part.duration_s:.2f} s and was not "
-                                    f"done after {elapsed_s:.2f} s (allowed {allowed_s:.2f} s); waiting for "
-                                    f"{', '.join(late.controller.name for late in parts)}")
+                raise PlanningError(
+                    ErrorCode.TIMED_OUT,
+                    f"the motion should take {part.duration_s:.2f} s and was not "
+                    f"done after {elapsed_s:.2f} s (allowed {allowed_s:.2f} s); waiting for "
+                    f"{', '.join(late.controller.name for late in parts)}",
+                )
 
     def _settle(self, joint_names: list[str]) -> None:
         """Waits until the joints stand still, so that the next plan starts from where the robot stays."""
@@ -223,5 +239,7 @@ def _load_manager(timeout_s: float, monitor: SceneMonitor) -> ControllerManager:
             only = str(rospy.get_param("~ros_control_namespace", "/")) if known == ROS_CONTROL_MANAGER else None
             may_switch = bool(rospy.get_param("~moveit_manage_controllers", False))
             return RosControlControllers(listed_controllers(), only, may_switch, timeout_s)
-    raise ModelError(f"parameter {rospy.resolve_name('~moveit_controller_manager')}: '{name}' is not known; known: "
-                     f"{', '.join((SIMPLE_MANAGER, FAKE_MANAGER, ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS))}")
+    raise ModelError(
+        f"parameter {rospy.resolve_name('~moveit_controller_manager')}: '{name}' is not known; known: "
+        f"{', '.join((SIMPLE_MANAGER, FAKE_MANAGER, ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS))}"
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers of a robot that is not there: they publish the joint positions a trajectory asks for."""
+
 from __future__ import annotations
 
 import threading
@@ -41,8 +42,10 @@ def initial_positions(model: RobotModel, entries: Any) -> tuple[dict[str, float]
         if pose in poses:
             positions |= {joint: value for joint, value in poses[pose].items() if joint in model.index}
         else:
-            faults.append(f"initial[{number}]: group '{group}' has no pose '{pose}' in the SRDF; it has "
-                          f"{', '.join(poses) or 'none'}")
+            faults.append(
+                f"initial[{number}]: group '{group}' has no pose '{pose}' in the SRDF; it has "
+                f"{', '.join(poses) or 'none'}"
+            )
     return positions, faults
 
 
@@ -143,13 +146,17 @@ class FakeMotion:
             return False
         wanted = dict(zip(self._part.trajectory.joint_names, self._part.trajectory.points[-1].positions, strict=True))
         now, index = self._monitor.positions(), self._monitor.model.index
-        away = [name for name, value in wanted.items() if name in index
-                and abs(now[index[name]] - value) > SEEN_TOLERANCE]
+        away = [
+            name for name, value in wanted.items() if name in index and abs(now[index[name]] - value) > SEEN_TOLERANCE
+        ]
         if away and time.monotonic() - self._published_s > SEEN_TIMEOUT_S:
-            raise PlanningError(ErrorCode.CONTROL_FAILED, f"{rospy.resolve_name(names.JOINT_STATES_TOPIC)} does not "
-                                f"show where fake controller '{self._part.controller.name}' put {', '.join(away)} "
-                                f"{SEEN_TIMEOUT_S:.0f} s ago; let joint_state_publisher run with "
-                                f"{rospy.resolve_name(names.FAKE_JOINT_STATES_TOPIC)} in its source_list")
+            raise PlanningError(
+                ErrorCode.CONTROL_FAILED,
+                f"{rospy.resolve_name(names.JOINT_STATES_TOPIC)} does not "
+                f"show where fake controller '{self._part.controller.name}' put {', '.join(away)} "
+                f"{SEEN_TIMEOUT_S:.0f} s ago; let joint_state_publisher run with "
+                f"{rospy.resolve_name(names.FAKE_JOINT_STATES_TOPIC)} in its source_list",
+            )
         return not away
 
     def cancel(self) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers a controller manager of ros_control has loaded; stopped ones are started where a motion needs them."""
+
 from __future__ import annotations
 
 import time
@@ -22,8 +23,10 @@ from modular_framework_planning.trajectory_execution.controllers import GRIPPER,
 LIST_SERVICE = "controller_manager/list_controllers"
 KEPT_S = 1.0
 # end of a controller's type -> kind and name of its action
-CONTROLLER_TYPES = {"JointTrajectoryController": (TRAJECTORY, "follow_joint_trajectory"),
-                    "GripperActionController": (GRIPPER, "gripper_cmd")}
+CONTROLLER_TYPES = {
+    "JointTrajectoryController": (TRAJECTORY, "follow_joint_trajectory"),
+    "GripperActionController": (GRIPPER, "gripper_cmd"),
+}
 
 
 def spec_of(state: ControllerState, namespace: str = "/") -> ControllerSpec | None:
@@ -31,21 +34,32 @@ def spec_of(state: ControllerState, namespace: str = "/") -> ControllerSpec | No
     for ending, (kind, action_ns) in CONTROLLER_TYPES.items():
         joints = tuple(dict.fromkeys(name for claim in state.claimed_resources for name in claim.resources))
         if state.type.endswith(ending) and joints:
-            return ControllerSpec(rosgraph.names.ns_join(namespace, state.name), action_ns, kind, joints,
-                                  is_active=state.state == "running", command_joints=joints[:1])
+            return ControllerSpec(
+                rosgraph.names.ns_join(namespace, state.name),
+                action_ns,
+                kind,
+                joints,
+                is_active=state.state == "running",
+                command_joints=joints[:1],
+            )
     return None
 
 
 def running_claims(states: Sequence[ControllerState], joints: set[str], without: set[str]) -> list[str]:
     """Returns the running controllers that hold one of the joints, except those named."""
-    return [state.name for state in states if state.state == "running" and state.name not in without
-            and joints & {name for claim in state.claimed_resources for name in claim.resources}]
+    return [
+        state.name
+        for state in states
+        if state.state == "running"
+        and state.name not in without
+        and joints & {name for claim in state.claimed_resources for name in claim.resources}
+    ]
 
 
 def manager_namespaces() -> list[str]:
     """Returns the namespaces of all controller managers the ROS master knows."""
     services = rosgraph.Master(rospy.get_name()).getSystemState()[2]
-    return sorted(name[:-len(LIST_SERVICE)] for name, _ in services if name.endswith(f"/{LIST_SERVICE}"))
+    return sorted(name[: -len(LIST_SERVICE)] for name, _ in services if name.endswith(f"/{LIST_SERVICE}"))
 
 
 class RosControlControllers(ActionControllers):
@@ -58,8 +72,9 @@ class RosControlControllers(ActionControllers):
         timeout_s: how long to wait for a service or an action [s].
     """
 
-    def __init__(self, listed: tuple[ControllerSpec, ...], namespace: str | None, may_switch: bool,
-                 timeout_s: float) -> None:
+    def __init__(
+        self, listed: tuple[ControllerSpec, ...], namespace: str | None, may_switch: bool, timeout_s: float
+    ) -> None:
         super().__init__((), timeout_s)
         self.may_switch = may_switch
         self._settings = {rosgraph.names.ns_join("/", spec.name): spec for spec in listed}
@@ -80,9 +95,19 @@ class RosControlControllers(ActionControllers):
             for spec in (spec_of(state, namespace) for state in states):
                 if spec is not None:
                     settings = self._settings.get(spec.name)
-                    found.append(spec if settings is None else replace(
-                        settings, name=spec.name, action_ns=spec.action_ns, kind=spec.kind, joints=spec.joints,
-                        is_active=spec.is_active, command_joints=settings.command_joints or spec.command_joints))
+                    found.append(
+                        spec
+                        if settings is None
+                        else replace(
+                            settings,
+                            name=spec.name,
+                            action_ns=spec.action_ns,
+                            kind=spec.kind,
+                            joints=spec.joints,
+                            is_active=spec.is_active,
+                            command_joints=settings.command_joints or spec.command_joints,
+                        )
+                    )
         return tuple(found)
 
     def _ask(self) -> None:
@@ -90,9 +115,12 @@ class RosControlControllers(ActionControllers):
         try:
             self._states = {name: self._client_of(name).list_controllers() for name in namespaces}
         except ControllerManagerClientError as error:
-            raise PlanningError(ErrorCode.CONTROL_FAILED, f"controllers are not known: {error}; is the controller "
-                                f"manager running, and is {rospy.resolve_name('~ros_control_namespace')} its "
-                                "namespace?") from error
+            raise PlanningError(
+                ErrorCode.CONTROL_FAILED,
+                f"controllers are not known: {error}; is the controller "
+                f"manager running, and is {rospy.resolve_name('~ros_control_namespace')} its "
+                "namespace?",
+            ) from error
         self._asked_s = time.monotonic()
 
     def _client_of(self, namespace: str) -> ControllerManagerClient:
@@ -101,8 +129,12 @@ class RosControlControllers(ActionControllers):
     def prepare(self, parts: Sequence[MotionPart]) -> None:
         """Starts the controllers that are stopped, then waits for their actions; raises PlanningError."""
         for namespace, states in self._states.items():
-            stopped = [part.controller for part in parts if not part.controller.is_active
-                       and part.controller.name in {rosgraph.names.ns_join(namespace, state.name) for state in states}]
+            stopped = [
+                part.controller
+                for part in parts
+                if not part.controller.is_active
+                and part.controller.name in {rosgraph.names.ns_join(namespace, state.name) for state in states}
+            ]
             if stopped:
                 self._start(namespace, states, stopped)
         super().prepare(parts)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shows the octomap as cubes coloured by height, for an RViz without MoveIt's plugin."""
+
 from __future__ import annotations
 
 import colorsys
@@ -33,8 +34,13 @@ class OctomapMarkers:
             return
         self._shown = scene.octomap
         markers = [Marker(action=Marker.DELETEALL)]
-        markers += [_cubes(body, shape, scene.model.planning_frame) for body in (scene.octomap,) if body is not None
-                    for shape, _ in body.shapes if isinstance(shape, Octree) and len(shape.centers)]
+        markers += [
+            _cubes(body, shape, scene.model.planning_frame)
+            for body in (scene.octomap,)
+            if body is not None
+            for shape, _ in body.shapes
+            if isinstance(shape, Octree) and len(shape.centers)
+        ]
         publish(self._publisher, MarkerArray(markers))
 
 

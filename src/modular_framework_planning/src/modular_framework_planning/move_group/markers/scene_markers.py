@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shows planning scene and planned path as markers, for an RViz without MoveIt's plugin."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -73,8 +74,9 @@ class MarkerPublisher:
         for share in np.linspace(0.0, 1.0, INTERMEDIATE_GHOSTS + 2)[1:]:
             positions = answer.start.copy()
             positions[group.indices] = rows[int(round(share * (len(rows) - 1)))]
-            markers += robot_markers(scene.model, positions, f"ghost_{share:.2f}",
-                                     (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15))
+            markers += robot_markers(
+                scene.model, positions, f"ghost_{share:.2f}", (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15)
+            )
         for number, marker in enumerate(markers):
             marker.id = number
         publish(self._path, MarkerArray(markers))
@@ -129,11 +131,16 @@ def _shape_marker(shape: Shape, pose: Transform, frame: str, namespace: str, num
 def _cone_points(cone: Cone, sides: int = 24) -> list[Point]:
     """Triangles of a cone's side and base."""
     angles = np.linspace(0.0, 2.0 * np.pi, sides + 1)
-    rim = [Point(cone.radius * x, cone.radius * y, -cone.height / 2)
-           for x, y in zip(np.cos(angles), np.sin(angles), strict=True)]
+    rim = [
+        Point(cone.radius * x, cone.radius * y, -cone.height / 2)
+        for x, y in zip(np.cos(angles), np.sin(angles), strict=True)
+    ]
     tip, middle = Point(0.0, 0.0, cone.height / 2), Point(0.0, 0.0, -cone.height / 2)
-    return [point for first, second in zip(rim[:-1], rim[1:], strict=True)
-            for point in (first, second, tip, second, first, middle)]
+    return [
+        point
+        for first, second in zip(rim[:-1], rim[1:], strict=True)
+        for point in (first, second, tip, second, first, middle)
+    ]
 
 
 def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, number: int) -> Marker:
@@ -171,8 +178,11 @@ def robot_markers(model: RobotModel, positions: Array, namespace: str, color: Co
     """
     transforms = model.link_transforms(positions)
     frame = model.planning_frame
-    markers = [_shape_marker(shape, transforms[link] * origin, frame, namespace, 0)
-               for link, shapes in model.document.visual_shapes.items() for shape, origin in shapes]
+    markers = [
+        _shape_marker(shape, transforms[link] * origin, frame, namespace, 0)
+        for link, shapes in model.document.visual_shapes.items()
+        for shape, origin in shapes
+    ]
     for link, visuals in model.document.visual_meshes.items():
         for uri, origin, scale in visuals:
             marker = _marker(Marker.MESH_RESOURCE, frame, namespace)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Remembers where the joints were a moment ago, for sensor data that arrive later than they were taken."""
+
 from __future__ import annotations
 
 from bisect import bisect_left
@@ -41,9 +42,12 @@ class JointHistory:
         """
         if not self._times or not self._times[0] <= stamp_s <= self._times[-1]:
             known = f"{self._times[0]:.3f} to {self._times[-1]:.3f} s" if self._times else "none"
-            raise PlanningError(ErrorCode.ROBOT_STATE_STALE, f"joint positions at {stamp_s:.3f} s: known times are "
-                                f"{known}; is joint_states published, and do its stamps and the sensor's come from one "
-                                "clock?")
+            raise PlanningError(
+                ErrorCode.ROBOT_STATE_STALE,
+                f"joint positions at {stamp_s:.3f} s: known times are "
+                f"{known}; is joint_states published, and do its stamps and the sensor's come from one "
+                "clock?",
+            )
         after = bisect_left(self._times, stamp_s)
         if self._times[after] == stamp_s:
             return self._positions[after]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the scene's octomap up to date with what depth sensors see, and saves and loads it."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -75,8 +76,9 @@ class OctomapMonitor:
         for settings in sensors:
             updater_of(settings, self.insert_point_cloud).connect()
 
-    def insert_point_cloud(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker,
-                           shadow: float = 0.0) -> Array:
+    def insert_point_cloud(
+        self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker, shadow: float = 0.0
+    ) -> Array:
         """Puts what a sensor saw at one moment into the map.
 
         Args:
@@ -107,14 +109,21 @@ class OctomapMonitor:
             voxels = self._map(scene, into_map).with_point_cloud(origin, hits, masked, clipped)
             if self._replace(scene, voxels, into_map):
                 return hidden
-        raise PlanningError(ErrorCode.FAILURE, f"octomap: it changed during each of {ATTEMPTS} attempts to put a look "
-                            "into it; change it less often, or use larger voxels (octomap_resolution)")
+        raise PlanningError(
+            ErrorCode.FAILURE,
+            f"octomap: it changed during each of {ATTEMPTS} attempts to put a look "
+            "into it; change it less often, or use larger voxels (octomap_resolution)",
+        )
 
     def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
         """The scene's map to go on with; an empty one where it has none, or one of other voxels from elsewhere."""
         voxels = voxels_of(scene)
-        if voxels is None or voxels.resolution != self._resolution or scene.octomap is None or not np.allclose(
-                scene.octomap.pose.homogeneous, pose.homogeneous, atol=1.0e-9):
+        if (
+            voxels is None
+            or voxels.resolution != self._resolution
+            or scene.octomap is None
+            or not np.allclose(scene.octomap.pose.homogeneous, pose.homogeneous, atol=1.0e-9)
+        ):
             return empty_map(self._resolution)
         return voxels
 
@@ -149,7 +158,7 @@ class OctomapMonitor:
         voxels = voxels_of(scene)
         if not fresh or voxels is None or scene.octomap is None:
             return
-        things = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries):]
+        things = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries) :]
         known = self_filter_of(self._regions, things, 1.0, voxels.resolution * np.sqrt(0.75))
         centers = scene.octomap.shapes[0][0].centers  # type: ignore[attr-defined]
         points = centers @ scene.octomap.pose.rotation.T + scene.octomap.pose.translation
@@ -177,9 +186,12 @@ class OctomapMonitor:
         try:
             found = self._transforms.lookup_transform(model.planning_frame, frame, stamp, rospy.Duration(WAIT_S))
         except tf2_ros.TransformException as error:
-            raise PlanningError(ErrorCode.FRAME_TRANSFORM_FAILURE, f"sensor data in frame '{frame}': waited {WAIT_S} s "
-                                f"for its transform to '{model.planning_frame}' at {stamp.to_sec():.3f} s ({error}); "
-                                "is it published on tf?") from error
+            raise PlanningError(
+                ErrorCode.FRAME_TRANSFORM_FAILURE,
+                f"sensor data in frame '{frame}': waited {WAIT_S} s "
+                f"for its transform to '{model.planning_frame}' at {stamp.to_sec():.3f} s ({error}); "
+                "is it published on tf?",
+            ) from error
         t, q = found.transform.translation, found.transform.rotation
         return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{frame}'")
 
@@ -188,8 +200,9 @@ class OctomapMonitor:
         try:
             write_file(Path(request.filename), voxels)
         except OSError as error:
-            rospy.logerr("%s: '%s' cannot be written: %s", rospy.resolve_name(names.SAVE_MAP_SERVICE), request.filename,
-                         error)
+            rospy.logerr(
+                "%s: '%s' cannot be written: %s", rospy.resolve_name(names.SAVE_MAP_SERVICE), request.filename, error
+            )
             return SaveMapResponse(success=False)
         return SaveMapResponse(success=True)
 

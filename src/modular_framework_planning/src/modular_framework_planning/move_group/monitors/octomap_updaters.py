@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Inserts depth images and point clouds into the octomap: MoveIt's two octomap updaters."""
+
 from __future__ import annotations
 
 import threading
@@ -30,8 +31,9 @@ FLOAT_POINT = np.dtype("<f4")
 class InsertPointCloud(Protocol):
     """Puts what a sensor saw into the map; see OctomapMonitor.insert_point_cloud."""
 
-    def __call__(self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker,
-                 shadow: float = 0.0) -> Array:
+    def __call__(
+        self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker, shadow: float = 0.0
+    ) -> Array:
         """Returns which of the points lie on the robot or on known objects."""
         ...
 
@@ -98,8 +100,11 @@ class PointCloudUpdater(_Updater):
         s = self._settings
         seen = points_of_cloud(cloud_array(message), s.max_range, s.point_subsample)
         hidden = self._insert(
-            message.header.frame_id, message.header.stamp, seen,
-            lambda regions, bodies, _: self_filter_of(regions, bodies, s.padding_scale, s.padding_offset))
+            message.header.frame_id,
+            message.header.stamp,
+            seen,
+            lambda regions, bodies, _: self_filter_of(regions, bodies, s.padding_scale, s.padding_offset),
+        )
         if self._filtered is not None:
             self._filtered.publish(_cloud_message(message.header, seen.ends[~hidden]))
 
@@ -126,24 +131,45 @@ class DepthImageUpdater(_Updater):
     def _process(self, message: Image) -> None:
         s = self._settings
         if self._camera is None:
-            rospy.logwarn_throttle(5.0, "octomap: no usable camera_info beside '%s' yet; its images are left out",
-                                   rospy.resolve_name(s.image_topic))
+            rospy.logwarn_throttle(
+                5.0,
+                "octomap: no usable camera_info beside '%s' yet; its images are left out",
+                rospy.resolve_name(s.image_topic),
+            )
             return
-        depth = depth_array(message.data, message.encoding, (message.height, message.width), message.step,
-                            bool(message.is_bigendian))
-        seen = points_of_depth(depth, self._camera, s.near_clipping_plane_distance, s.far_clipping_plane_distance,
-                               (s.skip_vertical_pixels, s.skip_horizontal_pixels))
+        depth = depth_array(
+            message.data, message.encoding, (message.height, message.width), message.step, bool(message.is_bigendian)
+        )
+        seen = points_of_depth(
+            depth,
+            self._camera,
+            s.near_clipping_plane_distance,
+            s.far_clipping_plane_distance,
+            (s.skip_vertical_pixels, s.skip_horizontal_pixels),
+        )
         hidden = self._insert(
-            message.header.frame_id, message.header.stamp, seen,
-            lambda regions, bodies, origin: depth_self_filter(regions, bodies, origin, s.padding_scale,
-                                                              s.padding_offset),
-            s.shadow_threshold)
+            message.header.frame_id,
+            message.header.stamp,
+            seen,
+            lambda regions, bodies, origin: depth_self_filter(
+                regions, bodies, origin, s.padding_scale, s.padding_offset
+            ),
+            s.shadow_threshold,
+        )
         if self._filtered is not None:
             kept = np.zeros(depth.size)
             kept[seen.pixels[~hidden]] = depth.ravel()[seen.pixels[~hidden]]
             data = np.clip(np.round(kept * 1000.0), 0, 65535).astype("<u2").tobytes()
-            self._filtered.publish(Image(header=message.header, height=message.height, width=message.width,
-                                         encoding="16UC1", step=2 * message.width, data=data))
+            self._filtered.publish(
+                Image(
+                    header=message.header,
+                    height=message.height,
+                    width=message.width,
+                    encoding="16UC1",
+                    step=2 * message.width,
+                    data=data,
+                )
+            )
 
 
 def _cloud_message(header: Any, points: Any) -> PointCloud2:

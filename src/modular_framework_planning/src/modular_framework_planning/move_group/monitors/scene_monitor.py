@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the current planning scene: changes arrive by service and topic, joint positions by joint_states."""
+
 from __future__ import annotations
 
 import threading
@@ -41,8 +42,9 @@ class SceneMonitor:
     Parameters: those of `settings`, below ~planning_scene_monitor.
     """
 
-    def __init__(self, model: RobotModel, padding: Padding | None = None,
-                 settings: SceneMonitorSettings | None = None) -> None:
+    def __init__(
+        self, model: RobotModel, padding: Padding | None = None, settings: SceneMonitorSettings | None = None
+    ) -> None:
         self.model = model
         self.settings = settings or SceneMonitorSettings()  # may be replaced while the node runs
         self._frames = TfFrames(model)
@@ -66,14 +68,16 @@ class SceneMonitor:
         """Starts to listen and to publish."""
         self._frames.connect()
         self._published_scene = self.snapshot()
-        self._publisher = rospy.Publisher(names.MONITORED_SCENE_TOPIC, SceneMessage, _NewSubscriberListener(self),
-                                          queue_size=100)
+        self._publisher = rospy.Publisher(
+            names.MONITORED_SCENE_TOPIC, SceneMessage, _NewSubscriberListener(self), queue_size=100
+        )
         rospy.Subscriber(names.JOINT_STATES_TOPIC, JointState, self._on_joint_state, queue_size=5, tcp_nodelay=True)
         for topic, kind, change in (
-                (names.SCENE_TOPIC, SceneMessage, apply_scene),
-                (names.SCENE_WORLD_TOPIC, PlanningSceneWorld, apply_world),
-                (names.OBJECT_TOPIC, CollisionObject, apply_collision_object),
-                (names.ATTACHED_OBJECT_TOPIC, AttachedCollisionObject, apply_attached_object)):
+            (names.SCENE_TOPIC, SceneMessage, apply_scene),
+            (names.SCENE_WORLD_TOPIC, PlanningSceneWorld, apply_world),
+            (names.OBJECT_TOPIC, CollisionObject, apply_collision_object),
+            (names.ATTACHED_OBJECT_TOPIC, AttachedCollisionObject, apply_attached_object),
+        ):
             rospy.Subscriber(topic, kind, self._on_change, callback_args=(topic, change), queue_size=100)
         threading.Thread(target=self._publish_changes, name="planning scene", daemon=True).start()
 
@@ -111,9 +115,11 @@ class SceneMonitor:
             visible = replace(
                 scene if settings.publish_geometry_updates else self._published_scene,
                 positions=(scene if settings.publish_state_updates else self._published_scene).positions,
-                fixed_frames=(scene if settings.publish_transforms_updates else self._published_scene).fixed_frames)
-            message = scene_message(visible, 0) if self._was_disabled else difference_message(
-                self._published_scene, visible)
+                fixed_frames=(scene if settings.publish_transforms_updates else self._published_scene).fixed_frames,
+            )
+            message = (
+                scene_message(visible, 0) if self._was_disabled else difference_message(self._published_scene, visible)
+            )
             if message is not None:
                 self._publisher.publish(message)
                 self._published_scene, self._was_disabled = visible, False
@@ -138,11 +144,18 @@ class SceneMonitor:
 
     def _on_joint_state(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
-            rospy.logwarn_throttle(5.0, "joint_states: %d names but %d positions; message ignored",
-                                   len(message.name), len(message.position))
+            rospy.logwarn_throttle(
+                5.0,
+                "joint_states: %d names but %d positions; message ignored",
+                len(message.name),
+                len(message.position),
+            )
             return
-        changed = {name: float(position) for name, position in zip(message.name, message.position, strict=True)
-                   if name in self.model.index and np.isfinite(position)}
+        changed = {
+            name: float(position)
+            for name, position in zip(message.name, message.position, strict=True)
+            if name in self.model.index and np.isfinite(position)
+        }
         with self._lock:
             self._positions = self.model.merge(self._positions, changed)
             self._history.add(message.header.stamp.to_sec(), self._positions)
@@ -172,9 +185,12 @@ class SceneMonitor:
         while self.missing_joints():
             remaining = deadline - time.monotonic()
             if remaining <= 0.0 or rospy.is_shutdown():
-                raise PlanningError(ErrorCode.ROBOT_STATE_STALE, f"topic {rospy.resolve_name('joint_states')}: waited "
-                                    f"{timeout_s:.1f} s for the positions of {', '.join(self.missing_joints())}; is "
-                                    "the joint state controller running?")
+                raise PlanningError(
+                    ErrorCode.ROBOT_STATE_STALE,
+                    f"topic {rospy.resolve_name('joint_states')}: waited "
+                    f"{timeout_s:.1f} s for the positions of {', '.join(self.missing_joints())}; is "
+                    "the joint state controller running?",
+                )
             with self._arrived:
                 self._arrived.wait(min(remaining, 0.1))
 

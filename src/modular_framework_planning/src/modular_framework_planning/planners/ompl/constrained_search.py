@@ -5,6 +5,7 @@ Two trees grow from the start and from the goals as in CBiRRT (Berenson, Sriniva
 planning on constraint manifolds, ICRA 2009): a tree steps towards a target, projects the step onto the constraints and
 keeps it while it comes nearer; then the other tree tries to reach what was added.
 """
+
 from __future__ import annotations
 
 import numpy as np
@@ -41,13 +42,13 @@ class _Tree:
 
     def __init__(self, roots: Array) -> None:
         self._values = np.empty((256, roots.shape[1]))
-        self._values[:len(roots)] = roots
+        self._values[: len(roots)] = roots
         self._parents = [-1] * len(roots)
 
     @property
     def values(self) -> Array:
         """The vertices, shape (n, joints)."""
-        return self._values[:len(self._parents)]
+        return self._values[: len(self._parents)]
 
     def add(self, values: Array, parent: int) -> int:
         """Adds a vertex; returns its number."""
@@ -74,8 +75,9 @@ class _Tree:
 class ConstrainedSearch:
     """One search."""
 
-    def __init__(self, problem: PlanningProblem, step: float, goals: Array | None = None,
-                 most_states: float = np.inf) -> None:
+    def __init__(
+        self, problem: PlanningProblem, step: float, goals: Array | None = None, most_states: float = np.inf
+    ) -> None:
         """Takes what to search.
 
         Args:
@@ -91,8 +93,10 @@ class ConstrainedSearch:
     def run(self) -> PlannedPath:
         """Returns a path whose edges satisfy the constraints; raises PlanningError when time or states are used up."""
         problem = self._problem
-        grown, other = _Tree(problem.start_values[None, :]), _Tree(
-            problem.goal_states() if self._goals is None else self._goals)
+        grown, other = (
+            _Tree(problem.start_values[None, :]),
+            _Tree(problem.goal_states() if self._goals is None else self._goals),
+        )
         forward = True
         while not self._ends():
             target = problem.rng.uniform(self._low, self._high)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Searches the joint space of a group with OMPL's geometric planners."""
+
 from __future__ import annotations
 
 import time
@@ -63,8 +64,11 @@ class OmplPlanner:
         if problem.constraints is not None and constraints_are_tight(problem):
             return ConstrainedSearch(problem, step).run()
         if problem.repeatable and problem.planner_id in THREADED:
-            raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' works in threads and "
-                                "cannot repeat a plan; choose another planner or do not set a seed")
+            raise PlanningError(
+                ErrorCode.PLANNING_FAILED,
+                f"planner_id '{problem.planner_id}' works in threads and "
+                "cannot repeat a plan; choose another planner or do not set a seed",
+            )
         paths, states = [], 0
         for _ in range(max(1, problem.request.attempts)):
             for reach, limit in stages(problem.planner_id, problem.planner_parameters):
@@ -92,8 +96,12 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
 
     The search ends after a number of iterations or states, so that a seed repeats it, or with the allowed time.
     """
-    near = replace(problem.with_start(problem.motion.full_positions(first)), planner_id="RRTConnect",
-                   planner_parameters={}, deadline_s=problem.end_s)
+    near = replace(
+        problem.with_start(problem.motion.full_positions(first)),
+        planner_id="RRTConnect",
+        planner_parameters={},
+        deadline_s=problem.end_s,
+    )
     fine = problem.settings.finest_step
     if problem.constraints is not None and constraints_are_tight(problem):
         try:
@@ -113,8 +121,10 @@ def edge_step(problem: PlanningProblem) -> float:
         try:
             size = float(str(value)) * unit if value is not None else 0.0
         except ValueError as error:
-            raise PlanningError(ErrorCode.PLANNING_FAILED, f"{key} of group '{problem.group.name}' is '{value}'; it "
-                                "must be a number above 0") from error
+            raise PlanningError(
+                ErrorCode.PLANNING_FAILED,
+                f"{key} of group '{problem.group.name}' is '{value}'; it must be a number above 0",
+            ) from error
         step = min(step, size) if size > 0.0 else step
     return max(step, problem.settings.finest_step)
 
@@ -138,8 +148,14 @@ class _EdgeValidator(ob.MotionValidator):
 class _Search:
     """One run of one planner."""
 
-    def __init__(self, problem: PlanningProblem, goals: Array, step: float, default_range: float = DEFAULT_RANGE,
-                 limit: int | None = None) -> None:
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        goals: Array,
+        step: float,
+        default_range: float = DEFAULT_RANGE,
+        limit: int | None = None,
+    ) -> None:
         """Stores what to search.
 
         Args:
@@ -230,12 +246,14 @@ class _Search:
         if self._problem.cancelled() and self._condition is not None:
             self._condition.terminate()
             return False
-        return self._problem.state_is_valid(np.array(state[0:self._count]))
+        return self._problem.state_is_valid(np.array(state[0 : self._count]))
 
     def edge_is_valid(self, first: Any, second: Any) -> bool:
         """Whether the straight motion between two OMPL states is free and keeps the constraints."""
         self.states += 1
-        return self._problem.edge_is_valid(np.array(first[0:self._count]), np.array(second[0:self._count]), self._step)
+        return self._problem.edge_is_valid(
+            np.array(first[0 : self._count]), np.array(second[0 : self._count]), self._step
+        )
 
     def _state(self, information: Any, values: Array) -> Any:
         state = information.allocState()
@@ -248,4 +266,4 @@ class _Search:
             return None
         if self._problem.repeatable and self._problem.interrupted():
             return None  # what was found until the clock ran out is not what the next run finds
-        return np.array([list(state[0:self._count]) for state in definition.getSolutionPath().getStates()])
+        return np.array([list(state[0 : self._count]) for state in definition.getSolutionPath().getStates()])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """OMPL's geometric planners and their settings, under the names MoveIt and ompl_planning.yaml give them."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -34,31 +35,49 @@ Setting = tuple[str, Callable[[object], Any]]
 _RANGE: dict[str, Setting] = {"range": ("setRange", _float)}
 _BIAS: dict[str, Setting] = {"goal_bias": ("setGoalBias", _float)}
 _INTERMEDIATE: dict[str, Setting] = {"intermediate_states": ("setIntermediateStates", _bool)}
-_CELLS: dict[str, Setting] = {"border_fraction": ("setBorderFraction", _float),
-                              "min_valid_path_fraction": ("setMinValidPathFraction", _float)}
+_CELLS: dict[str, Setting] = {
+    "border_fraction": ("setBorderFraction", _float),
+    "min_valid_path_fraction": ("setMinValidPathFraction", _float),
+}
 _FAILED: dict[str, Setting] = {"failed_expansion_score_factor": ("setFailedExpansionCellScoreFactor", _float)}
 _STAR: dict[str, Setting] = {
-    "delay_collision_checking": ("setDelayCC", _bool), "focus_search": ("setFocusSearch", _bool),
-    "informed_sampling": ("setInformedSampling", _bool), "new_state_rejection": ("setNewStateRejection", _bool),
-    "number_sampling_attempts": ("setNumSamplingAttempts", _int), "ordered_sampling": ("setOrderedSampling", _bool),
-    "ordering_batch_size": ("setBatchSize", _int), "prune_threshold": ("setPruneThreshold", _float),
-    "pruned_measure": ("setPrunedMeasure", _bool), "rewire_factor": ("setRewireFactor", _float),
-    "sample_rejection": ("setSampleRejection", _bool), "tree_pruning": ("setTreePruning", _bool),
-    "use_admissible_heuristic": ("setAdmissibleCostToCome", _bool), "use_k_nearest": ("setKNearest", _bool)}
+    "delay_collision_checking": ("setDelayCC", _bool),
+    "focus_search": ("setFocusSearch", _bool),
+    "informed_sampling": ("setInformedSampling", _bool),
+    "new_state_rejection": ("setNewStateRejection", _bool),
+    "number_sampling_attempts": ("setNumSamplingAttempts", _int),
+    "ordered_sampling": ("setOrderedSampling", _bool),
+    "ordering_batch_size": ("setBatchSize", _int),
+    "prune_threshold": ("setPruneThreshold", _float),
+    "pruned_measure": ("setPrunedMeasure", _bool),
+    "rewire_factor": ("setRewireFactor", _float),
+    "sample_rejection": ("setSampleRejection", _bool),
+    "tree_pruning": ("setTreePruning", _bool),
+    "use_admissible_heuristic": ("setAdmissibleCostToCome", _bool),
+    "use_k_nearest": ("setKNearest", _bool),
+}
 _MARCHING: dict[str, Setting] = {
-    "cache_cc": ("setCacheCC", _bool), "extended_fmt": ("setExtendedFMT", _bool),
-    "free_space_volume": ("setFreeSpaceVolume", _float), "heuristics": ("setHeuristics", _bool),
-    "nearest_k": ("setNearestK", _bool), "num_samples": ("setNumSamples", _int),
-    "radius_multiplier": ("setRadiusMultiplier", _float)}
+    "cache_cc": ("setCacheCC", _bool),
+    "extended_fmt": ("setExtendedFMT", _bool),
+    "free_space_volume": ("setFreeSpaceVolume", _float),
+    "heuristics": ("setHeuristics", _bool),
+    "nearest_k": ("setNearestK", _bool),
+    "num_samples": ("setNumSamples", _int),
+    "radius_multiplier": ("setRadiusMultiplier", _float),
+}
 _BATCHES: dict[str, Setting] = {
     "delay_rewiring_to_first_solution": ("setDelayRewiringUntilInitialSolution", _bool),
     "drop_unconnected_samples_on_prune": ("setDropSamplesOnPrune", _bool),
     "find_approximate_solutions": ("setConsiderApproximateSolutions", _bool),
     "prune_threshold_as_fractional_cost_change": ("setPruneThresholdFraction", _float),
-    "rewire_factor": ("setRewireFactor", _float), "samples_per_batch": ("setSamplesPerBatch", _int),
+    "rewire_factor": ("setRewireFactor", _float),
+    "samples_per_batch": ("setSamplesPerBatch", _int),
     "stop_on_each_solution_improvement": ("setStopOnSolnImprovement", _bool),
-    "use_graph_pruning": ("setPruning", _bool), "use_just_in_time_sampling": ("setJustInTimeSampling", _bool),
-    "use_k_nearest": ("setUseKNearest", _bool), "use_strict_queue_ordering": ("setStrictQueueOrdering", _bool)}
+    "use_graph_pruning": ("setPruning", _bool),
+    "use_just_in_time_sampling": ("setJustInTimeSampling", _bool),
+    "use_k_nearest": ("setUseKNearest", _bool),
+    "use_strict_queue_ordering": ("setStrictQueueOrdering", _bool),
+}
 _ROADMAP: dict[str, Setting] = {"max_nearest_neighbors": ("setMaxNearestNeighbors", _int)}
 
 PLANNERS: dict[str, tuple[type, dict[str, Setting]]] = {
@@ -83,9 +102,16 @@ THREADED = frozenset({"PRM", "PRMstar"})
 ANYTIME = frozenset({"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"})
 PATH_LENGTH = "PathLengthOptimizationObjective"
 # Keys of ompl_planning.yaml that are read elsewhere, and those whose other values this OMPL has nothing for.
-GENERAL_KEYS = ("type", "projection_evaluator", "longest_valid_segment_fraction", "maximum_waypoint_distance",
-                "simplify_solutions", "optimization_objective", "enforce_joint_model_state_space",
-                "enforce_constrained_state_space")
+GENERAL_KEYS = (
+    "type",
+    "projection_evaluator",
+    "longest_valid_segment_fraction",
+    "maximum_waypoint_distance",
+    "simplify_solutions",
+    "optimization_objective",
+    "enforce_joint_model_state_space",
+    "enforce_constrained_state_space",
+)
 # Settings OMPL has, but not in its Python interface.
 NOT_SETTABLE = {"BFMT": ("balanced", "optimality")}
 
@@ -102,8 +128,10 @@ def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[st
         elif key in known:
             faults += _unreadable(key, known[key][1], value)
         elif key not in GENERAL_KEYS:
-            faults.append(f"{planner_id} has no setting '{key}'; it is ignored; allowed are "
-                          f"{', '.join(sorted((*known, *GENERAL_KEYS)))}")
+            faults.append(
+                f"{planner_id} has no setting '{key}'; it is ignored; allowed are "
+                f"{', '.join(sorted((*known, *GENERAL_KEYS)))}"
+            )
         elif key == "optimization_objective" and str(value) != PATH_LENGTH:
             faults.append(f"optimization_objective '{value}' is not available and ignored; allowed is {PATH_LENGTH}")
     return faults
@@ -126,8 +154,9 @@ def stages(planner_id: str, settings: Mapping[str, object]) -> tuple[tuple[float
     return (LONG_RANGE, LONG_RANGE_ITERATIONS), (DEFAULT_RANGE, None)
 
 
-def make_planner(planner_id: str, settings: Mapping[str, object], information: Any,
-                 default_range: float = DEFAULT_RANGE) -> Any:
+def make_planner(
+    planner_id: str, settings: Mapping[str, object], information: Any, default_range: float = DEFAULT_RANGE
+) -> Any:
     """Makes an OMPL planner with its settings.
 
     Args:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Projections of the joint space to few dimensions, which OMPL's cell planners measure coverage in."""
+
 from __future__ import annotations
 
 import re
@@ -29,7 +30,7 @@ class _LinkPosition(ob.ProjectionEvaluator):
     def project(self, state: Any, projection: Any) -> None:
         """Writes the position [m] of the link at a state."""
         if self._position is not None:
-            projection[:] = self._position(np.array(state[0:self._count]))
+            projection[:] = self._position(np.array(state[0 : self._count]))
 
     def release(self) -> None:
         """Lets go of the robot model."""
@@ -51,17 +52,25 @@ def projection_evaluator(text: str, problem: PlanningProblem, space: Any) -> Any
     names = [name.strip() for name in match[2].split(",") if name.strip()] if match else []
     joints = problem.group.joints
     if not match or not names or (match[1] == "link" and len(names) != 1):
-        raise PlanningError(ErrorCode.PLANNING_FAILED, f"projection_evaluator '{text}' of group "
-                            f"'{problem.group.name}': allowed are joints(a,b,...) and link(name)")
+        raise PlanningError(
+            ErrorCode.PLANNING_FAILED,
+            f"projection_evaluator '{text}' of group "
+            f"'{problem.group.name}': allowed are joints(a,b,...) and link(name)",
+        )
     if match[1] == "joints":
         unknown = [name for name in names if name not in joints]
         if unknown:
-            raise PlanningError(ErrorCode.PLANNING_FAILED, f"projection_evaluator '{text}': {', '.join(unknown)} is "
-                                f"not in group '{problem.group.name}'; its joints are {', '.join(joints)}")
+            raise PlanningError(
+                ErrorCode.PLANNING_FAILED,
+                f"projection_evaluator '{text}': {', '.join(unknown)} is "
+                f"not in group '{problem.group.name}'; its joints are {', '.join(joints)}",
+            )
         return ob.RealVectorOrthogonalProjectionEvaluator(space, [joints.index(name) for name in names])
     if not problem.model.has_link(names[0]):
-        raise PlanningError(ErrorCode.INVALID_LINK_NAME, f"projection_evaluator '{text}': the robot has no such link; "
-                            f"known: {', '.join(problem.model.frame_ids)}")
+        raise PlanningError(
+            ErrorCode.INVALID_LINK_NAME,
+            f"projection_evaluator '{text}': the robot has no such link; known: {', '.join(problem.model.frame_ids)}",
+        )
 
     def position(values: Array) -> Array:
         return problem.model.link_transforms(problem.motion.full_positions(values))[names[0]].translation

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the point of a circle from path_constraints, where Pilz's planner has it: it is an input and no constraint."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -26,13 +27,19 @@ def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_c
         PlanningError: the name is another, there is not exactly one point, it is not finite, or its frame or link
             does not exist.
     """
-    poses = [pose for item in constraints.position_constraints
-             for pose in (*item.constraint_region.primitive_poses, *item.constraint_region.mesh_poses)]
+    poses = [
+        pose
+        for item in constraints.position_constraints
+        for pose in (*item.constraint_region.primitive_poses, *item.constraint_region.mesh_poses)
+    ]
     if constraints.name not in (CENTRE, INTERIM) or len(constraints.position_constraints) != 1 or len(poses) != 1:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{where}: name '{constraints.name}' with "
-                            f"{len(constraints.position_constraints)} position constraints and {len(poses)} poses; "
-                            f"CIRC needs the name '{CENTRE}' or '{INTERIM}' and one position constraint whose region "
-                            "has one pose, the point")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"{where}: name '{constraints.name}' with "
+            f"{len(constraints.position_constraints)} position constraints and {len(poses)} poses; "
+            f"CIRC needs the name '{CENTRE}' or '{INTERIM}' and one position constraint whose region "
+            "has one pose, the point",
+        )
     item = constraints.position_constraints[0]
     if item.link_name and not scene.model.has_link(item.link_name):
         raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"{where}: link", item.link_name, scene.model.frame_ids)

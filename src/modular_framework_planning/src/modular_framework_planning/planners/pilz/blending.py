@@ -5,6 +5,7 @@ Both motions go on in their own time; the link's pose is a mean of the two poses
 polynomial of fifth order) from the first to the second. The link enters and leaves the sphere with the velocity and
 the acceleration of the motion it comes from or goes to, and as a mean of two points of a ball it stays inside.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -53,8 +54,11 @@ class Transition:
         """Returns the second motion's share and its first and second derivative, which are 0 at both ends."""
         s = min(max(time_s / self.duration_s, 0.0), 1.0)
         rest = 1.0 - s
-        return (s * s * s * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * rest * rest / self.duration_s,
-                60.0 * s * rest * (1.0 - 2.0 * s) / self.duration_s**2)
+        return (
+            s * s * s * (10.0 - 15.0 * s + 6.0 * s * s),
+            30.0 * s * s * rest * rest / self.duration_s,
+            60.0 * s * rest * (1.0 - 2.0 * s) / self.duration_s**2,
+        )
 
     def pose(self, time_s: float) -> Transform:
         """Returns the link's pose in the planning frame."""
@@ -62,17 +66,23 @@ class Transition:
         other = self.follower.pose(state_at(self.second, time_s + self.second_from).positions)
         weight = self.weight(time_s)[0]
         turn = pin.log3(one.rotation.T @ other.rotation)
-        return pin.SE3(one.rotation @ pin.exp3(weight * turn),
-                       one.translation + weight * (other.translation - one.translation))
+        return pin.SE3(
+            one.rotation @ pin.exp3(weight * turn), one.translation + weight * (other.translation - one.translation)
+        )
 
     def posture(self, time_s: float) -> JointState:
         """Returns the mean of the joints, for a redundant arm to keep near to."""
         one, other = state_at(self.first, time_s + self.first_from), state_at(self.second, time_s + self.second_from)
         weight, rate, change = self.weight(time_s)
         offset, speed = other.positions - one.positions, other.velocities - one.velocities
-        return JointState(one.positions + weight * offset, one.velocities + weight * speed + rate * offset,
-                          one.accelerations + weight * (other.accelerations - one.accelerations)
-                          + 2.0 * rate * speed + change * offset)
+        return JointState(
+            one.positions + weight * offset,
+            one.velocities + weight * speed + rate * offset,
+            one.accelerations
+            + weight * (other.accelerations - one.accelerations)
+            + 2.0 * rate * speed
+            + change * offset,
+        )
 
 
 def _crossing(outside: Callable[[float], bool], times: Array) -> float | None:
@@ -89,8 +99,9 @@ def _crossing(outside: Callable[[float], bool], times: Array) -> float | None:
     return None
 
 
-def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFollower,
-          period_s: float) -> tuple[Trajectory, Trajectory]:
+def blend(
+    first: Trajectory, second: Trajectory, radius: float, follower: PoseFollower, period_s: float
+) -> tuple[Trajectory, Trajectory]:
     """Joins two trajectories.
 
     Args:
@@ -109,15 +120,19 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
     centre = follower.pose(first.positions[-1]).translation
 
     def outside(trajectory: Trajectory) -> Callable[[float], bool]:
-        return lambda time_s: float(np.linalg.norm(
-            follower.pose(state_at(trajectory, time_s).positions).translation - centre)) >= radius
+        return lambda time_s: (
+            float(np.linalg.norm(follower.pose(state_at(trajectory, time_s).positions).translation - centre)) >= radius
+        )
 
     entry = _crossing(outside(first), first.sample_times(SEARCH_PERIOD_S)[::-1])
     leave = _crossing(outside(second), second.sample_times(SEARCH_PERIOD_S))
     if entry is None or leave is None:
         which = "before" if entry is None else "after"
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blend_radius {radius} m: the motion {which} the blended "
-                            f"point stays within that distance of it; choose a radius shorter than the motion")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"blend_radius {radius} m: the motion {which} the blended "
+            f"point stays within that distance of it; choose a radius shorter than the motion",
+        )
     remaining = first.duration_s - entry
     duration = max(remaining, leave)
     transition = Transition(first, second, follower, entry, leave - duration, duration)
@@ -125,26 +140,42 @@ def blend(first: Trajectory, second: Trajectory, radius: float, follower: PoseFo
     middle = follow(transition, follower, period_s, start, end, transition.posture)
     off = np.abs(middle.positions[-1] - end.positions)
     if off.max() > SAME_POSTURE:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "blending: the arm would arrive in another posture than the "
-                            f"next motion has; joint '{first.joint_names[int(off.argmax())]}' is off by "
-                            f"{off.max():.3f}: choose a smaller blend_radius")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            "blending: the arm would arrive in another posture than the "
+            f"next motion has; joint '{first.joint_names[int(off.argmax())]}' is off by "
+            f"{off.max():.3f}: choose a smaller blend_radius",
+        )
     middle.positions[-1] = end.positions
-    parts = [_part(first, first.times < entry - SHORTEST_PIECE_S, 0.0),
-             _part(middle, np.ones(len(middle.times), dtype=bool), entry),
-             _part(second, second.times > leave + SHORTEST_PIECE_S, entry + duration - leave)]
+    parts = [
+        _part(first, first.times < entry - SHORTEST_PIECE_S, 0.0),
+        _part(middle, np.ones(len(middle.times), dtype=bool), entry),
+        _part(second, second.times > leave + SHORTEST_PIECE_S, entry + duration - leave),
+    ]
     return concatenated(parts), middle
 
 
 def _part(trajectory: Trajectory, chosen: NDArray[np.bool_], shift_s: float) -> Trajectory:
-    return Trajectory(trajectory.joint_names, trajectory.times[chosen] + shift_s, trajectory.positions[chosen],
-                      trajectory.velocities[chosen], trajectory.accelerations[chosen])
+    return Trajectory(
+        trajectory.joint_names,
+        trajectory.times[chosen] + shift_s,
+        trajectory.positions[chosen],
+        trajectory.velocities[chosen],
+        trajectory.accelerations[chosen],
+    )
 
 
 def concatenated(parts: list[Trajectory]) -> Trajectory:
     """Joins pieces whose times are already right, to whole nanoseconds."""
     times = np.round(np.concatenate([part.times for part in parts]), 9)
-    return Trajectory(parts[0].joint_names, times, *(np.concatenate([getattr(part, name) for part in parts])
-                                                     for name in ("positions", "velocities", "accelerations")))
+    return Trajectory(
+        parts[0].joint_names,
+        times,
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("positions", "velocities", "accelerations")
+        ),
+    )
 
 
 def appended(first: Trajectory, second: Trajectory) -> Trajectory:

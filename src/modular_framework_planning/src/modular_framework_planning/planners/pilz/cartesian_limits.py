@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Limits of a tool's speed along lines and arcs, as `robot_description_planning/cartesian_limits` gives them."""
+
 from __future__ import annotations
 
 import math
@@ -43,11 +44,19 @@ def read_cartesian_limits(entries: Mapping[str, Any], where: str = "cartesian_li
     for key in KEYS:
         value = entries.get(key)
         sign = -1.0 if key == "max_trans_dec" else 1.0
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or (
-                sign * value <= 0.0):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not math.isfinite(value)
+            or (sign * value <= 0.0)
+        ):
             got = "missing" if key not in entries else repr(value)
             faults.append(f"{key} is {got}; a number {'below' if sign < 0 else 'above'} 0 is needed")
     if faults:
         raise ModelError(f"{where}: {'; '.join(faults)}; see cartesian_limits.yaml of a config package")
-    return CartesianLimits(float(entries["max_trans_vel"]), float(entries["max_trans_acc"]),
-                           -float(entries["max_trans_dec"]), float(entries["max_rot_vel"]))
+    return CartesianLimits(
+        float(entries["max_trans_vel"]),
+        float(entries["max_trans_acc"]),
+        -float(entries["max_trans_dec"]),
+        float(entries["max_rot_vel"]),
+    )

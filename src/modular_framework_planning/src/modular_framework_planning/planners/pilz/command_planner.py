@@ -3,6 +3,7 @@
 
 It goes around nothing: the motion is what was asked for, or it is refused with the reason.
 """
+
 from __future__ import annotations
 
 import math
@@ -51,8 +52,9 @@ class CommandPlanner:
     auxiliary_constraints = (CENTRE, INTERIM)
     collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators check no collisions themselves
 
-    def __init__(self, cartesian_limits: Mapping[str, Any] | None, sampling_time_s: float = DEFAULT_SAMPLING_TIME_S
-                 ) -> None:
+    def __init__(
+        self, cartesian_limits: Mapping[str, Any] | None, sampling_time_s: float = DEFAULT_SAMPLING_TIME_S
+    ) -> None:
         """Stores the limits.
 
         Args:
@@ -70,8 +72,10 @@ class CommandPlanner:
     @classmethod
     def configure(cls, _model: RobotModel, settings: PipelineSettings) -> CommandPlanner:
         """Makes the planner from parameters: robot_description_planning/cartesian_limits, sampling_time."""
-        return cls(settings.robot_planning.get("cartesian_limits"),
-                   float(settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S)))
+        return cls(
+            settings.robot_planning.get("cartesian_limits"),
+            float(settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S)),
+        )
 
     def plan(self, problem: PlanningProblem) -> Trajectory:
         """Plans one motion; raises PlanningError with the reason."""
@@ -79,11 +83,16 @@ class CommandPlanner:
             raise PlanningError(ErrorCode.PREEMPTED, f"{problem.planner_id} was cancelled before it began")
         _require_standing(problem)
         if len(problem.request.goals) != 1:
-            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {len(problem.request.goals)} "
-                                f"alternatives; {problem.planner_id} takes exactly one")
+            raise PlanningError(
+                ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                f"goal_constraints: {len(problem.request.goals)} alternatives; {problem.planner_id} takes exactly one",
+            )
         if not isinstance(problem.request.goals[0], JointGoal | PoseGoal):
-            raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"goal_constraints: {problem.planner_id} takes "
-                                "joint constraints alone, or one position and one orientation constraint of one link")
+            raise PlanningError(
+                ErrorCode.INVALID_GOAL_CONSTRAINTS,
+                f"goal_constraints: {problem.planner_id} takes "
+                "joint constraints alone, or one position and one orientation constraint of one link",
+            )
         pace = self._pace(problem)
         match problem.planner_id:
             case "PTP" | "":
@@ -91,15 +100,18 @@ class CommandPlanner:
                 return point_to_point(problem.start_values, problem.goal_states()[0], rates, pace)
             case "LIN" | "CIRC":
                 return self._along_path(problem, pace)
-        raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' is not one of "
-                            f"{', '.join(self.planner_ids)}")
+        raise PlanningError(
+            ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' is not one of {', '.join(self.planner_ids)}"
+        )
 
     def _pace(self, problem: PlanningProblem) -> Pace:
         """Reads the scaling factors back from the scaled limits, where 0 has become the default."""
         indices = problem.group.indices
-        return Pace(float((problem.max_velocity / problem.model.max_velocity[indices]).min()),
-                    float((problem.max_acceleration / problem.model.max_acceleration[indices]).min()),
-                    self.sampling_time_s)
+        return Pace(
+            float((problem.max_velocity / problem.model.max_velocity[indices]).min()),
+            float((problem.max_acceleration / problem.model.max_acceleration[indices]).min()),
+            self.sampling_time_s,
+        )
 
     def _along_path(self, problem: PlanningProblem, pace: Pace) -> Trajectory:
         limits = self._require_limits(problem.planner_id)
@@ -111,17 +123,23 @@ class CommandPlanner:
 
     def _require_limits(self, planner_id: str) -> CartesianLimits:
         if self._limits is None:
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{planner_id}: robot_description_planning/"
-                                "cartesian_limits is not set; load a cartesian_limits.yaml with max_trans_vel, "
-                                "max_trans_acc, max_trans_dec and max_rot_vel")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"{planner_id}: robot_description_planning/"
+                "cartesian_limits is not set; load a cartesian_limits.yaml with max_trans_vel, "
+                "max_trans_acc, max_trans_dec and max_rot_vel",
+            )
         return self._limits
 
 
 def _require_standing(problem: PlanningProblem) -> None:
     for name, velocity in problem.request.start_velocities.items():
         if name in problem.group.joints and not abs(velocity) <= STANDING_STILL:
-            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"start state: joint '{name}' moves at {velocity}; "
-                                f"{problem.planner_id} starts from rest (at most {STANDING_STILL})")
+            raise PlanningError(
+                ErrorCode.INVALID_ROBOT_STATE,
+                f"start state: joint '{name}' moves at {velocity}; "
+                f"{problem.planner_id} starts from rest (at most {STANDING_STILL})",
+            )
 
 
 def _target(problem: PlanningProblem) -> _Target:
@@ -139,6 +157,9 @@ def _path(problem: PlanningProblem, start: Transform, end: Transform) -> PosePat
         return LinePath.between(start, end)
     auxiliary = problem.request.auxiliary_point
     if auxiliary is None:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"CIRC: path_constraints: neither '{CENTRE}' nor "
-                            f"'{INTERIM}'; one is needed as the name, with a position constraint that is the point")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"CIRC: path_constraints: neither '{CENTRE}' nor "
+            f"'{INTERIM}'; one is needed as the name, with a position constraint that is the point",
+        )
     return (arc_around_centre if auxiliary.name == CENTRE else arc_through_interim)(start, end, auxiliary.position)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The three motions: PTP moves the joints together, LIN leads a link along a line, CIRC along an arc."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -45,9 +46,12 @@ def point_to_point(start: Array, goal: Array, rates: JointRates, pace: Pace) -> 
     lead = float(np.abs(change).max())
     if lead < SAME_POSITION:
         return standstill(rates.joints, start)
-    profile = fastest_profile(lead, float(rates.velocity.min()) * pace.velocity_scaling,
-                              float(rates.acceleration.min()) * pace.acceleration_scaling,
-                              float(rates.deceleration.min()) * pace.acceleration_scaling)
+    profile = fastest_profile(
+        lead,
+        float(rates.velocity.min()) * pace.velocity_scaling,
+        float(rates.acceleration.min()) * pace.acceleration_scaling,
+        float(rates.deceleration.min()) * pace.acceleration_scaling,
+    )
     times = sample_times(profile.duration_s, profile.knots, pace.period_s)
     position, velocity, acceleration = (values[:, None] / lead * change for values in profile.at(times))
     positions = start + position
@@ -55,8 +59,9 @@ def point_to_point(start: Array, goal: Array, rates: JointRates, pace: Pace) -> 
     return Trajectory(rates.joints, times, positions, velocity, acceleration)
 
 
-def along_path(path: PosePath, follower: PoseFollower, start: Array, limits: CartesianLimits, pace: Pace,
-               goal: Array | None = None) -> Trajectory:
+def along_path(
+    path: PosePath, follower: PoseFollower, start: Array, limits: CartesianLimits, pace: Pace, goal: Array | None = None
+) -> Trajectory:
     """Leads a link along a path.
 
     Args:
@@ -102,6 +107,9 @@ def require_posture(trajectory: Trajectory, goal: Array) -> None:
     off = np.abs(trajectory.positions[-1] - goal)
     worst = int(off.argmax())
     if off[worst] > GOAL_TOLERANCE:
-        raise PlanningError(ErrorCode.GOAL_CONSTRAINTS_VIOLATED, "the path ends at the goal's pose in another posture: "
-                            f"joint '{trajectory.joint_names[worst]}' at {trajectory.positions[-1][worst]:.4f} instead "
-                            f"of {goal[worst]:.4f}; give the goal as a pose, or move there by PTP")
+        raise PlanningError(
+            ErrorCode.GOAL_CONSTRAINTS_VIOLATED,
+            "the path ends at the goal's pose in another posture: "
+            f"joint '{trajectory.joint_names[worst]}' at {trajectory.positions[-1][worst]:.4f} instead "
+            f"of {goal[worst]:.4f}; give the goal as a pose, or move there by PTP",
+        )

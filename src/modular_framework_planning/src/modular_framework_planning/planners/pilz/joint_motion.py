@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Turns a link's motion over time into a trajectory of joints, each sample checked against the joints' limits."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -73,8 +74,12 @@ class JointRates:
     @classmethod
     def of(cls, model: RobotModel, group: JointGroup) -> JointRates:
         """Reads the limits of a group."""
-        return cls(group.joints, model.max_velocity[group.indices], model.max_acceleration[group.indices],
-                   model.max_deceleration[group.indices])
+        return cls(
+            group.joints,
+            model.max_velocity[group.indices],
+            model.max_acceleration[group.indices],
+            model.max_deceleration[group.indices],
+        )
 
     def require(self, time_s: float, velocities: Array, accelerations: Array) -> None:
         """Checks one sample.
@@ -84,8 +89,10 @@ class JointRates:
         """
         braking = velocities * accelerations < 0.0
         allowed = np.where(braking, self.deceleration, self.acceleration)
-        for what, unit, values, limits in (("velocity", "1/s", velocities, self.velocity),
-                                           ("acceleration", "1/s^2", accelerations, allowed)):
+        for what, unit, values, limits in (
+            ("velocity", "1/s", velocities, self.velocity),
+            ("acceleration", "1/s^2", accelerations, allowed),
+        ):
             excess = np.abs(values) / limits
             worst = int(excess.argmax())
             if excess[worst] > 1.0 + LIMIT_TOLERANCE:
@@ -93,7 +100,8 @@ class JointRates:
                     ErrorCode.INVALID_MOTION_PLAN,
                     f"joint '{self.joints[worst]}' would need {what} {abs(values[worst]):.3f} {unit} at "
                     f"{time_s:.3f} s; allowed is {limits[worst]:.3f}: lower max_{what}_scaling_factor, or keep away "
-                    "from singular postures")
+                    "from singular postures",
+                )
 
 
 def link_motion(motion: PoseMotion, time_s: float) -> LinkMotion:
@@ -107,8 +115,14 @@ def link_motion(motion: PoseMotion, time_s: float) -> LinkMotion:
     return LinkMotion(velocity, np.concatenate([step_after - step_before, turn_after - turn_before]) / step**2)
 
 
-def follow(motion: PoseMotion, follower: PoseFollower, period_s: float, start: JointState,
-           end: JointState | None = None, posture: Posture | None = None) -> Trajectory:
+def follow(
+    motion: PoseMotion,
+    follower: PoseFollower,
+    period_s: float,
+    start: JointState,
+    end: JointState | None = None,
+    posture: Posture | None = None,
+) -> Trajectory:
     """Follows a link's motion with the joints.
 
     Args:
@@ -133,18 +147,23 @@ def follow(motion: PoseMotion, follower: PoseFollower, period_s: float, start: J
             rates.require(time_s, state.velocities, state.accelerations)
         rows.append(state)
     rows[-1] = JointState(state.positions, end.velocities, end.accelerations) if end else at_rest(state.positions)
-    return Trajectory(follower.group.joints, points, *(np.array([getattr(row, name) for row in rows])
-                                                       for name in ("positions", "velocities", "accelerations")))
+    return Trajectory(
+        follower.group.joints,
+        points,
+        *(np.array([getattr(row, name) for row in rows]) for name in ("positions", "velocities", "accelerations")),
+    )
 
 
-def _advance(motion: PoseMotion, follower: PoseFollower, state: JointState, time_s: float, gap_s: float,
-             posture: Posture | None) -> JointState:
+def _advance(
+    motion: PoseMotion, follower: PoseFollower, state: JointState, time_s: float, gap_s: float, posture: Posture | None
+) -> JointState:
     guess = state.positions + gap_s * (state.velocities + 0.5 * gap_s * state.accelerations)
     wanted = posture(time_s) if posture else None
     try:
         values = follower.step(guess, motion.pose(time_s), wanted.positions if wanted else None)
     except PlanningError as error:
         raise PlanningError(error.code, f"{error.reason} (after {time_s:.3f} of {motion.duration_s:.3f} s)") from error
-    velocities, accelerations = follower.rates(values, link_motion(motion, time_s),
-                                               (wanted.velocities, wanted.accelerations) if wanted else None)
+    velocities, accelerations = follower.rates(
+        values, link_motion(motion, time_s), (wanted.velocities, wanted.accelerations) if wanted else None
+    )
     return JointState(values, velocities, accelerations)

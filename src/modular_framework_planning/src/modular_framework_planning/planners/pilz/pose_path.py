@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Paths of a link in space: straight lines and circular arcs, the orientation turning evenly about one axis."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -57,8 +58,10 @@ class LinePath:
 
     def pose(self, share: float) -> Transform:
         """Returns the link's pose in the planning frame."""
-        return pin.SE3(_turned(self.start, self.turn, share),
-                       self.start.translation + share * (self.end.translation - self.start.translation))
+        return pin.SE3(
+            _turned(self.start, self.turn, share),
+            self.start.translation + share * (self.end.translation - self.start.translation),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,19 +114,33 @@ def arc_around_centre(start: Transform, end: Transform, centre: Array) -> ArcPat
     out, back = start.translation - centre, end.translation - centre
     start_radius, end_radius = float(np.linalg.norm(out)), float(np.linalg.norm(back))
     if min(start_radius, end_radius) < SMALLEST_RADIUS:
-        raise _invalid(f"the centre is {min(start_radius, end_radius):.6f} m from start or goal; at least "
-                       f"{SMALLEST_RADIUS} m is needed")
+        raise _invalid(
+            f"the centre is {min(start_radius, end_radius):.6f} m from start or goal; at least "
+            f"{SMALLEST_RADIUS} m is needed"
+        )
     if abs(start_radius - end_radius) > SAME_RADIUS:
-        raise _invalid(f"start is {start_radius:.4f} m from the centre and goal {end_radius:.4f} m; they may differ "
-                       f"by {SAME_RADIUS} m: move the centre")
+        raise _invalid(
+            f"start is {start_radius:.4f} m from the centre and goal {end_radius:.4f} m; they may differ "
+            f"by {SAME_RADIUS} m: move the centre"
+        )
     if _sine(out, back) < SMALLEST_SINE:
-        raise _invalid("start, centre and goal lie on one line, so the circle's plane is unknown; a centre cannot "
-                       "give a half or a full circle: use an interim point, or two arcs")
+        raise _invalid(
+            "start, centre and goal lie on one line, so the circle's plane is unknown; a centre cannot "
+            "give a half or a full circle: use an interim point, or two arcs"
+        )
     first = out / start_radius
     across = back - (back @ first) * first
     angle = float(np.arctan2(np.linalg.norm(across), back @ first))
-    return ArcPath(start, pin.log3(start.rotation.T @ end.rotation), centre, first, across / np.linalg.norm(across),
-                   angle, start_radius, end_radius)
+    return ArcPath(
+        start,
+        pin.log3(start.rotation.T @ end.rotation),
+        centre,
+        first,
+        across / np.linalg.norm(across),
+        angle,
+        start_radius,
+        end_radius,
+    )
 
 
 def arc_through_interim(start: Transform, end: Transform, interim: Array) -> ArcPath:
@@ -135,12 +152,15 @@ def arc_through_interim(start: Transform, end: Transform, interim: Array) -> Arc
     to_interim, to_end = interim - start.translation, end.translation - start.translation
     nearest = min(float(np.linalg.norm(item)) for item in (to_interim, to_end, to_end - to_interim))
     if nearest < SMALLEST_RADIUS or _sine(to_interim, to_end) < SMALLEST_SINE:
-        raise _invalid("start, interim point and goal coincide or lie on one line, so they give no circle; a full "
-                       "circle needs two arcs")
+        raise _invalid(
+            "start, interim point and goal coincide or lie on one line, so they give no circle; a full "
+            "circle needs two arcs"
+        )
     normal = np.cross(to_interim, to_end)
     square = float(normal @ normal)
     shift = (to_interim @ to_interim * np.cross(to_end, normal) + to_end @ to_end * np.cross(normal, to_interim)) / (
-        2.0 * square)
+        2.0 * square
+    )
     centre = start.translation + shift
     radius = float(np.linalg.norm(shift))
     first = -shift / radius
@@ -173,12 +193,19 @@ class TimedPath:
         return self.path.pose(float(position) / self.profile.distance)
 
 
-def timed(path: PosePath, limits: CartesianLimits, velocity_scaling: float,
-          acceleration_scaling: float) -> TimedPath | None:
+def timed(
+    path: PosePath, limits: CartesianLimits, velocity_scaling: float, acceleration_scaling: float
+) -> TimedPath | None:
     """Gives a path the fastest trapezoid within scaled Cartesian limits; None where it has no length."""
     length = max(path.translation_length, float(np.linalg.norm(path.turn)) * limits.metres_per_radian)
     if length < 1e-9:
         return None
-    return TimedPath(path, fastest_profile(length, limits.velocity * velocity_scaling,
-                                           limits.acceleration * acceleration_scaling,
-                                           limits.deceleration * acceleration_scaling))
+    return TimedPath(
+        path,
+        fastest_profile(
+            length,
+            limits.velocity * velocity_scaling,
+            limits.acceleration * acceleration_scaling,
+            limits.deceleration * acceleration_scaling,
+        ),
+    )

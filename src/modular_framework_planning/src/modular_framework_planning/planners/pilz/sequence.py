@@ -3,6 +3,7 @@
 
 The motions of one group that follow each other become one trajectory; a change of group begins another.
 """
+
 from __future__ import annotations
 
 import math
@@ -77,8 +78,11 @@ def checked_radii(items: Sequence[ItemSpec]) -> tuple[list[float], list[str]]:
         PlanningError: a radius is below 0 or not finite, the last one is not 0, or an item that is not the first of
             its group has a start state.
     """
-    faults = [f"items[{number}].blend_radius is {item.blend_radius}; it must be 0 or more"
-              for number, item in enumerate(items) if not 0.0 <= item.blend_radius < math.inf]
+    faults = [
+        f"items[{number}].blend_radius is {item.blend_radius}; it must be 0 or more"
+        for number, item in enumerate(items)
+        if not 0.0 <= item.blend_radius < math.inf
+    ]
     if items and items[-1].blend_radius != 0.0:
         faults.append(f"items[{len(items) - 1}].blend_radius is {items[-1].blend_radius}; the last one must be 0")
     if faults:
@@ -86,16 +90,21 @@ def checked_radii(items: Sequence[ItemSpec]) -> tuple[list[float], list[str]]:
     seen: set[str] = set()
     for number, item in enumerate(items):
         if item.has_start_state and item.group in seen:
-            raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, f"items[{number}].start_state: only the first item of "
-                                f"group '{item.group}' may have one; leave it empty, the motion starts where the one "
-                                "before it ends")
+            raise PlanningError(
+                ErrorCode.INVALID_ROBOT_STATE,
+                f"items[{number}].start_state: only the first item of "
+                f"group '{item.group}' may have one; leave it empty, the motion starts where the one "
+                "before it ends",
+            )
         seen.add(item.group)
     radii, warnings = [item.blend_radius for item in items], []
     for number, (item, following) in enumerate(zip(items[:-1], items[1:], strict=True)):
         if item.blend_radius > 0.0 and item.group != following.group:
             radii[number] = 0.0
-            warnings.append(f"items[{number}].blend_radius {item.blend_radius} is taken as 0: the next motion is that "
-                            f"of group '{following.group}' and not of '{item.group}'")
+            warnings.append(
+                f"items[{number}].blend_radius {item.blend_radius} is taken as 0: the next motion is that "
+                f"of group '{following.group}' and not of '{item.group}'"
+            )
     return radii, warnings
 
 
@@ -130,8 +139,11 @@ class SequenceJoiner:
             before = parts[-1]
             radius = items[number - 1].blend_radius
             try:
-                trajectory = (self._blended(before, items[number - 1], item, radius) if radius > 0.0
-                              else appended(before.trajectory, item.answer.trajectory))
+                trajectory = (
+                    self._blended(before, items[number - 1], item, radius)
+                    if radius > 0.0
+                    else appended(before.trajectory, item.answer.trajectory)
+                )
             except PlanningError as error:
                 raise PlanningError(error.code, f"items[{number - 1}] and items[{number}]: {error.reason}") from error
             parts[-1] = SequencePart(before.scene, group, trajectory, (*before.answers, item.answer))
@@ -152,13 +164,17 @@ class SequenceJoiner:
             ends = [follower.pose(part.answer.goal[indices]).translation for part in (item, following)]
             distance = float(np.linalg.norm(ends[1] - ends[0]))
             if radii > distance - SMALLEST_GAP_M:
-                raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"items[{number}] and items[{number + 1}]: the "
-                                    f"blend radii {item.blend_radius} and {following.blend_radius} m overlap: their "
-                                    f"sum must be below the distance {distance:.4f} m of the two ends")
+                raise PlanningError(
+                    ErrorCode.INVALID_MOTION_PLAN,
+                    f"items[{number}] and items[{number + 1}]: the "
+                    f"blend radii {item.blend_radius} and {following.blend_radius} m overlap: their "
+                    f"sum must be below the distance {distance:.4f} m of the two ends",
+                )
 
     def _blended(self, before: SequencePart, item: PlannedItem, following: PlannedItem, radius: float) -> Trajectory:
-        trajectory, inside = blend(before.trajectory, following.answer.trajectory, radius, self._follower(item),
-                                   self._period_s)
+        trajectory, inside = blend(
+            before.trajectory, following.answer.trajectory, radius, self._follower(item), self._period_s
+        )
         group, start = before.group, following.answer.start
         checker = self._checkers(following.request.scene, group, start)
         motion = MotionChecker(checker, group.indices, start)
@@ -170,6 +186,9 @@ class SequenceJoiner:
         for constraints in (item.request.path_constraints, following.request.path_constraints):
             for values in curve if constraints is not None else ():
                 if constraints is not None and not constraints.satisfied(motion.full_positions(values)):
-                    raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blended within {radius} m: a path constraint "
-                                        f"is violated: {constraints.describe(motion.full_positions(values))}")
+                    raise PlanningError(
+                        ErrorCode.INVALID_MOTION_PLAN,
+                        f"blended within {radius} m: a path constraint "
+                        f"is violated: {constraints.describe(motion.full_positions(values))}",
+                    )
         return trajectory

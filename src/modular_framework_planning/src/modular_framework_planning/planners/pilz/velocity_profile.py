@@ -6,6 +6,7 @@ of acceleration, and such a polynomial overshoots the limits there. Averaging th
 distance and limits (an average never exceeds what it averages) and makes it a chain of cubics, which a controller
 follows exactly.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -82,8 +83,9 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
     positions = np.concatenate([[0.0], np.cumsum(steps)])
     scale = distance / positions[-1]
     velocities[-1] = 0.0
-    return TrapezoidalProfile(distance, rise, cruise, fall, knots, positions * scale, velocities * scale,
-                              accelerations * scale)
+    return TrapezoidalProfile(
+        distance, rise, cruise, fall, knots, positions * scale, velocities * scale, accelerations * scale
+    )
 
 
 def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
@@ -96,9 +98,12 @@ def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
         PlanningError: the motion is so slow that it would have more than 20,000 points.
     """
     if duration_s > MAX_POINTS * period_s:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"the motion would take {duration_s:.0f} s, which at one "
-                            f"point every {period_s} s is more than {MAX_POINTS} points; choose larger scaling "
-                            "factors")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"the motion would take {duration_s:.0f} s, which at one "
+            f"point every {period_s} s is more than {MAX_POINTS} points; choose larger scaling "
+            "factors",
+        )
     regular = np.arange(0.0, duration_s, period_s)
     kept = np.unique(np.concatenate([[0.0, duration_s], knots[(knots > 0.0) & (knots < duration_s)]]))
     kept = kept[np.concatenate([[True], np.diff(kept) >= SHORTEST_GAP_S])]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a state of a motion costs: depth in obstacles, violation of path constraints."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -37,5 +38,7 @@ def collision_costs(checker: CollisionChecker, states: Array) -> Array:
     """Returns the costs of collisions of states (n, joints), shape (n,)."""
     if isinstance(checker, CollisionCostEstimator):
         return checker.collision_costs(states)
-    return np.array([sum(item.depth + TOUCH_COST_M for item in checker.contacts(state, include_fixed=False))
-                     for state in states], dtype=float)
+    return np.array(
+        [sum(item.depth + TOUCH_COST_M for item in checker.contacts(state, include_fixed=False)) for state in states],
+        dtype=float,
+    )

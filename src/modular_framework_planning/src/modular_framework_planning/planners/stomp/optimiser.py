@@ -4,6 +4,7 @@
 Source: M. Kalakrishnan, S. Chitta, E. Theodorou, P. Pastor, S. Schaal, "STOMP: Stochastic Trajectory Optimization for
 Motion Planning", ICRA 2011. Besides the weighted average, the cheapest copy itself may become the next motion.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -35,7 +36,7 @@ class Optimiser:
         inner = settings.num_timesteps - 2
         differences = np.zeros((inner + 2, inner))  # second differences of a motion whose ends do not move
         for column in range(inner):
-            differences[column:column + 3, column] = 1.0, -2.0, 1.0
+            differences[column : column + 3, column] = 1.0, -2.0, 1.0
         inverse = np.linalg.inv(differences.T @ differences)
         self._noise = np.linalg.cholesky(inverse / inverse.max())
         self._smoothing = inverse / (inverse.max(axis=0) * inner)

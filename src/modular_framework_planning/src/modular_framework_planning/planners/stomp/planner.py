@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The planner of the pipeline `stomp`: several attempts to bend a straight motion around obstacles."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -64,18 +65,30 @@ class StompPlanner:
 
 def _failure(problem: PlanningProblem, settings: StompSettings, motion: Array) -> PlanningError:
     """Says why there is no path: how many states of the best motion are invalid, and what is wrong with one of them."""
-    reason = no_path(problem, "STOMP") if problem.interrupted() else PlanningError(
-        ErrorCode.PLANNING_FAILED, f"STOMP found no path in {settings.num_attempts} attempts of "
-        f"{settings.num_iterations} iterations; allow more or choose another goal")
+    reason = (
+        no_path(problem, "STOMP")
+        if problem.interrupted()
+        else PlanningError(
+            ErrorCode.PLANNING_FAILED,
+            f"STOMP found no path in {settings.num_attempts} attempts of "
+            f"{settings.num_iterations} iterations; allow more or choose another goal",
+        )
+    )
     invalid = [row for row in motion if not problem.state_is_valid(row)]
     if not invalid:
-        return PlanningError(reason.code, f"{reason.reason}; in its best motion only the ways between timesteps are "
-                             "invalid: raise num_timesteps")
+        return PlanningError(
+            reason.code,
+            f"{reason.reason}; in its best motion only the ways between timesteps are invalid: raise num_timesteps",
+        )
     middle = problem.motion.full_positions(invalid[len(invalid) // 2])
     contacts = problem.checker.contacts(middle, include_fixed=False)
     violated = "" if problem.constraints is None else problem.constraints.describe(middle)
-    return PlanningError(reason.code, f"{reason.reason}; in its best motion {len(invalid)} of {len(motion)} timesteps "
-                         f"are invalid: {describe_contacts(contacts) if contacts else violated}", contacts)
+    return PlanningError(
+        reason.code,
+        f"{reason.reason}; in its best motion {len(invalid)} of {len(motion)} timesteps "
+        f"are invalid: {describe_contacts(contacts) if contacts else violated}",
+        contacts,
+    )
 
 
 class _Attempt:
@@ -100,7 +113,7 @@ class _Attempt:
             if (valid is not None and after >= settings.num_iterations_after_valid) or self._problem.interrupted():
                 break
             after += valid is not None
-            kept = np.argsort(costs.sum(axis=1))[:max(0, settings.max_rollouts - settings.num_rollouts)]
+            kept = np.argsort(costs.sum(axis=1))[: max(0, settings.max_rollouts - settings.num_rollouts)]
             sizes = stddev * np.resize(SCALES, settings.num_rollouts)
             fresh = self._optimiser.disturbed(self.motion, sizes)
             copies = np.concatenate([fresh, copies[kept]])
@@ -117,8 +130,10 @@ class _Attempt:
 
     def _step(self, copies: Array, costs: Array, cost: float) -> tuple[bool, float]:
         """Takes the cheaper one of the weighted average and the best copy, where it is cheaper than the motion."""
-        candidates = [self._on_constraints(item) for item in (
-            self._optimiser.update(self.motion, copies, costs), copies[int(np.argmin(costs.sum(axis=1)))])]
+        candidates = [
+            self._on_constraints(item)
+            for item in (self._optimiser.update(self.motion, copies, costs), copies[int(np.argmin(costs.sum(axis=1)))])
+        ]
         candidate_costs = [self._cost(item) for item in candidates]
         best = int(np.argmin(candidate_costs))
         if candidate_costs[best] >= cost:
@@ -149,7 +164,8 @@ class _Attempt:
             return False
         return problem.constraints is None or all(
             problem.edge_is_valid(first, second, fine)
-            for first, second in zip(self.motion[:-1], self.motion[1:], strict=True))
+            for first, second in zip(self.motion[:-1], self.motion[1:], strict=True)
+        )
 
     def invalid_states(self) -> int:
         """Number of time steps that are not valid."""

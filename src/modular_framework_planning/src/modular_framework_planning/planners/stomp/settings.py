@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters of STOMP, read and checked once."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -9,8 +10,15 @@ from typing import Any
 from modular_framework_planning.errors import ErrorCode, PlanningError
 
 NAMESPACE = "stomp_moveit"
-LOWEST: dict[str, float] = {"num_timesteps": 5, "num_iterations": 1, "num_rollouts": 2, "max_rollouts": 2,
-                            "delta_t": 1e-6, "stddev": 1e-6, "num_attempts": 1}
+LOWEST: dict[str, float] = {
+    "num_timesteps": 5,
+    "num_iterations": 1,
+    "num_rollouts": 2,
+    "max_rollouts": 2,
+    "delta_t": 1e-6,
+    "stddev": 1e-6,
+    "num_attempts": 1,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +69,10 @@ def read_settings(parameters: Mapping[str, Any], group: str = "") -> StompSettin
         value, lowest = given[item.name], LOWEST.get(item.name, 0)
         kinds = (int,) if isinstance(item.default, int) else (int, float)
         if isinstance(value, bool) or not isinstance(value, kinds) or not lowest <= value < float("inf"):
-            faults.append(f"{item.name} is {value!r}, allowed is {'a whole number' if len(kinds) == 1 else 'a number'} "
-                          f"of at least {lowest}")
+            faults.append(
+                f"{item.name} is {value!r}, allowed is {'a whole number' if len(kinds) == 1 else 'a number'} "
+                f"of at least {lowest}"
+            )
         values[item.name] = value
     if faults:
         raise PlanningError(ErrorCode.PLANNING_FAILED, f"parameters of STOMP: {'; '.join(faults)}")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the limits of jerk: the fastest of several smooth timings that passes the last check."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gives a path its fastest timing within the limits, with rounded corners where they are free."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -41,8 +42,12 @@ def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     tolerance = _number(problem.settings.parameters, "path_tolerance", problem.settings.blend_deviation, 0.0)
 
     def timed(blends: Array) -> PlannedPath:
-        return replace(path, trajectory=parameterize(problem.group.joints, vertices, blends, problem.max_velocity,
-                                                     problem.max_acceleration, period))
+        return replace(
+            path,
+            trajectory=parameterize(
+                problem.group.joints, vertices, blends, problem.max_velocity, problem.max_acceleration, period
+            ),
+        )
 
     blends = choose_blends(vertices, tolerance, lambda curve: _is_valid(problem, curve))
     if blends.any():
@@ -55,7 +60,8 @@ def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
 def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
     """Whether a rounded corner is free and keeps the path constraints."""
     if problem.constraints is not None and not all(
-            problem.constraints.satisfied(problem.motion.full_positions(values)) for values in curve):
+        problem.constraints.satisfied(problem.motion.full_positions(values)) for values in curve
+    ):
         return False
     return problem.motion.colliding_state(curve, problem.settings.finest_step) is None
 
@@ -63,6 +69,8 @@ def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
 def _number(parameters: Any, name: str, default: float, lowest: float) -> float:
     value = parameters.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not lowest <= value < np.inf:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"parameter {name} of the pipeline is {value!r}; allowed is "
-                            f"a number of at least {lowest}")
+        raise PlanningError(
+            ErrorCode.INVALID_MOTION_PLAN,
+            f"parameter {name} of the pipeline is {value!r}; allowed is a number of at least {lowest}",
+        )
     return float(value)

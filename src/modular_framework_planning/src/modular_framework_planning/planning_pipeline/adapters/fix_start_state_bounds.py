@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pulls a start state that is slightly beyond a joint's bounds back onto them."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -22,8 +23,11 @@ class FixStartStateBounds(RequestAdapter):
         beyond = np.abs(problem.start[indices] - inner).max()
         if beyond > problem.settings.start_state_max_bounds_error:
             faults = "; ".join(problem.model.bound_violations(problem.start, indices))
-            raise PlanningError(ErrorCode.START_STATE_INVALID, f"start state: {faults}; at most "
-                                f"{problem.settings.start_state_max_bounds_error} beyond a bound is pulled back")
+            raise PlanningError(
+                ErrorCode.START_STATE_INVALID,
+                f"start state: {faults}; at most "
+                f"{problem.settings.start_state_max_bounds_error} beyond a bound is pulled back",
+            )
         if beyond == 0.0:
             return plan_next(problem)
         start = problem.start.copy()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Leads a start state that collides a little out to a free state nearby."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -34,8 +35,14 @@ class FixStartStateCollision(RequestAdapter):
             moved = np.clip(start + share * problem.rng.uniform(-reach, reach), low, high)
             if problem.motion.state_is_free(moved):
                 return moved
-        raise PlanningError(ErrorCode.START_STATE_IN_COLLISION, "start state in collision: "
-                            f"{describe_contacts(contacts)}; " + (
-                                f"no free state within {settings.jiggle_fraction:.0%} of the joints' ranges"
-                                if shallow else "too deep to move out of; allow the pair or move the object"),
-                            contacts)
+        raise PlanningError(
+            ErrorCode.START_STATE_IN_COLLISION,
+            "start state in collision: "
+            f"{describe_contacts(contacts)}; "
+            + (
+                f"no free state within {settings.jiggle_fraction:.0%} of the joints' ranges"
+                if shallow
+                else "too deep to move out of; allow the pair or move the object"
+            ),
+            contacts,
+        )

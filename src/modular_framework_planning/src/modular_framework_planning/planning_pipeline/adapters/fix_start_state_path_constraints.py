@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Leads a start state that violates the path constraints to the nearest one that satisfies them."""
+
 from __future__ import annotations
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -18,10 +19,14 @@ class FixStartStatePathConstraints(RequestAdapter):
             return plan_next(problem)
         indices = problem.group.indices
         nearest = constraints.project(problem.start, indices)
-        if nearest is None or not problem.motion.edge_is_free(problem.start[indices], nearest[indices],
-                                                              problem.settings.motion_step):
-            raise PlanningError(ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, "start state: "
-                                f"{constraints.describe(problem.start)}; no free straight motion leads to a state that "
-                                "satisfies the path constraints: start from one that does")
+        if nearest is None or not problem.motion.edge_is_free(
+            problem.start[indices], nearest[indices], problem.settings.motion_step
+        ):
+            raise PlanningError(
+                ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+                "start state: "
+                f"{constraints.describe(problem.start)}; no free straight motion leads to a state that "
+                "satisfies the path constraints: start from one that does",
+            )
         path = plan_next(problem.with_start(nearest))
         return with_path_prefix(problem, path)

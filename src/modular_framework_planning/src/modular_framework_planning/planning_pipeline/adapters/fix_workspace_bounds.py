@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gives a request without a workspace the default one."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps a link's speed in space below the request's max_cartesian_speed."""
+
 from __future__ import annotations
 
 import math
@@ -25,22 +26,36 @@ class LimitMaxCartesianLinkSpeed(RequestAdapter):
         if highest == 0.0:
             return plan_next(problem)
         if not (math.isfinite(highest) and highest > 0.0):
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_cartesian_speed is {highest} m/s; allowed is a "
-                                "speed above 0, or 0 for none")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"max_cartesian_speed is {highest} m/s; allowed is a speed above 0, or 0 for none",
+            )
         link = self._link(problem)
         path = plan_next(problem)
         timed = path if path.trajectory is not None else time_path(problem, path)
         assert timed.trajectory is not None
-        return replace(timed, trajectory=with_limited_link_speed(
-            problem.model, timed.trajectory, problem.motion.full_positions, link, highest, problem.max_velocity,
-            problem.max_acceleration))
+        return replace(
+            timed,
+            trajectory=with_limited_link_speed(
+                problem.model,
+                timed.trajectory,
+                problem.motion.full_positions,
+                link,
+                highest,
+                problem.max_velocity,
+                problem.max_acceleration,
+            ),
+        )
 
     @staticmethod
     def _link(problem: PlanningProblem) -> str:
         link = problem.request.cartesian_speed_limited_link or problem.group.tip_link
         if not link:
-            raise PlanningError(ErrorCode.INVALID_LINK_NAME, f"max_cartesian_speed: group '{problem.group.name}' has "
-                                "no tip; name the link in cartesian_speed_limited_link")
+            raise PlanningError(
+                ErrorCode.INVALID_LINK_NAME,
+                f"max_cartesian_speed: group '{problem.group.name}' has "
+                "no tip; name the link in cartesian_speed_limited_link",
+            )
         if not problem.model.has_link(link):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, problem.model.frame_ids)
         return link

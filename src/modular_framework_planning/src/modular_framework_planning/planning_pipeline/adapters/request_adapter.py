@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One step around a planner, and the chain of them that a pipeline runs."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
