@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Notes when processors are taken away: by the host of a virtual machine, or by work of the kernel that nothing may
-interrupt.
+"""Notes when processors are taken away.
+
+The host of a virtual machine takes them, or work of the kernel that nothing may interrupt.
 
 On each processor that may be used a process sleeps a millisecond at a time, as the most urgent of all. What wakes it
 late was no other process: from when it was to wake until it did, its processor was away.

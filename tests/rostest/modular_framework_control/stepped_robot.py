@@ -161,8 +161,11 @@ class SteppedRobot:
 
 
 def trajectory_of(names: list[str], *points: Any, stamp_s: float = 0.0) -> JointTrajectory:
-    """A trajectory message; points are (time, positions[, velocities[, accelerations]]), or (time, positions, None) for
-    one that comes to rest there."""
+    """A trajectory message.
+
+    Points are (time, positions[, velocities[, accelerations]]), or (time, positions, None) for one that comes to rest
+    there.
+    """
     message = JointTrajectory(joint_names=names)
     message.header.stamp = rospy.Time.from_sec(stamp_s)
     for time_s, positions, *more in points:

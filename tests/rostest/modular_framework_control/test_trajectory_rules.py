@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rules of ros_controllers' trajectory controller, one by one, as a client of actions and topics meets them, in
-simulated time."""
+"""The rules of ros_controllers' trajectory controller, one by one.
+
+They are tested as a client of actions and topics meets them, in simulated time.
+"""
 
 from __future__ import annotations
 

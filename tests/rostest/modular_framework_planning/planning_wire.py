@@ -54,8 +54,11 @@ OK = MoveItErrorCodes.SUCCESS
 
 
 class FakeArm:
-    """Joint states, an arm controller that jumps from point to point in the trajectory's time, and (if asked for) a
-    gripper controller that is where it should be at once."""
+    """Joint states and controllers without a robot.
+
+    The arm controller jumps from point to point in the trajectory's time; the gripper controller (if asked for) is
+    where it should be at once.
+    """
 
     def __init__(self, with_gripper: bool = False) -> None:
         self.positions = dict(zip(ARM, START, strict=True)) | {GRIPPER: 0.3}

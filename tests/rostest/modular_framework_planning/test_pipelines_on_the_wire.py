@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pipelines of move_group on the wire: chosen by name, a planner and a collision checker of the user's own,
-settings of planners, seeds.
+"""Pipelines of move_group on the wire.
+
+They are chosen by name; a planner and a collision checker of the user's own, settings of planners, seeds.
 """
 
 from __future__ import annotations

@@ -63,8 +63,9 @@ class Reconfiguration:
         Args:
             namespace: absolute, or beginning with "~".
             table: the settings that may be changed.
-            holder, attribute: where the settings are, a frozen dataclass that is replaced as a whole, so that its
-                readers see the old settings or the new ones, never some of each.
+            holder: what has the settings.
+            attribute: where it has them: a frozen dataclass that is replaced as a whole, so that its readers see the
+                old settings or the new ones, never some of each.
         """
         self._namespace, self._table = namespace, tuple(table)
         self._holder, self._attribute = holder, attribute

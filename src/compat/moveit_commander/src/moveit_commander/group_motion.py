@@ -119,8 +119,9 @@ class GroupMotion(GroupPoseTargets):
         Args:
             waypoints: poses to pass, in the pose reference frame: Pose or lists of 6 or 7 numbers [m, rad].
             eef_step: longest step along the lines [m].
-            options: [jump_threshold,] [avoid_collisions=True,] [path_constraints=None], by position or by name; older
-                scripts give the jump threshold (a number), newer ones do not.
+            *options: [jump_threshold,] [avoid_collisions=True,] [path_constraints=None], by position; older scripts
+                give the jump threshold (a number), newer ones do not.
+            **named_options: the same, by name.
 
         Returns:
             The path and the share of it that was found, in [0, 1]; -1 when move_group could not begin.

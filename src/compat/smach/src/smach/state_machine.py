@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A container that runs one state at a time and follows transitions from outcome to state until it reaches one of
-its own outcomes."""
+"""A container that runs one state at a time.
+
+It follows transitions from outcome to state until it reaches one of its own outcomes.
+"""
 
 from __future__ import annotations
 

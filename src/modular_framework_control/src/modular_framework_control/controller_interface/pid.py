@@ -86,8 +86,10 @@ def _integral_part(gains: PidGains, total: float) -> float:
 
 
 def read_pid(gains_nh: NodeHandle) -> Pid:
-    """Gains of one joint: `p`, which must be there; `i` 0, `d` 0, `i_clamp` 0 (or `i_clamp_min`, `i_clamp_max`),
-    `antiwindup` false. An `i_clamp` of 0 switches the integral off, as in ros_control.
+    """Gains of one joint.
+
+    `p` must be there; defaults are `i` 0, `d` 0, `i_clamp` 0 (or `i_clamp_min`, `i_clamp_max`), `antiwindup` false.
+    An `i_clamp` of 0 switches the integral off, as in ros_control.
 
     Raises:
         ParameterError: no `p`, or a value of the wrong kind.

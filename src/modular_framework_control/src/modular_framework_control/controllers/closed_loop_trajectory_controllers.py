@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectory controllers for joints that take velocities or efforts: what a position-controlled joint does inside
-itself, these do with gains."""
+"""Trajectory controllers for joints that take velocities or efforts.
+
+What a position-controlled joint does inside itself, these do with gains.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,9 @@ class VelocityJointTrajectoryController(_ClosedLoopTrajectoryController):
 
 
 class EffortJointTrajectoryController(_ClosedLoopTrajectoryController):
-    """effort_controllers/JointTrajectoryController; gains in [Nm/rad] (p), [Nm/(rad s)] (i), [Nm s/rad] (d,
-    velocity_ff)."""
+    """effort_controllers/JointTrajectoryController.
+
+    Gains are in [Nm/rad] (p), [Nm/(rad s)] (i), [Nm s/rad] (d, velocity_ff).
+    """
 
     interface_class = EffortJointInterface

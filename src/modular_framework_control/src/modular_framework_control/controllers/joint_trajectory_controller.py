@@ -133,8 +133,9 @@ class JointTrajectoryController(Controller):
         self._mailbox.put(goal_handle)
 
     def desired_at(self, time_s: float) -> Array:
-        """Returns the desired position, velocity and acceleration at `time_s` [s], shape (3, joints), if the robot
-        keeps its present speed scaling.
+        """Returns the desired position, velocity and acceleration at `time_s` [s], shape (3, joints).
+
+        This is what they are if the robot keeps its present speed scaling.
 
         Raises:
             ControllerError: the controller does not run, or the motion at that time is no longer stored.
@@ -229,8 +230,11 @@ class JointTrajectoryController(Controller):
         return desired, error
 
     def _desired_and_measured(self) -> tuple[Array, Array]:
-        """The state desired now, and positions and velocities measured, in the turn in which the joints are commanded;
-        the desired values where those are not numbers."""
+        """The state desired now, and positions and velocities measured.
+
+        They are in the turn in which the joints are commanded. Where a measured value is not a number, the desired one
+        stands for it.
+        """
         desired, error = self._desired_and_error()
         actual = desired[:2] - error
         return desired, np.where(np.isfinite(actual), actual, desired[:2])

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that command nothing: they report what force-torque sensors and inertial units measure, and how fast a
-robot lets itself be moved."""
+"""Controllers that command nothing.
+
+They report what force-torque sensors and inertial units measure, and how fast a robot lets itself be moved.
+"""
 
 from __future__ import annotations
 

@@ -158,9 +158,11 @@ class _Saturation:
 
 
 class VelocityJointSaturation(_Saturation):
-    """Saturates velocity commands: largest velocity, largest change from one command to the next, the first one from
-    the measured velocity; at an end of the range only velocities back into it, whatever change that takes. With soft
-    limits at most `k_position` times the distance to their end. Not a number becomes 0.
+    """Saturates velocity commands.
+
+    Largest velocity, largest change from one command to the next, the first one from the measured velocity; at an end
+    of the range only velocities back into it, whatever change that takes. With soft limits at most `k_position` times
+    the distance to their end. Not a number becomes 0.
     """
 
     __slots__ = ()
@@ -186,9 +188,10 @@ class VelocityJointSaturation(_Saturation):
 
 
 class EffortJointSaturation(_Saturation):
-    """Saturates effort commands: largest effort; none that drives a joint further out of its range or beyond its
-    largest velocity. With soft limits at most `k_velocity` times what is left to the velocity that is allowed there.
-    Not a number becomes 0.
+    """Saturates effort commands.
+
+    Largest effort; none that drives a joint further out of its range or beyond its largest velocity. With soft limits
+    at most `k_velocity` times what is left to the velocity that is allowed there. Not a number becomes 0.
     """
 
     __slots__ = ()
@@ -252,8 +255,9 @@ def limit_handle(
 
 
 def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[JointLimits]:
-    """What is known of the limits of joints: those their hardware enforces; where it enforces none, those of
-    `robot_description` and `joint_limits/<joint>/...`.
+    """What is known of the limits of joints.
+
+    Those their hardware enforces; where it enforces none, those of `robot_description` and `joint_limits/<joint>/...`.
 
     Args:
         handles: the joints.

@@ -120,7 +120,7 @@ class _PairTransmission(Transmission):
 
 @dataclass(frozen=True)
 class DifferentialTransmission(_PairTransmission):
-    """Both actuators together move the first joint, against each other the second:
+    """Both actuators together move the first joint, against each other the second.
 
     v_a1 = n_a1 (n_j1 v_j1 + n_j2 v_j2), v_a2 = n_a2 (n_j1 v_j1 - n_j2 v_j2);
     tau_j1 = n_j1 (n_a1 tau_a1 + n_a2 tau_a2), tau_j2 = n_j2 (n_a1 tau_a1 - n_a2 tau_a2).
@@ -148,7 +148,7 @@ class DifferentialTransmission(_PairTransmission):
 
 @dataclass(frozen=True)
 class FourBarLinkageTransmission(_PairTransmission):
-    """The first joint goes by the first actuator alone, the second by both:
+    """The first joint goes by the first actuator alone, the second by both.
 
     v_a1 = n_j1 n_a1 v_j1, v_a2 = n_a2 (v_j1 + n_j2 v_j2);
     tau_j1 = n_j1 n_a1 tau_a1, tau_j2 = n_j2 (n_a2 tau_a2 - tau_j1).

@@ -20,8 +20,10 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError
 
 
 class AckermannSteeringController(MobileBaseController):
-    """ackermann_steering_controller/AckermannSteeringController; a command is a `BaseVelocity` whose `angular` is the
-    angle of the steering [rad], as in ros_controllers; limits below `angular/z` are those of this angle.
+    """ackermann_steering_controller/AckermannSteeringController.
+
+    A command is a `BaseVelocity` whose `angular` is the angle of the steering [rad], as in ros_controllers; limits
+    below `angular/z` are those of this angle.
 
     Parameters, besides those of every mobile base: `rear_wheel` rear_wheel_joint and `front_steer` front_steer_joint,
     the joints; `wheel_separation_h` [m], the distance of the axles, and `wheel_radius` [m]: of the robot description

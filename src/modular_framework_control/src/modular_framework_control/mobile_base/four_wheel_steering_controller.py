@@ -88,8 +88,10 @@ class _Rate:
 
 
 class FourWheelSteeringController(MobileBaseController):
-    """four_wheel_steering_controller/FourWheelSteeringController; a command is a `BaseVelocity`, for which front and
-    rear steer against each other, or a `SteeringCommand`; the last one of either is in force.
+    """four_wheel_steering_controller/FourWheelSteeringController.
+
+    A command is a `BaseVelocity`, for which front and rear steer against each other, or a `SteeringCommand`; the last
+    one of either is in force.
 
     Parameters, besides those of every mobile base: `front_wheel`, `rear_wheel`, `front_steering`, `rear_steering`: two
     joints each, the left one first; `track`, `wheel_base`, `wheel_radius` and `wheel_steering_y_offset` [m]: of the

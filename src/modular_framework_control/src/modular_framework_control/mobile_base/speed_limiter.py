@@ -52,8 +52,10 @@ class SpeedLimiter:
 
 
 def read_speed_limiter(limits_nh: NodeHandle) -> SpeedLimiter:
-    """The limits below `linear/x` or `angular/z`: `has_velocity_limits`, `max_velocity`, `min_velocity` (default
-    minus the largest), likewise `..._acceleration` and `..._jerk`.
+    """The limits below `linear/x` or `angular/z`.
+
+    `has_velocity_limits`, `max_velocity`, `min_velocity` (default minus the largest), likewise `..._acceleration` and
+    `..._jerk`.
 
     Raises:
         ParameterError: a limit that is switched on has no largest value, or its range does not hold 0.

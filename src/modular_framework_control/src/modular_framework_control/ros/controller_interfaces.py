@@ -84,8 +84,11 @@ class JointStateRosInterface:
 
 
 class JointTrajectoryRosInterface:
-    """Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
-    `<name>/query_state` (service)."""
+    """The topics, action and service of a trajectory controller.
+
+    Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
+    `<name>/query_state` (service).
+    """
 
     def __init__(
         self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime

@@ -21,8 +21,11 @@ from modular_framework_ros.node_handle import join_names
 
 
 class JointCommandRosInterface:
-    """Subscribes `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several. Publishes
-    `<name>/state` (control_msgs/JointControllerState) of controllers that have gains for one joint."""
+    """The topics of a controller that is commanded joint by joint.
+
+    Subscribes `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several. Publishes
+    `<name>/state` (control_msgs/JointControllerState) of controllers that have gains for one joint.
+    """
 
     def __init__(
         self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime

@@ -19,8 +19,9 @@ OVERRUN_WARNING_PERIOD_S = 10.0
 
 
 class LoopReport:
-    """Publishes `/diagnostics` (diagnostic_msgs/DiagnosticArray) once a second of real time; serves `~reset_statistics`
-    (std_srvs/Empty), which resets the statistics.
+    """Publishes `/diagnostics` (diagnostic_msgs/DiagnosticArray) once a second of real time.
+
+    The service `~reset_statistics` (std_srvs/Empty) resets the statistics.
 
     The status is a warning when cycles were late since the last message, an error when the hardware has a fault.
     Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,

@@ -42,8 +42,11 @@ DIFF_DRIVE_SETTINGS = (
 
 
 class MobileBaseRosInterface:
-    """Subscribes `<name>/cmd_vel` (geometry_msgs/Twist); publishes `<name>/odom` (nav_msgs/Odometry) and, where that is
-    switched on, the frame of the base on `/tf`."""
+    """The topics of every mobile base.
+
+    Subscribes `<name>/cmd_vel` (geometry_msgs/Twist); publishes `<name>/odom` (nav_msgs/Odometry) and, where that is
+    switched on, the frame of the base on `/tf`.
+    """
 
     def __init__(
         self, controller: MobileBaseController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
@@ -106,9 +109,12 @@ class MobileBaseRosInterface:
 
 
 class DiffDriveRosInterface(MobileBaseRosInterface):
-    """Publishes besides, where that is switched on, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and
+    """What a base with differential drive has besides.
+
+    Publishes, where that is switched on, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and
     `<name>/wheel_joint_controller_state` (control_msgs/JointTrajectoryControllerState); serves dynamic_reconfigure in
-    `<name>`."""
+    `<name>`.
+    """
 
     _controller: DiffDriveController
 
@@ -131,8 +137,11 @@ class DiffDriveRosInterface(MobileBaseRosInterface):
 
 
 class FourWheelSteeringRosInterface(MobileBaseRosInterface):
-    """Subscribes besides `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
-    `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped)."""
+    """What a base with four steered wheels has besides.
+
+    Subscribes `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
+    `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped).
+    """
 
     _controller: FourWheelSteeringController
 

@@ -208,8 +208,10 @@ class RobotHwNode:
         _attempt("closing the report of the loop", self._report.close)
 
     def _bring_to_rest(self) -> None:
-        """Writes the last commands of the controllers (velocities and efforts of 0) until no joint moves, because
-        hardware and limits brake cycle by cycle. It uses real time, because a simulated clock may be paused."""
+        """Writes the last commands of the controllers (velocities and efforts of 0) until no joint moves.
+
+        Hardware and limits brake cycle by cycle. It uses real time, because a simulated clock may be paused.
+        """
         begun_s = due_s = time.monotonic()
         going = self._attempt_last("write")
         while going and time.monotonic() - begun_s < LONGEST_END_S:

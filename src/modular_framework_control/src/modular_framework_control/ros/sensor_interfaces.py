@@ -29,8 +29,11 @@ from modular_framework_ros.node_handle import join_names
 
 
 class SensorRosInterface:
-    """Publishes geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units,
-    std_msgs/Float64 for the pace of a robot."""
+    """Publishes what sensors measure.
+
+    geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units, std_msgs/Float64 for the
+    pace of a robot.
+    """
 
     def __init__(
         self, controller: SensorController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime

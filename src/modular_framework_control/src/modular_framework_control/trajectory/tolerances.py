@@ -51,8 +51,9 @@ class Tolerances:
 
 
 def read_tolerances(controller_nh: NodeHandle, joint_names: Sequence[str]) -> Tolerances:
-    """Defaults from `constraints/{goal_time, stopped_velocity_tolerance, <joint>/{trajectory, goal}}`; what is not
-    positive, as a tolerance, is not checked.
+    """Defaults from `constraints/{goal_time, stopped_velocity_tolerance, <joint>/{trajectory, goal}}`.
+
+    What is not positive, as a tolerance, is not checked.
 
     Raises:
         ParameterError: a value that is not a number, or a negative time.

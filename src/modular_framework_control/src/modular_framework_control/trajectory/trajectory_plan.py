@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all joints of a trajectory controller are to do from now on: the motion under way and the one that replaces it
-later.
+"""What all joints of a trajectory controller are to do from now on.
+
+This is the motion under way and the one that replaces it later.
 
 A trajectory that starts in the future, or moves some of the joints only, leaves the rest of the motion as it is. So the
 plan is a row of stages, each with the tracks in force from its beginning on; every joint is in one track of a stage.
@@ -53,8 +54,10 @@ class TrajectoryPlan:
         self.end_s = time_s
 
     def follow(self, tracks: Sequence[Track], from_s: float) -> None:
-        """Makes the joints of `tracks`, no two of which share a joint, follow them from `from_s` [s] on; the
-        motion until then, and of the others, stays."""
+        """Makes the joints of `tracks`, no two of which share a joint, follow them from `from_s` [s] on.
+
+        The motion until then, and of the others, stays.
+        """
         earlier = tuple(stage for stage in self._stages if stage.from_s < from_s) or self._stages[:1]
         moved = [joint for track in tracks for joint in track.joints]
         others = (old.without(moved) for old in earlier[-1].tracks)

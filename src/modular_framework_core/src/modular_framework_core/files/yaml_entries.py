@@ -159,7 +159,7 @@ def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryEr
 
     Args:
         path: File to read.
-        take: Gets one entry after the other; raises EntryError for one it cannot use.
+        handle: Gets one entry after the other; raises EntryError for one it cannot use.
 
     Returns:
         One error for each entry (or for the file) that is not usable, in file order.

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What moves the manipulator for the grasp server: its controller, whichever of the two kinds of action it offers, or a
-device's own driver."""
+"""What moves the manipulator for the grasp server.
+
+Its controller, whichever of the two kinds of action it offers, or a device's own driver.
+"""
 
 from __future__ import annotations
 

@@ -247,8 +247,10 @@ class EzGripper:
             self._grip.retarget(request.goal, position, time_s)
 
     def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
-        """Publishes the fault and stops the fingers, because not every fault switches every motor off; after a pause it
-        switches the torque on again, at the present position."""
+        """Publishes the fault and stops the fingers, because not every fault switches every motor off.
+
+        After a pause it switches the torque on again, at the present position.
+        """
         text = f"{self.settings.name}: {describe_errors(reading.errors, reading.temperature, reading.voltage)}"
         since_s = self._off_since_s
         if since_s is None:

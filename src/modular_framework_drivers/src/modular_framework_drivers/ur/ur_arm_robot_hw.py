@@ -230,6 +230,8 @@ class UrArmHardware(RobotHW):
         return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
 
     def _cause_may_follow(self, link: RtdeLink) -> bool:
-        """Whether a state may still come that explains the end of the program, which may be reported before the stop of
-        the arm that caused it."""
+        """Whether a state may still come that explains the end of the program.
+
+        The end may be reported before the stop of the arm that caused it.
+        """
         return link.state is None or link.state.received_s < link.program_failed_s + _CAUSE_S

@@ -136,6 +136,7 @@ def pose_error(
     """Compares the tip with a target.
 
     Args:
+        chain: the joints from the planning frame to the tip.
         values: the group's joint values [rad or m].
         target: pose of the tip in the planning frame, shape (3, 4).
         jacobian: filled; how the values move the tip, linear above angular, shape (6, group).
@@ -228,7 +229,11 @@ def converge(
     """Moves joint values, within bounds, until the tip is at the target; changes `values` in place.
 
     Args:
-        lower, upper: bounds of the group's joints, shape (group,).
+        chain: the joints from the planning frame to the tip.
+        values: the group's joint values [rad or m].
+        target: pose of the tip in the planning frame, shape (3, 4).
+        lower: least values of the group's joints, shape (group,).
+        upper: largest values, shape (group,).
         tolerance: length of the pose error to get below.
         steps: how many steps to try.
     """
@@ -279,8 +284,14 @@ def polish(
     """Drives approximate solutions to the target, in place; says which arrived.
 
     Args:
+        chain: the joints from the planning frame to the tip.
         candidates: joint values, shape (k, group).
+        target: pose of the tip in the planning frame, shape (3, 4).
+        lower: least values of the group's joints, shape (group,).
+        upper: largest values, shape (group,).
+        tolerance: length of the pose error to get below.
         furthest: pose error above which a candidate is not a solution at all.
+        steps: how many steps to try.
     """
     count, width = candidates.shape
     arrived = np.zeros(count, dtype=np.bool_)

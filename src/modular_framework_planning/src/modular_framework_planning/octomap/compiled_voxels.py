@@ -120,9 +120,12 @@ def merged(
     """Adds steps to the values of keys and clamps the sums; a key that is not there yet begins at 0.
 
     Args:
-        keys, values: what there is (n,), keys ascending.
-        new_keys, steps: what is added (m,), keys ascending.
-        lowest, highest: clamps.
+        keys: what there is (n,), ascending.
+        values: of the keys (n,).
+        new_keys: where something is added (m,), ascending.
+        steps: what is added (m,).
+        lowest: lower clamp.
+        highest: upper clamp.
     """
     all_keys, sums = np.empty(len(keys) + len(new_keys), np.int64), np.empty(len(keys) + len(new_keys), np.float32)
     old, new, size = 0, 0, 0

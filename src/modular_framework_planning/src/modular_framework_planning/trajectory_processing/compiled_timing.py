@@ -132,9 +132,11 @@ def optimal_speeds(
 
     Args:
         steps: lengths of the intervals, above 0, shape (n,).
-        tangents, end_tangents: q' at the start and the end of each interval, shape (n, joints).
+        tangents: q' at the start of each interval, shape (n, joints).
+        end_tangents: q' at the end of each interval, shape (n, joints).
         curvatures: q'' on each interval, shape (n, joints).
-        velocity, acceleration: limits of the joints, above 0, shape (joints,).
+        velocity: limits of the joints, above 0, shape (joints,).
+        acceleration: limits of the joints, above 0, shape (joints,).
     """
     count, joints = tangents.shape
     limits = np.concatenate((acceleration, acceleration))

@@ -19,8 +19,9 @@ ANSWER = "response"
 
 
 class CallService(FrameworkState):
-    """Calls a service; positive when the answer's field ``success`` (or ``ok``), if it has one, is true and all is as
-    expected.
+    """Calls a service; positive when its answer is as expected.
+
+    The answer's field ``success`` (or ``ok``), if it has one, must be true, too.
 
     A text ``userdata.<key>`` in a request or expectation stands for what userdata has there, and
     ``userdata.<key>.<field>`` for a field of it; the key must be an input key.

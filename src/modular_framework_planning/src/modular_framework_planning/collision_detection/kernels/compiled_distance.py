@@ -193,9 +193,17 @@ def surface_to_solid(  # type: ignore[no-untyped-def]
     """Bounds the distance of a surface from a solid.
 
     Args:
-        spheres, boxes, links: of a tree, see build_sphere_tree; triangles: (m, 9) corners.
-        root: node to start from; pose: (3, 4) of the surface in the solid's frame.
-        kind, p0, p1, p2: the solid; margin: what is taken off every distance [m].
+        spheres: of a tree, see build_sphere_tree.
+        boxes: of the tree.
+        links: of the tree.
+        triangles: (m, 9) corners.
+        root: node to start from.
+        pose: (3, 4) of the surface in the solid's frame.
+        kind: of the solid.
+        p0: first number that describes the solid.
+        p1: second number.
+        p2: third number.
+        margin: what is taken off every distance [m].
         limit: a distance [m] beyond which nothing needs to be known.
 
     Returns:
@@ -351,8 +359,19 @@ def surfaces_stay_apart(  # type: ignore[no-untyped-def]
     """Whether two surfaces stay apart while the first one turns about some axes; False also where it is too near.
 
     Args:
+        spheres: of the first surface's tree, see build_sphere_tree.
+        boxes: of the first tree.
+        links: of the first tree.
+        triangles: (m, 9) corners of the first surface.
+        root: node of the first tree to start from.
+        other_spheres: of the other surface's tree.
+        other_boxes: of the other tree.
+        other_links: of the other tree.
+        other_triangles: (m, 9) corners of the other surface.
+        other_root: node of the other tree to start from.
         pose: of the first surface in the frame of the other, in the middle of the turn; shape (3, 4).
-        origins, axes: of the turns in the same frame, the one nearest to the first surface first; shape (k, 3).
+        origins: of the turns in the same frame, the one nearest to the first surface first; shape (k, 3).
+        axes: of the turns, likewise.
         change: by how much each turns to either side at most [rad], shape (k,).
     """
     stack = np.empty((STACK, 2), np.int32)

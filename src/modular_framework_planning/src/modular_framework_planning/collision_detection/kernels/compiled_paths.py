@@ -158,9 +158,15 @@ def _first_within(travelled, numbers, low, high, at, reference, change, share, r
     """Returns the sample farthest from `at` (low or high, one of which is `at`) within a share of the change.
 
     Args:
-        travelled, numbers: of the samples.
-        low, high: samples between which to look; at: the one of both that is certified, at travel `reference`.
-        change: how far each joint may have gone where share is 1; row: working memory.
+        travelled: how far each joint has gone at the vertices, shape (n, joints).
+        numbers: sample at each vertex.
+        low: first of the samples between which to look.
+        high: last of them.
+        at: the one of both that is certified.
+        reference: the travel there.
+        change: how far each joint may have gone where share is 1.
+        share: of the change.
+        row: working memory.
     """
     near, far = at, low + high - at
     write_row(travelled, numbers, far, row)

@@ -94,7 +94,8 @@ def penetrations(world, cover, states):  # type: ignore[no-untyped-def]
     """Returns how deep some states are in collision, summed over the pairs [m]; 0 where no pair touches.
 
     Args:
-        world, cover: the bodies.
+        world: the bodies.
+        cover: spheres of the bodies, see cover_of.
         states: positions of the whole robot, shape (n, joints).
     """
     bodies = len(world.joints)

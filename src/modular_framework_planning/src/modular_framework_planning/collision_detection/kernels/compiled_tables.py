@@ -88,7 +88,9 @@ def table_answer(tables, table, joints, reach):  # type: ignore[no-untyped-def]
     APART is certain; NEAR also stands for too many cells to look up, UNKNOWN for a cell still to fill.
 
     Args:
-        tables, table, joints: all tables, the one to look into, their joints.
+        tables: all tables.
+        table: the one to look into.
+        joints: the joints of every table, shape (tables, 2), -1 for none.
         reach: least and largest position of every joint, shape (2, joints).
     """
     row, rows = _cells(reach, joints[table, 0])
