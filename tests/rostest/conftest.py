@@ -30,6 +30,16 @@ def ros_session() -> Iterator[RosSession]:
 
 
 @pytest.fixture(scope="module")
+def user_packages(ros_session: RosSession) -> Iterator[Path]:
+    """The packages of a user, in `tests/packages`: found along ROS_PACKAGE_PATH by this process and all it starts."""
+    packages = Path(__file__).parents[1] / "packages"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_PACKAGE_PATH", str(packages), prepend=":")
+        patch.setitem(ros_session.env, "ROS_PACKAGE_PATH", os.environ["ROS_PACKAGE_PATH"])
+        yield packages
+
+
+@pytest.fixture(scope="module")
 def ros_launch(ros_session: RosSession) -> Callable[..., RosSession]:
     """Starts launch files on the suite's master; answers the session.
 

@@ -17,7 +17,6 @@ from moveit_msgs.srv import GetPlanningScene, GetPositionFK
 from ros_session import until
 from std_msgs.msg import Header
 
-PACKAGES = Path(__file__).parents[2] / "packages"
 ROOT, HEIGHT, UPRIGHT = "panda_link0", 0.5, Quaternion(0.0, 0.0, 0.0, 1.0)
 LAUNCH = f"""<launch>
   <node pkg="tf2_ros" type="static_transform_publisher" name="table" args="0 0 {HEIGHT} 0 0 0 world {ROOT}"/>
@@ -34,15 +33,7 @@ LAUNCH = f"""<launch>
 
 
 @pytest.fixture(scope="module")
-def workspace() -> Iterator[None]:
-    """The packages are found along ROS_PACKAGE_PATH."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_PACKAGE_PATH", str(PACKAGES), prepend=":")
-        yield
-
-
-@pytest.fixture(scope="module")
-def arm(workspace: None, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
+def arm(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
     session = ros_launch(LAUNCH)
     session.wait_for_service("plan_kinematic_path", 120.0)
     commander = MoveGroupCommander("panda_arm", wait_for_servers=30.0)

@@ -14,7 +14,6 @@ from moveit_commander import MoveGroupCommander
 
 from modular_framework_control.ros.controller_manager_client import ControllerManagerClient
 
-PACKAGES = Path(__file__).parents[2] / "packages"
 JOINTS = [f"panda_joint{number}" for number in range(1, 8)]
 READY = dict(zip(JOINTS, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], strict=True))
 LAUNCH = f"""<launch>
@@ -37,15 +36,8 @@ LAUNCH = f"""<launch>
 </launch>"""
 
 
-@pytest.fixture(scope="module", autouse=True)
-def session() -> Iterator[Any]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_PACKAGE_PATH", str(PACKAGES), prepend=":")
-        yield
-
-
 @pytest.fixture(scope="module")
-def arm(session: None, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
+def arm(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
     session = ros_launch(LAUNCH)
     session.wait_for_service("plan_kinematic_path", 120.0)
     wait_for_controllers(3)

@@ -31,22 +31,13 @@ from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 
-PACKAGES = Path(__file__).parents[2] / "packages"
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 REACHING = [0.6, 0.3, 0.0, -1.7, 0.0, 2.0, 0.785]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def workspace() -> Iterator[None]:
-    """The packages are found as those of a user: along ROS_PACKAGE_PATH."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_PACKAGE_PATH", str(PACKAGES), prepend=":")
-        yield
-
-
 @pytest.fixture(scope="module")
-def demo(workspace: None, ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(PACKAGES / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
+def demo(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[Any]:
+    session = ros_launch(user_packages / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
     session.wait_for_service("plan_kinematic_path", 120.0)
     yield session
     assert session.alive(), session.log()
@@ -64,8 +55,8 @@ def commander(group: str) -> MoveGroupCommander:
     return group
 
 
-def test_the_package_knows_nothing_of_this_project() -> None:
-    folder = PACKAGES / "panda_moveit_config"
+def test_the_package_knows_nothing_of_this_project(user_packages: Path) -> None:
+    folder = user_packages / "panda_moveit_config"
     texts = [path.read_text() for path in (*folder.glob("launch/*"), *folder.glob("config/*"))]
     assert len(texts) > 25
     assert not [text for text in texts if "modular_framework" in text]

@@ -48,7 +48,6 @@ from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-PACKAGES = Path(__file__).parents[2] / "packages"
 CLASSES = (
     RobotCommander,
     RobotCommander.Joint,
@@ -85,29 +84,17 @@ def recorded(kind: type, name: str, method: Any) -> Any:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def session(ros_session_of_users: Callable[..., Any]) -> Iterator[Any]:
+def session(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[Any]:
     with pytest.MonkeyPatch.context() as patch:
         for kind in CLASSES:
             for name, method in public_methods(kind).items():
                 patch.setattr(kind, name, recorded(kind, name, method), raising=True)
-        session = ros_session_of_users(PACKAGES / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
+        session = ros_launch(user_packages / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
         session.wait_for_service("plan_kinematic_path", 120.0)
         moveit_commander.roscpp_initialize(["test"])
         yield session
         assert session.alive(), session.log()
         moveit_commander.roscpp_shutdown()
-
-
-@pytest.fixture(scope="module")
-def ros_session_of_users(user_packages: None, ros_launch: Callable[..., Any]) -> Callable[..., Any]:
-    return ros_launch
-
-
-@pytest.fixture(scope="module")
-def user_packages() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_PACKAGE_PATH", str(PACKAGES), prepend=":")
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -35,21 +35,13 @@ from moveit_ros_planning_interface._moveit_roscpp_initializer import roscpp_init
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
-PACKAGES = Path(__file__).parents[2] / "packages"
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 ARM_JOINTS = [f"panda_joint{number}" for number in range(1, 8)]
 
 
-@pytest.fixture(scope="module")
-def user_packages() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_PACKAGE_PATH", str(PACKAGES), prepend=":")
-        yield
-
-
 @pytest.fixture(scope="module", autouse=True)
-def session(user_packages: None, ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(PACKAGES / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
+def session(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[Any]:
+    session = ros_launch(user_packages / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
     session.wait_for_service("plan_kinematic_path", 120.0)
     roscpp_init("my_script", ["test"])
     yield session
