@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -279,6 +281,29 @@ def test_no_velocity_or_effort_is_left_when_a_command_controller_is_stopped(
     assert joint(loop, family).command == 0.0
     assert loop.switch(["c"], []) is None
     assert joint(loop, family).command == 0.0
+
+
+def test_a_command_that_arrives_while_a_controller_stops_is_not_left(
+    start: Callable[..., Any],
+) -> None:
+    loop = start("velocity", "JointVelocityController", joint="a")
+    controller, handle, ended = loop.controllers["c"], joint(loop, "velocity"), threading.Event()
+
+    def keep_submitting() -> None:
+        while not ended.is_set():
+            controller.submit([0.5])
+
+    interval, thread = sys.getswitchinterval(), threading.Thread(target=keep_submitting)
+    sys.setswitchinterval(1.0e-6)
+    thread.start()
+    try:
+        for _ in range(30_000):
+            controller.stopping(loop.time_s)
+            assert handle.command == 0.0
+    finally:
+        sys.setswitchinterval(interval)
+        ended.set()
+        thread.join()
 
 
 def test_a_position_by_gains_stays_within_the_limits_of_the_description(start: Callable[..., Any]) -> None:

@@ -118,20 +118,21 @@ class JointCommandController(Controller):
         if self._fault:
             self._rest()
         else:
-            self._command(period_s)
+            self._command(self._set_points, period_s)
 
     def _rest(self) -> None:
-        """Holds the joints."""
-        self._set_points = self._resting()
-        self._command(0.0)
+        """Holds the joints, whatever another thread submits meanwhile."""
+        resting = self._resting()
+        self._set_points = resting
+        self._command(resting, 0.0)
 
     def _resting(self) -> tuple[float, ...]:
         """Returns the command that holds the joints."""
         return (0.0,) * len(self._handles)
 
-    def _command(self, period_s: float) -> None:
-        """Writes the command to the joints; `period_s` [s] is the time since the last call, 0 at a start."""
-        for handle, value in zip(self._handles, self._set_points, strict=True):
+    def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
+        """Commands the joints; `period_s` [s] is the time since the last call, 0 at a start."""
+        for handle, value in zip(self._handles, set_points, strict=True):
             handle.command = value
 
 
@@ -245,8 +246,8 @@ class _PositionByGains(GainsController):
     def _resting(self) -> tuple[float, ...]:
         return tuple(handle.position for handle in self._handles)
 
-    def _command(self, period_s: float) -> None:
-        for handle, value, limits, pid in zip(self._handles, self._set_points, self._limits, self._pids, strict=True):
+    def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
+        for handle, value, limits, pid in zip(self._handles, set_points, self._limits, self._pids, strict=True):
             if limits.continuous:
                 error = math.remainder(value - handle.position, 2.0 * math.pi)
             else:
@@ -289,8 +290,8 @@ class EffortJointVelocityController(GainsController):
         self._last_error = math.nan
         super()._rest()
 
-    def _command(self, period_s: float) -> None:
-        error = self._set_points[0] - self._handles[0].velocity
+    def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
+        error = set_points[0] - self._handles[0].velocity
         known = period_s > 0.0 and math.isfinite(self._last_error)
         rate = (error - self._last_error) / period_s if known else 0.0
         self._last_error = self._error = error
