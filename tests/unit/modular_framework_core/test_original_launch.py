@@ -29,16 +29,33 @@ SIMULATION = {
 }
 
 
-@pytest.fixture(scope="module")
-def config(tmp_path_factory: pytest.TempPathFactory) -> roslaunch.config.ROSLaunchConfig:
-    """What roslaunch makes of the file; nothing is started."""
-    file = tmp_path_factory.mktemp("launch") / "start_framework.launch"
-    arguments = "".join(f'<arg name="{name}" value="{value}"/>' for name, value in SIMULATION.items())
+def load(folder: Path, **more: str) -> roslaunch.config.ROSLaunchConfig:
+    """What roslaunch makes of the file with more arguments; nothing is started."""
+    file = folder / "start_framework.launch"
+    arguments = "".join(f'<arg name="{name}" value="{value}"/>' for name, value in (SIMULATION | more).items())
     file.write_text(
         '<launch><include file="$(find modular_framework_core)/launch/run_framework_core.launch">'
         f"{arguments}</include></launch>"
     )
     return roslaunch.config.load_config_default([str(file)], None, verbose=False)
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> roslaunch.config.ROSLaunchConfig:
+    return load(tmp_path_factory.mktemp("launch"))
+
+
+def test_it_has_the_grasp_generator_and_a_launch_with_its_own_configuration_only_the_method_it_names(
+    config: roslaunch.config.ROSLaunchConfig, tmp_path: Path
+) -> None:
+    configuration = str(Path(rospkg.RosPack().get_path("modular_framework_api")) / "config")
+    own = load(tmp_path, config_directory=configuration)
+    named = load(tmp_path, config_directory=configuration, method_launch_file="top_down_grasps/top_down_grasps.launch")
+    assert [any(node.package == "top_down_grasps" for node in found.nodes) for found in (config, own, named)] == [
+        True,
+        False,
+        True,
+    ]
 
 
 def test_its_configuration_files_are_those_of_the_api_package(config: roslaunch.config.ROSLaunchConfig) -> None:

@@ -19,7 +19,8 @@ from independent_checker import IndependentChecker
 from plain_coal_checker import PlainCoalChecker, samples_of
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
-from modular_framework_planning.contacts import TOUCH_COST_M, Contact
+from modular_framework_planning.collision_detection.kernels.compiled_penetration import TOUCH_COST_M
+from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.shapes import Box, Cylinder, Sphere
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool

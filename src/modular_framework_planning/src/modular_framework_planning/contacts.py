@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 LINK, ATTACHED, WORLD = "robot_link", "robot_attached", "world_object"
-TOUCH_COST_M = 0.03  # added to the depth of a contact where contacts are costs: they begin with a step
 
 
 @dataclass(frozen=True, slots=True)

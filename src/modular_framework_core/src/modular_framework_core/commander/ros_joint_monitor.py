@@ -20,9 +20,14 @@ class JointMonitor:
     """Keeps the latest joint positions and velocities; safe to use from several threads.
 
     Subscribers: ``joint_states`` (sensor_msgs/JointState).
+
+    Args:
+        queue_size: Messages of a node that wait for the callback. Several, where joints must not be missed whose
+            states a node publishes in messages of their own; 1, where a message that waited would count as new.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, queue_size: int = 10) -> None:
+        self._queue_size = queue_size
         self._lock = threading.Lock()
         self._positions: dict[str, float] = {}
         self._velocities: dict[str, float] = {}
@@ -31,7 +36,9 @@ class JointMonitor:
 
     def connect(self) -> None:
         """Subscribes to the joint states."""
-        self._subscriber = rospy.Subscriber("joint_states", JointState, self._on_joint_states, queue_size=10)
+        self._subscriber = rospy.Subscriber(
+            "joint_states", JointState, self._on_joint_states, queue_size=self._queue_size
+        )
 
     def positions(self, names: Iterable[str]) -> dict[str, float]:
         """Returns the positions of joints [rad or m]; joints that have not been received are left out."""

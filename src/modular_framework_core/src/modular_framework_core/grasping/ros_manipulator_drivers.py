@@ -200,7 +200,7 @@ class ControlledManipulator:
 
     def __init__(self, controllers: list[dict[str, Any]], duration_s: float) -> None:
         self._controllers, self._duration_s = controllers, duration_s
-        self._monitor = JointMonitor()
+        self._monitor = JointMonitor(queue_size=1)  # rest counts from the end of the goal
         self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
 
     def connect(self) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Describes the language of tasks as a JSON Schema, so that editors complete and checks task scripts while typing."""
+"""Describes the language of tasks as a JSON Schema, so that editors complete and check task scripts while typing."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import time
 
 import rospy
 
-from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.move_group.capabilities.cartesian_path_service import CartesianPathService
 from modular_framework_planning.move_group.capabilities.execute_trajectory_action import ExecuteTrajectory
@@ -115,6 +115,23 @@ def advertise(context: MoveGroupContext) -> None:
         capability(context).connect()
 
 
+def warm_up(context: MoveGroupContext) -> None:
+    """Compiles what is missing and lets a checker build what its checks need of the links.
+
+    Raises:
+        PlanningError: the checker cannot check the scene, or lacks its model.
+    """
+    if cache_is_empty():
+        rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
+    compile_all()
+    scene = context.monitor.snapshot()
+    checker = context.new_checker(scene)
+    if not hasattr(checker, "model"):
+        raise ModelError(f"collision_detector: {type(checker).__name__} has no attribute model, the robot; add it")
+    checker.is_free(scene.positions)
+    checker.distance(scene.positions)
+
+
 def main() -> int:
     """Runs the node; returns its exit code."""
     begun = time.monotonic()
@@ -123,16 +140,10 @@ def main() -> int:
     widen_backlog()
     try:
         context = build_context()
+        warm_up(context)
     except PlanningError as error:
         rospy.logfatal("move_group cannot start: %s", error.reason)
         return 1
-    if cache_is_empty():
-        rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
-    compile_all()
-    scene = context.monitor.snapshot()
-    checker = context.new_checker(scene)
-    checker.is_free(scene.positions)  # builds what both checks need of the links
-    checker.distance(scene.positions)
     advertise(context)
     rospy.loginfo(
         "move_group is ready: robot '%s', groups %s, pipelines %s (default %s), %s, after %.1f s",

@@ -9,6 +9,11 @@ import rospy
 
 from modular_framework_planning.errors import ModelError
 from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings, settings_from
+from modular_framework_planning.planning_interface.collision_detectors import (
+    COLLISION_DETECTORS,
+    DEFAULT_COLLISION_DETECTOR,
+    is_known,
+)
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 DESCRIPTION = "robot_description"
@@ -46,6 +51,25 @@ def load_kinematics_settings() -> dict[str, KinematicsSettings]:
 
 
 def collision_detector_name() -> str:
-    """Returns `collision_detector` of the node or of a namespace above it, as in MoveIt; empty where there is none."""
+    """Returns `collision_detector` of the node or of a namespace above it; empty where there is none.
+
+    As in MoveIt a name that is not known is an error in the log, and the default is used; the classes of
+    `module/Class` are not looked up here.
+    """
     found = rospy.search_param(COLLISION_DETECTOR)
-    return str(rospy.get_param(found)) if found else ""
+    name = rospy.get_param(found) if found else ""
+    if not isinstance(name, str):
+        rospy.logwarn(
+            "parameter %s is no text but %r: it is ignored, and %s is used", found, name, DEFAULT_COLLISION_DETECTOR
+        )
+        return ""
+    if "/" not in name and not is_known(name):
+        rospy.logerr(
+            "parameter %s: collision_detector '%s' is not known; known are %s and module/Class; %s is used",
+            found,
+            name,
+            ", ".join(COLLISION_DETECTORS),
+            DEFAULT_COLLISION_DETECTOR,
+        )
+        return ""
+    return name

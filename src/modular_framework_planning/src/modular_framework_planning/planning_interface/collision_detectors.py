@@ -19,7 +19,13 @@ COLLISION_DETECTORS: dict[str, CollisionCheckerFactory] = {
     "HYBRID": ExactCollisionChecker,
 }
 DEFAULT_CHECKER = COLLISION_DETECTORS[DEFAULT_COLLISION_DETECTOR]
+SHIPPED = {key.lower(): factory for key, factory in COLLISION_DETECTORS.items()}
 METHODS = ("build", "is_free", "path_is_free", "colliding_state", "contacts", "fixed_contacts", "distance")
+
+
+def is_known(name: str) -> bool:
+    """Whether this is a name of COLLISION_DETECTORS, in capitals or not, or empty for the default."""
+    return not name or name.lower() in SHIPPED
 
 
 def collision_detector(name: str = DEFAULT_COLLISION_DETECTOR) -> CollisionCheckerFactory:
@@ -33,10 +39,8 @@ def collision_detector(name: str = DEFAULT_COLLISION_DETECTOR) -> CollisionCheck
         ModelError: there is no such class, or it lacks methods; lists the checkers there are.
     """
     known = f"known are {', '.join(COLLISION_DETECTORS)} and module/Class with the methods of CollisionChecker"
-    shipped = {key.lower(): factory for key, factory in COLLISION_DETECTORS.items()}
-    found = shipped.get((name or DEFAULT_COLLISION_DETECTOR).lower())
-    if found is not None:
-        return found
+    if is_known(name):
+        return SHIPPED[(name or DEFAULT_COLLISION_DETECTOR).lower()]
     kind: CollisionCheckerFactory = plugin_class(name, f"collision_detector '{name}'", known)
     missing = [method for method in METHODS if not callable(getattr(kind, method, None))]
     if missing:

@@ -25,19 +25,16 @@ class TrajectoryValidator:
     """
 
     def __init__(self) -> None:
-        self._passed: set[tuple[CollisionChecker, bytes]] = set()
+        self._passed: dict[bytes, CollisionChecker] = {}  # by motion; a checker need not be hashable
 
     def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
         """Returns what is wrong with a timed motion, or nothing; see SolutionValidator."""
         assert path.trajectory is not None
         motion = path.trajectory
-        key = (
-            problem.checker,
-            b"".join(
-                rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities, motion.accelerations)
-            ),
+        key = b"".join(
+            rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities, motion.accelerations)
         )
-        if key in self._passed:
+        if key in self._passed and self._passed[key] is problem.checker:
             return ""
         text = _not_in_order(path)
         if not text:
@@ -55,7 +52,7 @@ class TrajectoryValidator:
             )
             text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
         if not text:
-            self._passed.add(key)
+            self._passed[key] = problem.checker
         return text
 
 

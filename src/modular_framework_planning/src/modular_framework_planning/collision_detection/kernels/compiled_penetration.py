@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, pair_bound, place_bodies
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, SURFACE, solid_distance
-from modular_framework_planning.contacts import TOUCH_COST_M
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
+TOUCH_COST_M = 0.03  # added to the depth of a contact where contacts are costs: they begin with a step
 WIDEST_SPHERE = 0.07  # [m]; of those that cover the bodies
 NEAR = 1.0e-5  # [m]; bodies less apart count as touching
 

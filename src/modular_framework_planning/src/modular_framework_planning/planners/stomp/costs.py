@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modular_framework_planning.contacts import TOUCH_COST_M
+from modular_framework_planning.collision_detection.kernels.compiled_penetration import TOUCH_COST_M
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCostEstimator
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
