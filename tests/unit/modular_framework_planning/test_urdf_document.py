@@ -33,8 +33,11 @@ def test_primitives_and_meshes_of_a_link_are_kept_with_their_poses() -> None:
 
 
 def test_a_size_that_is_no_number_is_refused_and_named() -> None:
-    with pytest.raises(ModelError, match="link 'a'.*'0.1 wide 0.3'"):
+    with pytest.raises(ModelError, match="link 'a'.*'0.1 wide 0.3'") as fault:
         load_urdf(URDF.replace("0.1 0.2 0.3", "0.1 wide 0.3"))
+    assert "xacro" not in str(fault.value)
+    with pytest.raises(ModelError, match="xacro expanded"):
+        load_urdf("no description")
 
 
 # The second part begins at vertex 4: a reader that counts anew for each material builds another body.

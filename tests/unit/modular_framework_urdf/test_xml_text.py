@@ -32,6 +32,30 @@ def test_what_only_looks_like_one_is_read() -> None:
         parse("<a>\n\n</b>", "x")
 
 
+def test_a_doctype_does_not_hide_in_an_encoding_that_expat_cannot_read() -> None:
+    for encoding in ("utf-32", "gb2312"):
+        declared = BOMB.replace("?>", f' encoding="{encoding}"?>', 1)
+        with pytest.raises(XmlError, match=r"^x:1: not an XML document"):
+            parse((declared + "<robot>&e11;</robot>").encode(encoding), "x")
+
+
+def test_names_stand_as_written_without_their_namespace() -> None:
+    root = parse('<sdf><plugin><ignition:foo a:b="1"/></plugin><a xmlns="u"><b/></a></sdf>', "x")
+    assert [element.tag for element in root.iter()] == ["sdf", "plugin", "ignition:foo", "a", "b"]
+    assert root[0][0].get("a:b") == "1"
+    for wrong in ("<a><x:y></a>", "<a>" + "<x:y/>" * 300 + "</a>b", "<a>" + "<x:y/>" * 300 + "\ud800</a>"):
+        with pytest.raises(XmlError, match="^x:1: not an XML document"):
+            parse(wrong, "x")
+    with pytest.raises(XmlError, match="depth"):
+        parse("<a>" + "<x:y/>" * 300 + "<a>" * 300 + "</a>" * 301, "x")
+
+
+def test_the_line_of_an_element_is_where_its_start_tag_begins() -> None:
+    root = parse('<a>\n<b\n c="1"\n d="2"><e/>\n</b></a>' + "\n" * 70_000, "x")
+    assert [element.sourceline for element in root.iter()] == [1, 2, 4]
+    assert parse("<a>" + "\n" * 70_000 + "<b/>\n</a>", "x")[0].sourceline >= 70_001
+
+
 def _planning_urdf(text: str, _folder: Path) -> None:
     from modular_framework_planning.robot_model.urdf_document import load_urdf
 

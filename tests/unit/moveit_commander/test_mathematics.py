@@ -54,6 +54,7 @@ def test_lists_and_messages_are_turned_into_each_other() -> None:
         lambda: conversions.list_to_pose([1.0]),
         lambda: conversions.list_to_transform([1.0]),
         lambda: conversions.rpy_from_quaternion([0.0] * 4),
+        lambda: conversions.rpy_from_quaternion([math.nan, 0.0, 0.0, 1.0]),
     ):
         with pytest.raises(MoveItCommanderException):
             wrong()

@@ -8,6 +8,7 @@ import random
 
 import pytest
 from moveit_commander.exception import MoveItCommanderException, RobotModelError
+from moveit_commander.robot import Joint, Link, RobotCommander
 from moveit_commander.robot_model import ASSUMED_ROOT_JOINT, RobotModel, group_values
 
 URDF = """<robot name="tiny">
@@ -136,3 +137,21 @@ def test_faulty_descriptions_are_refused_with_a_reason(urdf: str, srdf: str, wor
 def test_an_unknown_group_is_named_with_those_there_are(model: RobotModel) -> None:
     with pytest.raises(RuntimeError, match="no group named 'leg'.*all, arm, hand"):
         model.group("leg")
+
+
+def test_a_subclass_chooses_what_its_joints_and_links_are(model: RobotModel) -> None:
+    class MyJoint(Joint):
+        pass
+
+    class MyLink(Link):
+        pass
+
+    class MyCommander(RobotCommander):
+        Joint = MyJoint
+        Link = MyLink
+
+        def __init__(self) -> None:
+            self._model = model
+
+    robot = MyCommander()
+    assert isinstance(robot.get_joint("b_elbow"), MyJoint) and isinstance(robot.get_link("base"), MyLink)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -170,8 +169,8 @@ class _Reader:
     def _position(self, element: Element) -> float:
         text = self._need(element, "value")
         try:
-            return float(text.split()[0]) if text.strip() else math.nan
-        except ValueError as error:
+            return float(text.split()[0])
+        except (ValueError, IndexError) as error:
             raise XmlError(
                 f"{self._where}:{element.sourceline}",
                 f"a group_state holds a value that is not a number ('{text}' for joint '{element.get('name')}')",

@@ -30,7 +30,7 @@ def msg_from_string(msg: Any, data: bytes) -> None:
 
 def rpy_from_quaternion(quaternion: Sequence[float]) -> list[float]:
     """Returns the turns about the fixed axes x, y, z [rad] of a quaternion xyzw; at pitch +-pi/2 the yaw is 0."""
-    if math.hypot(*quaternion) < 1e-9:
+    if not math.hypot(*quaternion) >= 1e-9:  # NaN neither
         raise MoveItCommanderException(f"quaternion {list(quaternion)} has no length; a unit quaternion is needed")
     return list(rotations.rpy_from_quaternion(quaternion))
 

@@ -151,13 +151,13 @@ class RobotCommander:
         """Returns a joint; raises MoveItCommanderException if there is none of that name."""
         if name not in self._model.joints:
             raise MoveItCommanderException(f"There is no joint named {name}; get_joint_names lists those there are")
-        return Joint(self, name)
+        return self.Joint(self, name)
 
     def get_link(self, name: str) -> Link:
         """Returns a link; raises MoveItCommanderException if there is none of that name."""
         if name not in self._model.links:
             raise MoveItCommanderException(f"There is no link named {name}; get_link_names lists those there are")
-        return Link(self, name)
+        return self.Link(self, name)
 
     def get_group(self, name: str) -> MoveGroupCommander:
         """Returns the commander of a group, the same one each time."""

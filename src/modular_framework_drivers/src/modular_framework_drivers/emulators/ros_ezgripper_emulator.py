@@ -54,7 +54,7 @@ class EzGripperEmulatorNode:
         self._line.connect()
         self._services = offer_commands(self._line.commands)
         rospy.loginfo(
-            "emulated gripper at %s; orders at TCP port %d (`help` lists them)", self._line.link, self._commands.port
+            "emulated gripper at %s; commands at TCP port %d (`help` lists them)", self._line.link, self._commands.port
         )
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import MOVABLE_KINDS, Link, PlacedShapes, Robot
-from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
@@ -179,10 +179,13 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
         resolve: turns a mesh URI into the path of an existing file.
 
     Raises:
-        ModelError: not XML, a DOCTYPE, no root link, an unsupported joint type, a mesh that cannot be read.
+        ModelError: not XML, a DOCTYPE, a wrong number, no root link, an unsupported joint type, a mesh that cannot be
+            read.
     """
     try:
         robot = read_urdf(text, "URDF")
+    except AttributeFault as error:
+        raise ModelError(str(error)) from error
     except xml_text.XmlError as error:
         raise ModelError(f"{error} (is robot_description loaded, and its xacro expanded?)") from error
     _check_kinds(robot)
