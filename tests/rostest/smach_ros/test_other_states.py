@@ -11,6 +11,7 @@ import pytest
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestRequestAction, TestRequestGoal
 from actionlib_msgs.msg import GoalStatus
+from ros_session import until
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
@@ -289,6 +290,8 @@ def test_a_machine_is_offered_as_an_action():
     double.running.clear()
     client.send_goal(TestGoal(0))
     assert double.running.wait(30.0)
+    # actionlib's client takes a goal for lost if it cancels before it has seen it accepted
+    until(lambda: client.get_state() == GoalStatus.ACTIVE, "the goal is active")
     client.cancel_goal()
     assert client.wait_for_result(rospy.Duration(30.0))
     assert client.get_state() == GoalStatus.PREEMPTED
