@@ -43,7 +43,12 @@ def test_names_stand_as_written_without_their_namespace() -> None:
     root = parse('<sdf><plugin><ignition:foo a:b="1"/></plugin><a xmlns="u"><b/></a></sdf>', "x")
     assert [element.tag for element in root.iter()] == ["sdf", "plugin", "ignition:foo", "a", "b"]
     assert root[0][0].get("a:b") == "1"
-    for wrong in ("<a><x:y></a>", "<a>" + "<x:y/>" * 300 + "</a>b", "<a>" + "<x:y/>" * 300 + "\ud800</a>"):
+    for wrong in (
+        "<a><x:y></a>",
+        '<a xmlns="u"><x::y/></a>',
+        "<a>" + "<x:y/>" * 300 + "</a>b",
+        "<a>" + "<x:y/>" * 300 + "\ud800</a>",
+    ):
         with pytest.raises(XmlError, match="^x:1: not an XML document"):
             parse(wrong, "x")
     with pytest.raises(XmlError, match="depth"):

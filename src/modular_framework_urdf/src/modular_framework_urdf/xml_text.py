@@ -93,7 +93,10 @@ def parse(text: str | bytes, where: str) -> Element:
     for entry in parser.error_log.filter_from_errors():
         if entry.domain != etree.ErrorDomains.NAMESPACE:  # libxml2's limits of depth and size
             raise _syntax_error(where, entry.line, entry.message)
-    _name_as_written(root)
+    try:
+        _name_as_written(root)
+    except ValueError as wrong:  # a name such as `a::b`
+        raise _syntax_error(where, 1, wrong) from wrong
     for element, line in zip(root.iter(), lines, strict=True):
         if line <= _LAST_LINE:
             element.sourceline = line
