@@ -86,7 +86,7 @@ def test_time_and_cancelling_end_the_search(model: RobotModel) -> None:
         planned(model, 0.7, {"stddev": 0.001}, cancelled=lambda: True)
     assert caught.value.code == ErrorCode.PREEMPTED
     with pytest.raises(PlanningError) as caught:
-        planned(model, 0.7, {"stddev": 0.001}, allowed_time_s=0.01)
+        planned(model, 0.7, {"stddev": 0.001, "num_iterations": 1_000_000}, allowed_time_s=1.0)
     assert caught.value.code == ErrorCode.TIMED_OUT and "timesteps" in caught.value.reason
 
 
