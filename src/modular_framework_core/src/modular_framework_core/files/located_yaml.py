@@ -11,9 +11,9 @@ from typing import Any, Union
 
 import yaml
 
+from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault, listing, nearest
 from modular_framework_core.files.shallow_yaml import MAX_DEPTH
-from modular_framework_core.files.whole_files import read_whole
 
 MAX_NODES = 500_000
 """Largest number of values in a file after its aliases are expanded: a guard against files that blow up."""
@@ -104,7 +104,7 @@ def load(path: Path, faults: FaultList) -> Node:
     """
     start = SourceLocation(str(path), 1, 1)
     try:
-        text = read_whole(path)
+        text = read_text(path)
     except FileNotFoundError as error:
         there = sorted(file.name for file in path.parent.glob("*.yaml"))
         raise TaskFault(

@@ -11,7 +11,7 @@ from pathlib import Path
 import yaml
 
 from modular_framework_core.files import shallow_yaml
-from modular_framework_core.files.whole_files import read_whole
+from modular_framework_core.files.atomic_files import read_text
 
 _NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: its tag is not needed
 
@@ -132,7 +132,7 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         EntryError: The file cannot be read, is no YAML, or its top level is no mapping.
     """
     try:
-        root = shallow_yaml.compose(read_whole(path), _NODES)
+        root = shallow_yaml.compose(read_text(path), _NODES)
     except (OSError, UnicodeDecodeError) as error:
         raise EntryError(path, 1, f"cannot be read ({error}); give the path of a readable YAML file") from error
     except yaml.MarkedYAMLError as error:

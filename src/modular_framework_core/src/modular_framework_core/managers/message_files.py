@@ -22,7 +22,7 @@ import orjson
 import yaml
 
 from modular_framework_core.files import shallow_yaml
-from modular_framework_core.files.whole_files import read_whole, write_whole
+from modular_framework_core.files.atomic_files import read_text, write_atomically
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -88,7 +88,7 @@ def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[An
     )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, text, mode=0o600)
+        write_atomically(path, text, mode=0o600)
     except OSError as error:
         raise MessageFileError(f"{path} cannot be written: {error}") from error
     return len(by_name) + len(waiting)
@@ -110,7 +110,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
             every message that does not is named.
     """
     try:
-        content = _parsed(read_whole(path))
+        content = _parsed(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:

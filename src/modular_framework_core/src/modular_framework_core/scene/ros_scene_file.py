@@ -19,7 +19,7 @@ from moveit_msgs.srv import (
 )
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
-from modular_framework_core.files.whole_files import write_whole
+from modular_framework_core.files.atomic_files import write_atomically
 from modular_framework_core.scene.scene_file import (
     NO_COLOR,
     Scene,
@@ -211,7 +211,7 @@ def export_main() -> int:
     try:
         arguments = _arguments(("--old", "the older layout"))
         scene = scene_of(_call("get_planning_scene", GetPlanningScene, GetPlanningSceneRequest(wanted)).scene)
-        write_whole(arguments.file, scene_text(scene, arguments.old))
+        write_atomically(arguments.file, scene_text(scene, arguments.old))
     except CallError as error:
         rospy.logfatal("moveit_export_scene_to_text: %s", error)
         return 1

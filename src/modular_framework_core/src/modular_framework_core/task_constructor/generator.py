@@ -13,7 +13,7 @@ from typing import Any
 import jinja2
 
 from modular_framework_core.files import default_folders
-from modular_framework_core.files.whole_files import write_whole
+from modular_framework_core.files.atomic_files import write_atomically
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.task_spec import MachineSpec, TaskSpec
 
@@ -140,7 +140,7 @@ def write(task: TaskSpec, text: str, directory: Path) -> Path:
     """
     directory.mkdir(parents=True, exist_ok=True)
     target = module_path(task, directory)
-    write_whole(target, text, mode=0o755)
+    write_atomically(target, text, mode=0o755)
     return target
 
 

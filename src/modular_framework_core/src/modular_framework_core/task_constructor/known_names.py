@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from modular_framework_core.files import default_folders, shallow_yaml
-from modular_framework_core.files.whole_files import read_whole
+from modular_framework_core.files.atomic_files import read_text
 from modular_framework_urdf.srdf_reader import read_srdf
 
 _FILES = {"joint_state": "named_joint_states.yaml", "trajectory": "named_trajectories.yaml", "pose": "named_poses.yaml"}
@@ -108,7 +108,7 @@ def names_of_installation(config: Path | None, moveit_package: str = "") -> Know
 def _mapping_in(file: Path) -> dict[Any, Any] | None:
     """Returns the mapping in a YAML file; None when the file is not there."""
     try:
-        content = shallow_yaml.load(read_whole(file))
+        content = shallow_yaml.load(read_text(file))
     except FileNotFoundError:
         return None
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:

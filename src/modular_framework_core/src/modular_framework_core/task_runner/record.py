@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import smach
-from modular_framework_core.files.whole_files import write_whole
+from modular_framework_core.files.atomic_files import write_atomically
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,5 +224,5 @@ def write_record(
         "error": error,
         "states": [asdict(record) for record in records],
     }
-    write_whole(path, json.dumps(content, indent=1))
+    write_atomically(path, json.dumps(content, indent=1))
     return path

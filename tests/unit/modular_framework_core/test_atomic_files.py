@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_core.files import shallow_yaml, yaml_entries
-from modular_framework_core.files.whole_files import read_whole, write_whole
+from modular_framework_core.files.atomic_files import read_text, write_atomically
 from modular_framework_core.managers import message_files
 from modular_framework_core.managers.message_files import MessageFileError
 from modular_framework_core.managers.message_numbers import unusable_position
@@ -78,7 +78,7 @@ def test_a_cache_of_meshes_that_cannot_be_written_leaves_nothing_and_is_named(tm
 def test_what_is_there_and_no_file_is_not_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     with pytest.raises(OSError, match="no regular file.*pipe.yaml"):
-        write_whole(tmp_path / "pipe.yaml", "text")
+        write_atomically(tmp_path / "pipe.yaml", "text")
     assert left_in(tmp_path) == [] and (tmp_path / "pipe.yaml").is_fifo()
 
 
@@ -141,7 +141,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     faults = yaml_entries.read_each_entry(tmp_path / "pipe.yaml", lambda entry: None)
     assert "is no regular file" in str(faults[0])
     with pytest.raises(OSError, match="is no path of a file"):
-        read_whole(Path("a\0b"))
+        read_text(Path("a\0b"))
 
 
 def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes files as a whole or not at all, and reads those that others name without waiting for what never comes."""
+"""Writes files atomically, and reads text files that users name; refuses pipes and devices, on which a read blocks."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ MAX_BYTES = 256 * 1024 * 1024
 """Largest file that is read."""
 
 
-def write_whole(path: Path, content: str | bytes, mode: int = 0o644) -> None:
-    """Writes a file in one step: it is there as a whole, or stays as it was, and nothing else is left in its folder.
+def write_atomically(path: Path, content: str | bytes, mode: int = 0o644) -> None:
+    """Writes a file atomically: on failure the old file stays as it was, and no temporary file is left in its folder.
 
     Args:
-        path: The file, in a folder that is there.
-        content: What it shall have.
+        path: The file; its folder exists.
+        content: The new content; text is encoded as UTF-8.
         mode: Its permissions.
 
     Raises:
@@ -40,17 +40,17 @@ def write_whole(path: Path, content: str | bytes, mode: int = 0o644) -> None:
     except ValueError as error:
         raise OSError(f"{str(path)!r} is no path of a file: {error}") from error
     finally:
-        with contextlib.suppress(OSError):  # it is gone after success
+        with contextlib.suppress(OSError):  # os.replace has moved it already when the write succeeded
             if temporary:
                 os.unlink(temporary)
 
 
-def read_whole(path: Path) -> str:
+def read_text(path: Path) -> str:
     """Reads a text file.
 
     Raises:
-        OSError: It cannot be read, is no regular file (a pipe would never end), or is too large; names the file.
-        UnicodeDecodeError: It is no UTF-8.
+        OSError: The file cannot be read, is not a regular file (a pipe blocks), or is too large; names the file.
+        UnicodeDecodeError: The file is not UTF-8.
     """
     try:
         status = path.stat()
