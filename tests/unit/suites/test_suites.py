@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The suites that tests/run starts leave out no module of tests/rostest."""
+"""The suites that tests/run starts leave out no module of tests/rostest, and one that tests nothing is a failure."""
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -26,3 +31,53 @@ def test_every_module_is_run_by_one_test_file(package: Path) -> None:
 
 def test_there_are_suites() -> None:
     assert len(PACKAGES) >= 10
+
+
+@pytest.fixture(scope="module")
+def runner() -> Iterator[ModuleType]:
+    """The script tests/run as a module."""
+    loader = SourceFileLoader("tests_run", str(ROSTEST.parent / "run"))
+    spec = importlib.util.spec_from_loader(loader.name, loader)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, loader.name, module)
+        patch.syspath_prepend(ROSTEST.parent)
+        patch.setattr(sys, "dont_write_bytecode", True)
+        loader.exec_module(module)
+        yield module
+
+
+def report(results: Path, tests: int, failures: int = 0, skipped: int = 0) -> Path:
+    """A folder with the results of pytest."""
+    (results / "rosunit-pytest.xml").write_text(
+        f'<testsuites><testsuite tests="{tests}" failures="{failures}" errors="0" skipped="{skipped}"/></testsuites>'
+    )
+    return results
+
+
+@pytest.mark.parametrize(
+    ("tests", "failures", "skipped", "code", "log", "count"),
+    [
+        (3, 1, 1, 1, "1 failed, 1 passed, 1 skipped in 0.1s", "1 passed, 1 failed, 1 skipped"),
+        (3, 0, 0, 2, "interrupted", "3 passed, 1 failed, 0 skipped"),
+        (0, 0, 0, 0, "no tests ran in 0.1s", "0 passed, 1 failed, 0 skipped"),
+        (0, 0, 0, 5, "no tests ran in 0.1s", "0 passed, 1 failed, 0 skipped"),
+        (2, 0, 2, 0, "2 skipped in 0.1s", "0 passed, 0 failed, 2 skipped"),
+        (0, 0, 0, 5, "\n4 deselected in 0.1s\n", "0 passed, 0 failed, 0 skipped"),
+    ],
+)
+def test_a_suite_without_tests_and_one_that_ends_badly_are_failures(
+    runner: ModuleType, tmp_path: Path, tests: int, failures: int, skipped: int, code: int, log: str, count: str
+) -> None:
+    results = report(tmp_path, tests, failures, skipped)
+    assert str(runner.count_of(code, results, log)) == count
+
+
+def test_options_for_pytest_come_after_those_of_the_environment(
+    runner: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--color=yes -x")
+    assert runner.pytest_options(["-k", "one or two"]) == "--color=yes -x -k 'one or two'"
+    monkeypatch.delenv("PYTEST_ADDOPTS")
+    assert runner.pytest_options(["-x"]) == "-x"
