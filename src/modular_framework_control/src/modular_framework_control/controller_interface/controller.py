@@ -2,8 +2,8 @@
 """Base class of controllers: made without arguments, then initialised, started, updated and stopped.
 
 `init` runs on a thread that may wait; `waiting`, `starting`, `update`, `stopping`, `aborting` and `failed` run in the
-control loop and must not block. What is started there inherits the priority of the loop, so start threads and processes
-in `init`. All time a controller knows is the time it is given there, so that it behaves alike under simulated and real
+control loop and must not block. A thread started there inherits the loop's priority, so start threads and processes
+in `init`. A controller uses only the time passed to these methods, so that it behaves alike under simulated and real
 time.
 """
 

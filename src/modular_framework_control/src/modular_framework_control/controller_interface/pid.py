@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the error of a joint into a command, with the gains users write below `gains/<joint>` or `pid`."""
+"""PID control of one joint, with the gains users write below `gains/<joint>` or `pid`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class PidGains:
         d: command per rate of the error.
         i_clamp_min: smallest command of the integral's part, at most 0.
         i_clamp_max: largest command of the integral's part, at least 0.
-        antiwindup: stop to add up where the bound is reached, instead of bounding only what comes out.
+        antiwindup: whether the integral itself is bounded, instead of only its part of the command.
     """
 
     p: float
@@ -34,10 +34,10 @@ class Pid:
     """Proportional, integral and derivative gain, with a bound on the integral's part of the command.
 
     Args:
-        gains: what it begins with.
+        gains: the initial gains.
 
     Attributes:
-        gains: what it goes by; may be replaced, from any thread, at any time. The integral's part of the command goes
+        gains: the gains in use; may be replaced at any time, from any thread. The integral's part of the command goes
             on from where it is.
     """
 

@@ -2,7 +2,7 @@
 """Loads, starts, updates, stops and unloads controllers on one `RobotHW`, with the rules of ros_control.
 
 Threads that may wait (services) load and unload controllers and request switches. The control loop calls `update`,
-which never waits for them: the list of controllers is replaced as a whole, a switch is handed over in one attribute.
+which never waits for them: the list of controllers is replaced, never changed, and a switch is passed in one attribute.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ class ControllerManager:
         return tuple(claim for claim in claims if claim.resources or claim is claims[0])
 
     def unload_controller(self, name: str) -> None:
-        """Forgets a controller that is not running.
+        """Unloads a controller that is not running.
 
         Raises:
             ControllerError: not loaded, or running.

@@ -32,7 +32,7 @@ class ControllerState(Enum):
 
 
 class Strictness(IntEnum):
-    """What a switch does with an item that cannot be done: leave it out, or refuse the whole."""
+    """What a switch does with an item that cannot be done: leave it out, or refuse the whole switch."""
 
     BEST_EFFORT = 1
     STRICT = 2
@@ -210,7 +210,7 @@ def plan_switch(
 
 @dataclass(slots=True)
 class SwitchRequest:
-    """A planned switch on its way through the control loop.
+    """A planned switch that the control loop carries out.
 
     Attributes:
         plan: what to do.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectory controllers for joints that take velocities or efforts.
 
-What a position-controlled joint does inside itself, these do with gains.
+Position-controlled joints close the position loop themselves; these controllers close it with a PID.
 """
 
 from __future__ import annotations

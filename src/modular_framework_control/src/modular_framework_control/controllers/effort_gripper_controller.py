@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A gripper whose joint takes efforts: gains make the way to its goal an effort, and the goal's bound holds for it."""
+"""Controls a gripper whose joint takes efforts: a PID turns the position error into an effort, bounded by the goal."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class JointControlSnapshot:
 
 
 class JointCommandController(Controller):
-    """Base class: a command of any thread is in force, as a whole, from the next cycle on.
+    """Base class: a command submitted by any thread is in force, for all joints at once, from the next cycle on.
 
     While the hardware has a fault the joints are held, and commands are refused with its reason. When the
     controller stops, the joints come to rest.
@@ -121,7 +121,7 @@ class JointCommandController(Controller):
             self._command(self._set_points, period_s)
 
     def _rest(self) -> None:
-        """Holds the joints, whatever another thread submits meanwhile."""
+        """Holds the joints, also when another thread submits a command at the same time."""
         resting = self._resting()
         self._set_points = resting
         self._command(resting, 0.0)

@@ -232,8 +232,8 @@ class JointTrajectoryController(Controller):
     def _desired_and_measured(self) -> tuple[Array, Array]:
         """The state desired now, and positions and velocities measured.
 
-        They are in the turn in which the joints are commanded. Where a measured value is not a number, the desired one
-        stands for it.
+        Measured positions of continuous joints are within half a turn of the commanded ones. A measured value that is
+        not a number is replaced by the desired one.
         """
         desired, error = self._desired_and_error()
         actual = desired[:2] - error
@@ -271,7 +271,7 @@ class JointTrajectoryController(Controller):
             self._stop()
 
     def _take_up(self, goal: ValidatedGoal) -> str:
-        """Begins to follow a goal, which replaces the active goal, and the motion from the start of the new one on.
+        """Begins to follow a goal, which replaces the active goal, and the present motion from its own start on.
 
         Returns:
             Why it cannot be followed, or "".

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectory controllers for joints whose own control takes more of a trajectory than its positions."""
+"""Trajectory controllers for joints that take velocities, or velocities and accelerations, with their positions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that command nothing.
 
-They report what force-torque sensors and inertial units measure, and how fast a robot lets itself be moved.
+They report what force-torque sensors and inertial units measure, and the speed scaling of a robot.
 """
 
 from __future__ import annotations

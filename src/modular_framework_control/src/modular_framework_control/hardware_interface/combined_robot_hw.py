@@ -28,7 +28,7 @@ class HardwarePart:
 
     Attributes:
         name: its name in the list, which is also the namespace of its parameters.
-        hardware: what was made of its `type`.
+        hardware: the instance of the class that its `type` names.
         resources: its joints by the type name of the interface.
     """
 
@@ -179,7 +179,7 @@ class CombinedRobotHW(RobotHW):
         return within or super().check_for_conflict(self._claims_on_shared_joints(everything))
 
     def _claims_on_shared_joints(self, controllers: Iterable[ControllerInfo]) -> Iterator[ControllerInfo]:
-        """The controllers with their claims on joints that several parts command, which no part sees as a whole."""
+        """The controllers with their claims on joints that several parts command; a part sees only its own claims."""
         commanded = Counter(name for part in self._parts for name in part.hardware.commanded_joints)
         for controller in controllers:
             yield ControllerInfo(

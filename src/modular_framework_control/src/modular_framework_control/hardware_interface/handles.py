@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Handles: plain objects through which hardware and controllers see the same joint, sensor or speed.
+"""Handles: plain objects that hardware and controllers share, one per joint, sensor or speed scaling.
 
-The `RobotHW` makes one handle per thing and keeps it; reading and writing it is reading and writing attributes.
+The `RobotHW` makes each handle once and keeps it; reading and writing it is reading and writing attributes.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ class ActuatorHandle:
         position: measured [rad] or [m]; the `RobotHW` writes it in `read()`, as velocity and effort.
         velocity: measured [rad/s] or [m/s].
         effort: measured [Nm] or [N].
-        command_position: what the joints' position commands make of it [rad] or [m]; NaN while there is none.
+        command_position: computed from the position commands of the joints [rad] or [m]; NaN while there is none.
         command_velocity: likewise of velocity commands [rad/s] or [m/s].
         command_effort: likewise of effort commands [Nm] or [N].
     """
@@ -153,7 +153,7 @@ class ActuatorHandle:
 
 
 class SpeedScalingHandle:
-    """How fast a robot lets itself be moved just now: its speed slider, 0 while it is paused or stopped.
+    """Speed scaling of a robot: the value of its speed slider, 0 while it is paused or stopped.
 
     Attributes:
         name: of the handle, "speed_scaling_factor" for one robot.
@@ -175,7 +175,7 @@ class ForceTorqueSensorHandle:
     Attributes:
         name: of the sensor; it is also the name of its topic.
         frame_id: frame in which force and torque are given.
-        force: x, y, z [N]; the `RobotHW` replaces it as a whole in `read()`.
+        force: x, y, z [N]; the `RobotHW` assigns a new array in `read()`, so that readers never see a mix.
         torque: x, y, z [Nm]; likewise.
     """
 

@@ -150,7 +150,7 @@ class PosVelAccJointInterface(_JointCommandInterface):
 
 
 class SpeedScalingInterface(HardwareInterface[SpeedScalingHandle]):
-    """How fast robots let themselves be moved; read by controllers that slow their clocks accordingly."""
+    """Speed scaling of robots; read by controllers that slow their trajectory clocks accordingly."""
 
     type_name = "scaled_controllers/SpeedScalingInterface"
     noun = "speed scaling"

@@ -25,8 +25,8 @@ LOGGER = logging.getLogger("rosout.mock_robot_hw")
 class MockRobotHW(RobotHW):
     """Joints that do, one cycle later, exactly what they were commanded to do.
 
-    Commanded by position they are there; by velocity they have moved on with it; by effort they have been accelerated
-    by it, as bodies of inertia 1 without friction or weight. They stop dead at the ends of their range.
+    A position command is reached; a velocity command is integrated once, an effort command twice, as of joints
+    with inertia 1 and without friction or gravity. Joints stop at once at the ends of their range.
 
     Parameters: `joints`, a list of names; `initial_positions/<joint>` [rad|m] 0; `command_interface`
     PositionJointInterface, or VelocityJointInterface, EffortJointInterface, PosVelJointInterface,
@@ -78,7 +78,7 @@ class MockRobotHW(RobotHW):
             state.position = position
 
     def _move_on(self, period_s: float) -> None:
-        """Where velocities or efforts have brought the joints in `period_s` [s]."""
+        """Integrates the commanded velocities or efforts over `period_s` [s]."""
         for handle, sent, limit in zip(self._handles, self._sent, self._limits, strict=True):
             state, velocity = handle.state, sent
             if self._by_effort:
@@ -91,7 +91,7 @@ class MockRobotHW(RobotHW):
 
     def write(self, time_s: float, period_s: float) -> None:
         self._guard.enforce(period_s)
-        self._sent_period_s = period_s  # what the controllers went on by; the next differs when cycles come late
+        self._sent_period_s = period_s  # the period that the controllers used; the next one may differ
         self._sent = [handle.command for handle in self._handles]
 
 

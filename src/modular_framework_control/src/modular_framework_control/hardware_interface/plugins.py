@@ -39,7 +39,7 @@ class Plugin:
 
     Attributes:
         name: what users write, package/Class.
-        base: what it is, as in `base_class_type`.
+        base: its base class, as in `base_class_type`.
         module: Python module it is in.
         class_name: its name in that module.
         origin: the description that offers it.

@@ -176,7 +176,7 @@ class RobotHW:
         """Begins the switch, in the control loop, before controllers are stopped and started."""
 
     def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
-        """How far the switch begun by `do_switch` is, as a whole or for one controller that is to start."""
+        """State of the switch begun by `do_switch`, of all controllers or of one that is to start."""
         del controller
         return SwitchState.DONE
 

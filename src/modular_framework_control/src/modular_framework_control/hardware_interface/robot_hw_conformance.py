@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One suite of tests for every `RobotHW`: what controllers rely on, whatever the hardware is.
+"""Conformance suite of `RobotHW`: what controllers rely on, for every hardware.
 
 Subclass `RobotHWConformance` in a test module under a name that begins with Test and say how the hardware is made;
 pytest finds the rest. Hardware that takes long to make may be handed out again by `make_robot_hw`, unless
@@ -154,7 +154,7 @@ class RobotHWConformance(ABC):
         self._run(robot_hw, {handle.name: handle.position for handle in handles}, 0.1)
         assert self._in_loop(robot_hw.fault) == "" and not self._in_loop(robot_hw.faults)
 
-    def test_told_to_stay_it_stays(self) -> None:
+    def test_commanded_to_hold_it_stays(self) -> None:
         robot_hw, handles = self._ready()
         before = {handle.name: handle.position for handle in handles}
         self._run(robot_hw, before, 0.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joints of a `RobotHW` whose actuators are known: handles of both, and the way between them in each cycle.
+"""Joints of a `RobotHW` whose actuators are known: the handles of both, and the conversion between them in each cycle.
 
 def init(self, root_nh, robot_hw_nh):
     self._transmissions = RobotTransmissions(self, root_nh, ["motor_1", "motor_2"])

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What lies between actuators and joints: the transmissions of ros_control's transmission_interface, as formulas.
+"""The transmissions of ros_control's transmission_interface: formulas between actuators and joints.
 
 Each maps positions, velocities and efforts from actuators to joints and back; both ways are inverse to each other.
-Ratios are `n`, of actuators `n_a` and of joints `n_j`; a ratio above 1 makes slower and stronger, a negative one turns
-the direction round. Offsets are positions of the joints where the actuators are at 0.
+Ratios are `n`, of actuators `n_a` and of joints `n_j`; a ratio above 1 reduces speed and raises effort, a negative one
+reverses the direction. Offsets are positions of the joints where the actuators are at 0.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class SimpleTransmission(Transmission):
 
 @dataclass(frozen=True)
 class _PairTransmission(Transmission):
-    """Two actuators move two joints; positions are velocities' formulas with the offsets taken off or put on.
+    """Two actuators move two joints; positions follow the formulas of velocities, with the offsets subtracted or added.
 
     Attributes:
         actuator_reduction: n_a1, n_a2.
@@ -120,7 +120,7 @@ class _PairTransmission(Transmission):
 
 @dataclass(frozen=True)
 class DifferentialTransmission(_PairTransmission):
-    """Both actuators together move the first joint, against each other the second.
+    """The sum of both actuators moves the first joint, their difference the second.
 
     v_a1 = n_a1 (n_j1 v_j1 + n_j2 v_j2), v_a2 = n_a2 (n_j1 v_j1 - n_j2 v_j2);
     tau_j1 = n_j1 (n_a1 tau_a1 + n_a2 tau_a2), tau_j2 = n_j2 (n_a1 tau_a1 - n_a2 tau_a2).
@@ -148,13 +148,13 @@ class DifferentialTransmission(_PairTransmission):
 
 @dataclass(frozen=True)
 class FourBarLinkageTransmission(_PairTransmission):
-    """The first joint goes by the first actuator alone, the second by both.
+    """The first actuator alone moves the first joint, both move the second.
 
     v_a1 = n_j1 n_a1 v_j1, v_a2 = n_a2 (v_j1 + n_j2 v_j2);
     tau_j1 = n_j1 n_a1 tau_a1, tau_j2 = n_j2 (n_a2 tau_a2 - tau_j1).
 
-    These are ros_control's formulas. Its efforts are not those that power would demand (tau_j1 = n_j1 n_a1 tau_a1
-    + n_a2 tau_a2), but they are what descriptions and gains are made for.
+    These are ros_control's formulas. Its efforts do not conserve power (that would be tau_j1 = n_j1 n_a1 tau_a1
+    + n_a2 tau_a2), but robot descriptions and gains are tuned for them.
     """
 
     def joint_velocities(self, actuators: Values) -> Values:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Knows where the packages of the sourced workspace are."""
+"""Finds the packages of the sourced workspace."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drives a base that turns by the difference between the wheels on its left and on its right."""
+"""Controls a base with differential drive."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 @dataclass(frozen=True)
 class DiffDriveSettings(BaseSettings):
-    """Besides: factors by which the geometry is calibrated.
+    """Settings of differential drive: also the factors that calibrate its geometry.
 
     Attributes:
         left_wheel_radius_multiplier: of `wheel_radius`, for the left wheels.
@@ -43,11 +43,11 @@ class WheelState:
     Attributes:
         position: measured [rad].
         velocity: measured [rad/s].
-        acceleration: by the change of the measured velocity [rad/s^2].
+        acceleration: derivative of the measured velocity [rad/s^2].
         effort: measured [Nm].
-        desired_position: what the commands add up to since the start [rad].
+        desired_position: integral of the commands since the start [rad].
         desired_velocity: commanded [rad/s].
-        desired_acceleration: by the change of the command [rad/s^2].
+        desired_acceleration: derivative of the command [rad/s^2].
     """
 
     position: float

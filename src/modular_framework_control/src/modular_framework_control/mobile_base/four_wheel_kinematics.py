@@ -70,7 +70,7 @@ class FourWheelGeometry:
         return PlanarTwist(linear, linear * slope, linear * (front_slope - rear_slope) / self.wheel_base)
 
     def axes(self) -> list[tuple[float, float]]:
-        """Places of the steering axes from the middle of the base [m]."""
+        """Positions of the steering axes relative to the middle of the base [m]."""
         half = self.track / 2.0 - self.steering_offset
         return [(end * self.wheel_base / 2.0, side * half) for end, side in zip(ENDS, SIDES, strict=True)]
 

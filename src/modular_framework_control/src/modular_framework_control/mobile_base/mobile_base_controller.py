@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What controllers of mobile bases have in common: commands that grow old, limits, odometry and what is published."""
+"""Base class of controllers of mobile bases: command timeout, limits, odometry and what is published."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class OdometrySnapshot:
 
 @dataclass(frozen=True)
 class BaseSettings:
-    """What may change while the controller runs; replaced as a whole.
+    """Settings that may change while the controller runs; frozen, so a change replaces the object.
 
     Attributes:
         publish_rate: of the odometry [1/s]; 0 for never.
@@ -168,7 +168,7 @@ class MobileBaseController(Controller, ABC):
     def starting(self, time_s: float) -> None:
         self._brake()
         self._forget()
-        self._rate = math.inf  # of no settings: they are taken over in the first cycle
+        self._rate = math.inf  # no valid rate, so that the settings are applied in the first cycle
         self.odometry.start(time_s)
         self._refusal = ""
 
@@ -219,7 +219,7 @@ class MobileBaseController(Controller, ABC):
         return None if time_s - self._seen_s > self._timeout_s else command
 
     def _forget(self) -> None:
-        """Clears all commands, including those that accelerations are limited by."""
+        """Clears all commands, including the earlier ones that acceleration limits are computed from."""
         self._latest = self._latest_seen = None
 
     @abstractmethod
@@ -265,7 +265,7 @@ class TwistLimits:
         return self.last
 
     def limit_linear(self, wanted: float, period_s: float) -> float:
-        """The linear velocity to command in this cycle, of a base whose turn is not limited by itself."""
+        """The linear velocity to command in this cycle, of a base whose rotation has no limit of its own."""
         last = self.last
         value = self._linear.limit(wanted, last.linear, self._before_last.linear, period_s)
         self.last, self._before_last = BaseVelocity(value, last.angular), last
@@ -273,7 +273,7 @@ class TwistLimits:
 
 
 def read_positive(handle: NodeHandle, key: str, default: float) -> float:
-    """A number parameter above 0.
+    """Reads a number parameter above 0.
 
     Raises:
         ParameterError: not a number above 0.
@@ -285,7 +285,7 @@ def read_positive(handle: NodeHandle, key: str, default: float) -> float:
 
 
 def read_name(handle: NodeHandle, key: str, default: str, what: str) -> str:
-    """A parameter that names something: `what` says what, for the message.
+    """Reads a parameter that names something; `what` says what, for the message.
 
     Raises:
         ParameterError: not a text, or an empty one.

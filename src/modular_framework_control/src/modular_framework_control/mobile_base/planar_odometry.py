@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a base on a plane has come to, by what its wheels have turned."""
+"""Odometry of a base on a plane, from the motion of its wheels."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class PlanarOdometry:
         self._time_s = time_s
 
     def move(self, forward: float, turn: float, time_s: float) -> None:
-        """The base was measured to have moved on.
+        """Updates the pose by a measured displacement.
 
         Args:
             forward: way since the last call [m].
@@ -77,7 +77,7 @@ class PlanarOdometry:
         self.angular = sum(self._angular) / len(self._angular)
 
     def move_at(self, linear: float, lateral: float, angular: float, time_s: float) -> None:
-        """The base moves at these velocities since the last call.
+        """Updates the pose by velocities that are in force since the last call.
 
         Args:
             linear: along the x axis of the base [m/s].

@@ -10,7 +10,7 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 UNLIMITED = (-math.inf, math.inf)
 JERK_FACTOR = 2.0
-"""How many times the jerk that is given is allowed: that of ros_controllers, by which its users' limits are tuned."""
+"""Factor on jerk limits: ros_controllers has it too, and its users' limits are tuned with it."""
 
 
 def clamped(value: float, lowest: float, highest: float) -> float:

@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 
 class WheelGeometry:
-    """What `robot_description` says of the joints of wheels.
+    """Reads the geometry of wheels from `robot_description`.
 
     Args:
         root_nh: where `robot_description` is found.
@@ -52,7 +52,7 @@ class WheelGeometry:
             raise ParameterError(str(error)) from error
 
     def between(self, first: str, second: str) -> Array:
-        """Way from the first joint to the second, both unmoved: x, y, z in the frame of the first one's parent [m].
+        """Vector from the first joint to the second, both at 0: x, y, z in the frame of the first one's parent [m].
 
         Raises:
             ParameterError: no such joint, an origin that is not made of numbers, or links that are no tree.

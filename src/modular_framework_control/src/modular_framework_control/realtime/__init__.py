@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of the control loop that work with other threads: its pace, its clock, goals on their way, mailboxes."""
+"""The control loop beside other threads: its pace and clock, the mailboxes and goal handles it shares with them."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps a control loop at its rate in real time, and counts how late its cycles begin and how long they take.
 
-A system that was not made for real time takes a processor away for milliseconds now and then: for work of its kernel
+A system without real-time scheduling now and then takes the processor away for milliseconds: for work of its kernel
 that nothing may interrupt or, in a virtual machine, for other machines on the same host. A loop that sleeps there is
 woken only afterwards. The figures say how long that was, apart from the time that cycles themselves took too long.
 """
@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 RESOLUTION_S = 5e-6
 NO_PROCESSOR_S = 1e-3
-"""A loop that sleeps and is woken later than this after its time had no processor, or not Python's interpreter [s]."""
+"""A loop that wakes up later than this had no processor, or another thread held Python's interpreter [s]."""
 _BUCKETS = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class LoopFigures:
-    """How a control loop keeps its time, since the figures were begun.
+    """How well a control loop keeps its rate, since the last reset.
 
     Attributes:
         cycles: cycles that were run.
@@ -32,7 +32,7 @@ class LoopFigures:
         late_max_s: none began later [s].
         work_mean_s: mean time of the work of a cycle [s].
         work_max_s: longest work of a cycle [s].
-        no_processor_s: for how long in all the loop was to run and had no processor [s].
+        no_processor_s: total time that the loop was due and had no processor [s].
         no_processor_max_s: the longest such time [s].
     """
 
@@ -70,10 +70,10 @@ class LoopStatistics:
         """Counts one cycle.
 
         Args:
-            late_s: how long after it was due it began [s].
+            late_s: how much later than due it began [s].
             missed: cycles left out before it.
             work_s: how long its work took [s].
-            woken_late_s: how long after its time the loop was woken for it; 0 where it did not sleep [s].
+            woken_late_s: how much later than asked the loop was woken for it; 0 where it did not sleep [s].
         """
         self._cycles += 1
         self._missed += missed
@@ -117,7 +117,7 @@ class LoopStatistics:
 
 
 class CyclePacer:
-    """Runs cycles at fixed times: what one cycle takes longer, the next one waits less.
+    """Runs cycles at fixed times: after a cycle that took longer, the loop sleeps less.
 
     One that is overdue by a period or more is left out.
 
@@ -127,7 +127,7 @@ class CyclePacer:
         sleep: waits for some time [s].
 
     Attributes:
-        woken_late_s: how long after its time the loop was woken for the cycle under way, 0 where it did not sleep [s].
+        woken_late_s: how much later than asked the loop was woken for the present cycle, 0 where it did not sleep [s].
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class CyclePacer:
         """Runs cycles until one returns False; the first one begins at once.
 
         Args:
-            cycle: gets how late it begins [s] and how many were left out before it. What is started in a cycle inherits
+            cycle: gets how late it begins [s] and how many were left out before it. A thread started in it inherits
                 the priority of the loop.
         """
         due_s, goes_on = self._clock(), True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The state of one goal on its way through a controller, for whoever sent it.
+"""The state of one goal inside a controller, shared with the action server that received it.
 
 The control loop changes a goal handle and calls its listener, which must not block: the ROS interface of a controller
 only puts the new status into a queue that another thread processes.

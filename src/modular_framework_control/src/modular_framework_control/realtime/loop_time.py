@@ -32,7 +32,7 @@ class LoopTime:
         steady: clock that never jumps [s].
 
     Attributes:
-        ahead_s: how much the system clock is ahead of this time [s]; changes when it is set. Stamps of messages are
+        ahead_s: how far the system clock is ahead of this time [s]; changes when it is set. Stamps of messages are
             ahead by it.
         longest_step_s: largest increase from one reading to the next [s].
     """

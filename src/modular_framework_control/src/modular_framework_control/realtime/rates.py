@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When something that is done at a fixed rate is due again, counted in the time of the control loop."""
+"""Computes when an action with a fixed rate is due, in the time of the control loop."""
 
 import math
 
@@ -10,11 +10,11 @@ def period_of(rate: float) -> float:
 
 
 def first_due(period_s: float, time_s: float) -> float:
-    """When something with this period is due first after a start at `time_s` [s]: at once, or never."""
+    """Returns when an action with this period is first due after a start at `time_s` [s]: at once, or never."""
     return time_s if period_s < math.inf else math.inf
 
 
 def next_due(due_s: float, period_s: float, time_s: float) -> float:
-    """When something with this period is due after it was done at `time_s` [s]; missed turns are not made up for."""
+    """Returns when an action with this period is due after it ran at `time_s` [s]; missed ones are not repeated."""
     following_s = due_s + period_s
     return following_s if following_s > time_s else time_s + period_s

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Asks the operating system to let the control loop run on time, where it permits that.
 
-What Python itself does against a steady loop is made small too: another thread gives the interpreter up after a
+The jitter that Python itself causes is reduced too: another thread releases the interpreter after a
 fraction of a cycle, and the garbage collector ignores all objects that exist when the loop begins.
 """
 
@@ -24,14 +24,14 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
 
 def prepare_interpreter() -> None:
-    """Keeps other threads and the garbage collector from delaying the loop; to be called when everything is set up."""
+    """Keeps other threads and the garbage collector from delaying the loop; call it after set-up."""
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()
 
 
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:
-    """Runs this process before ordinary ones, the calling thread first (SCHED_FIFO), and keeps its memory in RAM.
+    """Gives this process real-time priority, the calling thread the highest (SCHED_FIFO), and locks its memory in RAM.
 
     The other threads get a real-time priority too, because the loop waits while one of them holds Python's interpreter:
     a process that takes the processor from that thread would delay the loop.

@@ -21,7 +21,7 @@ Groups = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True, slots=True)
 class GroupPlan:
-    """What brings the controllers of one group into force.
+    """What has to be loaded, started and stopped so that one group runs.
 
     Attributes:
         load: controllers of the group that are not loaded, in its order.
@@ -52,7 +52,7 @@ def read_groups(value: object) -> Groups:
 
 
 def plan_group(groups: Groups, group: str, states: Mapping[str, str]) -> GroupPlan:
-    """What is to be done for `group`.
+    """Computes what has to be done for `group`.
 
     Args:
         groups: controllers of each group.

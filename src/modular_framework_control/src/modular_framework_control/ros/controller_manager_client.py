@@ -54,7 +54,7 @@ class ControllerManagerClient:
         self._await_clock = await_clock
 
     def last_calls(self) -> ControllerManagerClient:
-        """A client for what is to be done at the end; it does not wait for a service that has gone."""
+        """A client for clean-up at shutdown; it does not wait for a service that has gone."""
         return ControllerManagerClient(self.namespace, timeout_s=0.0)
 
     def load(self, name: str) -> None:

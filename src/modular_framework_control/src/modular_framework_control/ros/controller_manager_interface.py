@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The functions of ros_control's module controller_manager.controller_manager_interface: ask, and print the answer.
 
-Each waits for its service as long as that takes, prints the text of the public tool and returns whether the manager did
+Each waits for its service without a timeout, prints the text of the public tool and returns whether the manager did
 it. Why it refused is on the log.
 """
 

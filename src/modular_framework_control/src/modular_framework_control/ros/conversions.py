@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where message classes meet the types of the controllers.
+"""Conversions between messages and the types of the controllers.
 
-Messages are stamped by the ROS clock, controllers count in the time of the control loop: by `ahead_s` [s] the former is
+Messages are stamped by the ROS clock, controllers use the time of the control loop: the former is `ahead_s` [s]
 ahead of the latter (see `LoopTime`).
 """
 

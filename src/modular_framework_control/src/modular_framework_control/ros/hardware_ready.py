@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says, and waits until others say, that hardware is ready for controllers: the topics `topic_to_wait_for`."""
+"""Publishes, and waits for, the readiness of hardware for controllers: the topics `topic_to_wait_for`."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 
 class HardwareNotReadyError(Exception):
-    """Hardware did not say within the time it had that it is ready; says which and on what topic."""
+    """Hardware did not announce in time that it is ready; names the hardware and its topic."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReadyTopics:
-    """Who says on which topic that it is ready.
+    """Which topics announce which hardware as ready.
 
     Attributes:
-        awaited: topic by hardware, of hardware that says it itself.
-        announced: topics on which it is said on behalf of hardware that does not.
+        awaited: topic by hardware, of hardware that announces itself.
+        announced: topics on which the node announces hardware that does not announce itself.
     """
 
     awaited: Mapping[str, str]

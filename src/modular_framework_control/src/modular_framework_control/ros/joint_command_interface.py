@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The topics of controllers that do at once what their topic `command` says."""
+"""The topics of controllers whose commands arrive on a topic `command`."""
 
 from __future__ import annotations
 

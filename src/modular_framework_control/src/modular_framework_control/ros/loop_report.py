@@ -25,7 +25,7 @@ class LoopReport:
 
     The status is a warning when cycles were late since the last message, an error when the hardware has a fault.
     Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
-    `work_max_us`, `no_processor_us` (for how long in all the loop was to run and had no processor),
+    `work_max_us`, `no_processor_us` (total time that the loop was due and had no processor),
     `no_processor_max_us` (the longest such time), `fault`.
 
     Args:

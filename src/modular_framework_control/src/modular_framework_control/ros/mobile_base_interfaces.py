@@ -86,7 +86,7 @@ class MobileBaseRosInterface:
     def _subscribe(self, opened: contextlib.ExitStack, topic: str, kind: Any, command_of: Any) -> None:
         """Hands each message of a topic to the controller, as what `command_of` makes of it."""
         name = self._topic(topic)
-        subscribers: list[rospy.Subscriber] = []  # a message may come before there is anything to ask
+        subscribers: list[rospy.Subscriber] = []  # a message may arrive before the subscriber is stored
 
         def on_message(message: Any) -> None:
             publishers = sum(subscriber.get_num_connections() for subscriber in subscribers)
@@ -109,7 +109,7 @@ class MobileBaseRosInterface:
 
 
 class DiffDriveRosInterface(MobileBaseRosInterface):
-    """What a base with differential drive has besides.
+    """Topics and settings of a base with differential drive, besides those of every mobile base.
 
     Publishes, where that is switched on, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and
     `<name>/wheel_joint_controller_state` (control_msgs/JointTrajectoryControllerState); serves dynamic_reconfigure in
@@ -137,7 +137,7 @@ class DiffDriveRosInterface(MobileBaseRosInterface):
 
 
 class FourWheelSteeringRosInterface(MobileBaseRosInterface):
-    """What a base with four steered wheels has besides.
+    """Topics of a base with four steered wheels, besides those of every mobile base.
 
     Subscribes `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
     `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped).

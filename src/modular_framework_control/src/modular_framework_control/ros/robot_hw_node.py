@@ -33,7 +33,7 @@ COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
 CLOCK_TOLERANCE_S = 1e-6
 REST_VELOCITY = 0.01
-"""What is no faster [rad/s|m/s] is at rest, for hardware whose measured velocities are never quite 0."""
+"""Velocity below which a joint counts as at rest [rad/s|m/s]; measured velocities are never quite 0."""
 HELD_UP_S = 0.05
 """A cycle that comes so late, or two periods late, finds the motions where they were."""
 RESTLESS_S = 0.2
@@ -270,7 +270,7 @@ def main() -> int:
 
     def on_signal(number: int, frame: object) -> None:
         del frame
-        if not running.is_set():  # hardware that takes its time to connect must not hold the end up
+        if not running.is_set():  # hardware that takes long to connect must not delay the shutdown
             raise SystemExit(128 + number)
         ended.set()
 

@@ -46,7 +46,7 @@ class SensorRosInterface:
         }
 
         def report(time_s: float, handle: Any) -> None:
-            reading = copy.copy(handle)  # the loop goes on to change it
+            reading = copy.copy(handle)  # the loop changes the handle in the next cycle
             outbox.publish(self._publishers[handle.name], lambda: to_msg(time_s + loop_time.ahead_s, reading))
 
         controller.on_reading = report
@@ -78,7 +78,7 @@ def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
 
 
 def pace_to_msg(time_s: float, handle: SpeedScalingHandle) -> Float64:
-    """How fast a robot lets itself be moved, 0 to 1; the message has no time."""
+    """Converts a speed scaling factor, 0 to 1; the message has no stamp."""
     del time_s
     return Float64(handle.factor)
 

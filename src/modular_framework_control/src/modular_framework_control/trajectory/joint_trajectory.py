@@ -125,7 +125,7 @@ class Spline:
 
 
 class Track:
-    """What some joints of a controller are to do over time: consecutive segments, then rest at the last position.
+    """The motion of some joints of a controller: consecutive segments, then rest at the last position.
 
     Args:
         joints: indices of the joints in the controller.
@@ -211,7 +211,7 @@ def splice(
         origin_s: time of its time_from_start 0 [s].
         splice_s: when it takes over [s].
         state: desired state of its joints at `splice_s`, shape (3, joints).
-        continuous: which joints turn without end; they go the short way round.
+        continuous: which joints are continuous; they take the shorter direction.
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
@@ -233,7 +233,7 @@ def splice(
 
 
 def _whole_turns(position: Array, target: Array) -> Array:
-    """What is to be added to `target` so that it is the short way from `position`; half a turn goes as the numbers say.
+    """Returns the multiple of 2 pi that brings `target` nearest to `position`; half a turn keeps its direction.
 
     Both of shape (joints,) [rad].
     """

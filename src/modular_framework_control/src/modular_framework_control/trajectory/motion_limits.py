@@ -73,7 +73,7 @@ class MotionLimits:
         return MotionLimits(self.lowest[chosen], self.highest[chosen], self.fastest[chosen], self.braking[chosen])
 
     def with_positions(self, positions: Array) -> MotionLimits:
-        """Returns the limits widened to these positions, shape (joints,), so that a joint outside may come back."""
+        """Returns the limits widened to these positions, shape (joints,), so that a joint outside may move back."""
         return MotionLimits(
             np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest, self.braking
         )

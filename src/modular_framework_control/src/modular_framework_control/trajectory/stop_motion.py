@@ -19,14 +19,14 @@ from modular_framework_control.trajectory.joint_trajectory import (
 from modular_framework_control.trajectory.motion_limits import MotionLimits
 
 FOLLOWING_LAG_S = 0.05
-"""How late a moving joint may follow [s]: at its measured velocity it is that far behind commands on their way, and a
-ramp goes on from them. Set by an arm that follows over a network 0.03 s late; a slower one is brought back a little as
-it brakes."""
+"""Largest lag of a joint behind its commands [s]: a ramp begins at the position that the joint reaches in this time at
+its measured velocity. Tuned on an arm that follows 0.03 s late over a network; a joint with a larger lag moves back a
+little while it brakes."""
 COMMAND_S = 0.01
-"""How old the last command is at most [s]; so much of the desired motion a joint has not begun to follow."""
+"""Largest age of the last command [s]; the desired motion since then has not been sent to the joint."""
 FOLLOWING_SHARE = 0.1
-"""How different the measured velocity of a joint that follows may be, as a share of the desired one, which a ramp then
-goes on from: measured velocities are late and noisy."""
+"""A joint whose measured velocity differs from the desired one by at most this share of it counts as following; a ramp
+then begins at the desired velocity, because measured velocities are late and noisy."""
 PEAK_OF_RAMP = 1.5
 """Largest deceleration of a ramp, as a multiple of its mean one."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far a joint may be from where a trajectory wants it, on the way and at the end, and the text when it is further.
+"""Path and goal tolerances of a trajectory, and the text of their violations.
 
 Defaults come from the parameters below `constraints`; a goal may replace or erase them. An infinite tolerance is one
 that is not checked.
@@ -89,7 +89,7 @@ def tolerances_of_goal(
         joints: indices of the joints of the goal.
         path: what the goal says for the way, by joint name.
         goal: what the goal says for the end, by joint name.
-        goal_time_s: positive replaces the default [s], 0 keeps it, negative means no time at all.
+        goal_time_s: positive replaces the default [s], 0 keeps it, negative means 0.
 
     Raises:
         InvalidTrajectoryError: one that is not a number.

@@ -42,7 +42,7 @@ class TrajectoryGoal:
         trajectory: the motion.
         path_tolerance: by joint name.
         goal_tolerance: by joint name.
-        goal_time_tolerance_s: positive replaces the default [s], 0 keeps it, negative means no time at all.
+        goal_time_tolerance_s: positive replaces the default [s], 0 keeps it, negative means 0.
     """
 
     trajectory: JointTrajectory

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all joints of a trajectory controller are to do from now on.
+"""The planned motion of all joints of a trajectory controller.
 
-This is the motion under way and the one that replaces it later.
+It is the present motion, and the ones that replace it later.
 
 A trajectory that starts in the future, or moves some of the joints only, leaves the rest of the motion as it is. So the
-plan is a row of stages, each with the tracks in force from its beginning on; every joint is in one track of a stage.
+plan is a sequence of stages with the tracks in force from their beginning on; each joint is in one track of a stage.
 """
 
 from __future__ import annotations
