@@ -28,7 +28,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 MODULE = """
 import rospy
 from std_msgs.msg import String
-from modular_framework_control.hardware_interface.interfaces import ForceTorqueSensorHandle, ForceTorqueSensorInterface
+from modular_framework_control.hardware_interface.handles import ForceTorqueSensorHandle
+from modular_framework_control.hardware_interface.interfaces import ForceTorqueSensorInterface
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 
 class LabArm(MockRobotHW):

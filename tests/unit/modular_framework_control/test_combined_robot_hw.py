@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 
 from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     InterfaceResources,
-    JointHandle,
-    JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
     VelocityJointInterface,

@@ -12,10 +12,9 @@ import pytest
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.controller_manager.controller_types import ControllerTypes
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
-    JointHandle,
-    JointStateHandle,
     PositionJointInterface,
     VelocityJointInterface,
 )

@@ -12,11 +12,8 @@ import pytest
 
 from modular_framework_control.controller_interface.controller import ControllerError
 from modular_framework_control.controllers.gripper_action_controller import GripperGoalHandle
-from modular_framework_control.hardware_interface.interfaces import (
-    COMMAND_INTERFACES,
-    SpeedScalingHandle,
-    SpeedScalingInterface,
-)
+from modular_framework_control.hardware_interface.handles import SpeedScalingHandle
+from modular_framework_control.hardware_interface.interfaces import COMMAND_INTERFACES, SpeedScalingInterface
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint

@@ -11,11 +11,10 @@ import pytest
 from modular_framework_control.controller_interface.controller import Controller
 from modular_framework_control.controller_manager.controller_types import ControllerTypes
 from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.handles import ForceTorqueSensorHandle, SpeedScalingHandle
 from modular_framework_control.hardware_interface.interfaces import (
-    ForceTorqueSensorHandle,
     ForceTorqueSensorInterface,
     PositionJointInterface,
-    SpeedScalingHandle,
     SpeedScalingInterface,
 )
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW

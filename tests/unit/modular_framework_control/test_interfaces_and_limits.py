@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 
 from modular_framework_control.controller_interface.controller import ControllerError
 from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
     HardwareInterfaceError,
-    JointHandle,
-    JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
     interface_from_name,

@@ -12,11 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle, PosVelAccJointHandle
 from modular_framework_control.hardware_interface.interfaces import (
-    JointHandle,
-    JointStateHandle,
     PositionJointInterface,
-    PosVelAccJointHandle,
     PosVelAccJointInterface,
     VelocityJointInterface,
 )

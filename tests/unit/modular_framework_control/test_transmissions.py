@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modular_framework_control.hardware_interface.handles import JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
-    JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
     VelocityJointInterface,

@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
+from modular_framework_control.hardware_interface.handles import JointHandle
 from modular_framework_control.hardware_interface.interfaces import (
     ForceTorqueSensorInterface,
-    JointHandle,
     PositionJointInterface,
     SpeedScalingInterface,
 )

@@ -98,7 +98,33 @@ def check_slots(what: str, message: Any, slots: Iterable[str]) -> tuple[str, ...
     return given
 
 
-class MessageSource:
+class _MessageRules:
+    """Base: what connects a message with the userdata, and the user's callback for it."""
+
+    def __init__(self, what: str, empty: Any, key: str | None, slots: Iterable[str], callback: UserCallback) -> None:
+        """Checks and keeps the rules.
+
+        Args:
+            what: what the message is: "goal", "result", "request" or "response".
+            empty: an empty message of the right type.
+            key: userdata key of the whole message; None: there is none.
+            slots: fields that have userdata keys of the same names.
+            callback: function of the user.
+
+        Raises:
+            smach.InvalidStateError: a field does not exist.
+        """
+        self._what = what
+        self._key = key
+        self._slots = check_slots(f"{what}_slots", empty, slots)
+        self._callback = callback
+
+    @property
+    def _keys(self) -> list[str]:
+        return [*([] if self._key is None else [self._key]), *self._slots]
+
+
+class MessageSource(_MessageRules):
     """Makes a message: the fixed one, or that under a userdata key; then fields by key; then the callback's."""
 
     def __init__(
@@ -109,28 +135,25 @@ class MessageSource:
         Args:
             what: "goal" or "request".
             empty: an empty message of the right type.
-            fixed: the message to start from; None: the empty one.
-            key: userdata key that holds the message; None: the fixed one is used.
-            slots: fields that are taken from userdata keys of the same names.
+            fixed: the message to start from, when there is no key; None: the empty one.
+            key: as of every message.
+            slots: as of every message.
             callback: gets (userdata, message) and may return another message.
 
         Raises:
             smach.InvalidStateError: the fixed message has another type, or a field does not exist.
         """
-        self._what = what
+        super().__init__(what, empty, key, slots, callback)
         self._empty = empty
         if fixed is not None and not self._fits(fixed):
             raise smach.InvalidStateError(
                 f"{what} is a {_kind(fixed)}; give a {empty._type}, or a function as {what}_cb"
             )
         self._fixed = empty if fixed is None else fixed
-        self._key = key
-        self._slots = check_slots(f"{what}_slots", empty, slots)
-        self._callback = callback
 
     def register_on(self, state: smach.State) -> None:
         """Declares the userdata keys on a state."""
-        state.register_input_keys([*([] if self._key is None else [self._key]), *self._slots])
+        state.register_input_keys(self._keys)
         self._callback.register_on(state, with_outcomes=False)
 
     def make(self, userdata: Any) -> Any:
@@ -168,19 +191,12 @@ def _kind(value: Any) -> str:
     return str(getattr(value, "_type", type(value).__name__))
 
 
-class MessageSink:
+class MessageSink(_MessageRules):
     """Delivers an answer: to the callback, then whole under a userdata key, then its fields under keys."""
-
-    def __init__(self, what: str, empty: Any, key: str | None, slots: Iterable[str], callback: UserCallback) -> None:
-        """Checks and keeps the rules; what, empty, key, slots and callback as for ``MessageSource``."""
-        self._what = what
-        self._key = key
-        self._slots = check_slots(f"{what}_slots", empty, slots)
-        self._callback = callback
 
     def register_on(self, state: smach.State) -> None:
         """Declares the userdata keys and the callback's outcomes on a state."""
-        state.register_output_keys([*([] if self._key is None else [self._key]), *self._slots])
+        state.register_output_keys(self._keys)
         self._callback.register_on(state, with_outcomes=True)
 
     def deliver(self, userdata: Any, outcomes: Iterable[str], message: Any, *before: Any) -> str | None:
@@ -223,6 +239,19 @@ class AskingState(smach.State):
         """Declares succeeded, aborted, preempted, and what the user adds."""
         super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, io_keys)
         self.reason = ""
+        self._keys = (self.get_registered_input_keys(), self.get_registered_output_keys())
+
+    def _user_callback(
+        self, what: str, function: Any, args: Iterable[Any], kwargs: Mapping[str, Any] | None
+    ) -> UserCallback:
+        """Returns a callback that may use the keys the user gave; arguments and errors as of ``UserCallback``."""
+        return UserCallback(what, function, args, kwargs, self._keys)
+
+    def _use(self, source: MessageSource, sink: MessageSink) -> None:
+        """Takes what makes the message and what delivers the answer, and declares their keys and outcomes."""
+        self._source, self._sink = source, sink
+        source.register_on(self)
+        sink.register_on(self)
 
     def _stopped(self) -> bool:
         return self.preempt_requested() or going_down()

@@ -10,7 +10,7 @@ from typing import Any
 import rospy
 
 import smach
-from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource, UserCallback
+from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource
 from smach_ros.waiting import POLL_PERIOD_S, WallTimeLimit, seconds
 
 __all__ = ["ServiceState"]
@@ -97,13 +97,12 @@ class ServiceState(AskingState):
         self._server_wait_timeout_s = seconds("server_wait_timeout", server_wait_timeout)
         self._exec_timeout_s = seconds("exec_timeout", exec_timeout)
         empty_request, empty_response = _empty_messages(service_name, service_spec)
-        keys = ([*input_keys, *io_keys], [*output_keys, *io_keys])
-        request_callback = UserCallback("request_cb", request_cb, request_cb_args, request_cb_kwargs, keys)
-        response_callback = UserCallback("response_cb", response_cb, response_cb_args, response_cb_kwargs, keys)
-        self._source = MessageSource("request", empty_request, request, request_key, request_slots, request_callback)
-        self._sink = MessageSink("response", empty_response, response_key, response_slots, response_callback)
-        self._source.register_on(self)
-        self._sink.register_on(self)
+        on_request = self._user_callback("request_cb", request_cb, request_cb_args, request_cb_kwargs)
+        on_response = self._user_callback("response_cb", response_cb, response_cb_args, response_cb_kwargs)
+        self._use(
+            MessageSource("request", empty_request, request, request_key, request_slots, on_request),
+            MessageSink("response", empty_response, response_key, response_slots, on_response),
+        )
 
     def execute(self, userdata: Any) -> str:
         """Waits for the service, calls it and delivers the answer."""

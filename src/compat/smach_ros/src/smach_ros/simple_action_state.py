@@ -12,7 +12,7 @@ from actionlib import CommState, SimpleActionClient
 from actionlib_msgs.msg import GoalID, GoalStatus
 
 import smach
-from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource, UserCallback
+from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource
 from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, WallTimeLimit, seconds
 
 __all__ = ["SimpleActionState"]
@@ -83,13 +83,12 @@ class SimpleActionState(AskingState):
         self._preempt_timeout_s = seconds("preempt_timeout", preempt_timeout)
         self._server_wait_timeout_s = seconds("server_wait_timeout", server_wait_timeout)
         empty_goal, empty_result = _empty_messages(action_name, action_spec)
-        keys = ([*input_keys, *io_keys], [*output_keys, *io_keys])
-        goal_callback = UserCallback("goal_cb", goal_cb, goal_cb_args, goal_cb_kwargs, keys)
-        result_callback = UserCallback("result_cb", result_cb, result_cb_args, result_cb_kwargs, keys)
-        self._source = MessageSource("goal", empty_goal, goal, goal_key, goal_slots, goal_callback)
-        self._sink = MessageSink("result", empty_result, result_key, result_slots, result_callback)
-        self._source.register_on(self)
-        self._sink.register_on(self)
+        on_goal = self._user_callback("goal_cb", goal_cb, goal_cb_args, goal_cb_kwargs)
+        on_result = self._user_callback("result_cb", result_cb, result_cb_args, result_cb_kwargs)
+        self._use(
+            MessageSource("goal", empty_goal, goal, goal_key, goal_slots, on_goal),
+            MessageSink("result", empty_result, result_key, result_slots, on_result),
+        )
         self._lock = threading.RLock()
         self._wake = threading.Event()
         self._goal_is_out = False

@@ -13,15 +13,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
-from modular_framework_control.hardware_interface.handles import unmeasured
-from modular_framework_control.hardware_interface.interfaces import (
-    HardwareInterface,
-    JointHandle,
-    PositionJointInterface,
-)
+from modular_framework_control.hardware_interface.handles import JointHandle, unmeasured
+from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.realtime.mailbox import Mailbox
-from modular_framework_control.realtime.rates import next_due, period_of
+from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 
 
@@ -97,7 +93,7 @@ class GripperActionController(Controller):
         self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
         threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
         self._stall_distance = threshold * self._stall_timeout_s
-        self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
+        self._feedback_turns = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
         return True
 
     # ---- any thread ----
@@ -198,7 +194,7 @@ class GripperActionController(Controller):
         self._max_effort = goal.max_effort if goal.max_effort > 0.0 else self._default_max_effort
         self._rest_position = self._handle.position
         self._rest_since_s = time_s
-        self._next_feedback_s = time_s
+        self._feedback_turns.start(time_s)
         goal.goal_handle.activate()
 
     def _check(self, goal: _Goal, time_s: float) -> None:
@@ -218,8 +214,7 @@ class GripperActionController(Controller):
                 f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s",
             )
             return
-        if self.on_feedback is not None and time_s >= self._next_feedback_s:
-            self._next_feedback_s = next_due(self._next_feedback_s, self._monitor_period_s, time_s)
+        if self.on_feedback is not None and self._feedback_turns.take_turn(time_s):
             self.on_feedback(goal.goal_handle, self._state(False, False))
 
     def _hold(self) -> None:

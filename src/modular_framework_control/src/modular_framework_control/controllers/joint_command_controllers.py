@@ -13,9 +13,9 @@ from typing import Any
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.controller_interface.pid import PidGains, read_pid
+from modular_framework_control.hardware_interface.handles import JointHandle
 from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
-    JointHandle,
     PositionJointInterface,
     VelocityJointInterface,
 )

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from modular_framework_control.controller_interface.controller import Controller
-from modular_framework_control.hardware_interface.interfaces import JointStateHandle, JointStateInterface
-from modular_framework_control.realtime.rates import first_due, next_due, period_of
+from modular_framework_control.hardware_interface.handles import JointStateHandle
+from modular_framework_control.hardware_interface.interfaces import JointStateInterface
+from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_ros.node_handle import NodeHandle, join_names, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.joint_state_controller")
@@ -55,23 +56,21 @@ class JointStateController(Controller):
         self.on_state: Callable[[JointStateSnapshot], None] | None = None
         self._handles: list[JointStateHandle] = []
         self._extra: list[JointStateHandle] = []
-        self._next_s = -math.inf
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         names = read_names(controller_nh, "joints") if controller_nh.has_param("joints") else sorted(hw.names)
         self._handles = [hw.get_handle(name) for name in names]
-        self._period_s = period_of(read_number(controller_nh, "publish_rate", 50.0))
+        self._turns = Schedule(read_number(controller_nh, "publish_rate", 50.0))
         self._extra = [joint for joint in _extra_joints(controller_nh) if joint.name not in hw.names]
         self._names = [handle.name for handle in (*self._handles, *self._extra)]
         return True
 
     def starting(self, time_s: float) -> None:
-        self._next_s = first_due(self._period_s, time_s)
+        self._turns.start(time_s)
 
     def update(self, time_s: float, period_s: float) -> None:
-        if time_s < self._next_s or self.on_state is None:
+        if self.on_state is None or not self._turns.take_turn(time_s):
             return
-        self._next_s = next_due(self._next_s, self._period_s, time_s)
         joints = (*self._handles, *self._extra)
         self.on_state(
             JointStateSnapshot(

@@ -23,7 +23,7 @@ from modular_framework_control.hardware_interface.joint_limits import limits_of
 from modular_framework_control.hardware_interface.robot_hw import speed_scaling_handles
 from modular_framework_control.realtime.goal_handle import GoalStatus
 from modular_framework_control.realtime.mailbox import Mailbox
-from modular_framework_control.realtime.rates import next_due, period_of
+from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_control.trajectory.goal_validation import GoalRules, ValidatedGoal, validate_goal
 from modular_framework_control.trajectory.joint_trajectory import (
     POSITION,
@@ -96,8 +96,8 @@ class JointTrajectoryController(Controller):
             read_bool(controller_nh, "allow_partial_joints_goal", False),
         )
         self._stop_motion = StopMotion(read_number(controller_nh, "stop_trajectory_duration", 0.0), self._limits)
-        self._state_period_s = period_of(read_number(controller_nh, "state_publish_rate", 50.0))
-        self._monitor_period_s = period_of(read_number(controller_nh, "action_monitor_rate", 20.0))
+        self._state_turns = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
+        self._feedback_turns = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
         self._continuous = np.array([limits.continuous for limits in known])
         self._any_continuous = bool(self._continuous.any())
         self._clock = TrajectoryClock(speed_scaling_handles(self.robot_hw, self.joint_names))
@@ -156,7 +156,8 @@ class JointTrajectoryController(Controller):
         self._reject_waiting("the goal was sent while the controller was being stopped")
         self._active, self._fault = None, ""
         self._clock.start(time_s)
-        self._next_state_s = self._next_feedback_s = time_s
+        self._state_turns.start(time_s)
+        self._feedback_turns.start(time_s)
         self._read_actual()
         self._unmeasured = unmeasured(self._handles)
         if self._unmeasured:
@@ -386,16 +387,14 @@ class JointTrajectoryController(Controller):
             goal.goal_handle.finish(status, code, text)
 
     def _report(self, time_s: float, desired: Array, error: Array) -> None:
-        state_due = self.on_state is not None and time_s >= self._next_state_s
-        feedback_due = self._active is not None and self.on_feedback is not None and time_s >= self._next_feedback_s
-        if not state_due and not feedback_due:
+        goal_handle = self._active.goal_handle if self._active is not None else None
+        on_state = self.on_state if self._state_turns.take_turn(time_s) else None
+        on_feedback = self.on_feedback if goal_handle is not None and self._feedback_turns.take_turn(time_s) else None
+        if on_state is None and on_feedback is None:
             return
         elapsed_s = self._plan.elapsed_s(self._clock.now_s)
         snapshot = TrajectorySnapshot(time_s, desired, self._actual.copy(), error, elapsed_s)
-        if state_due and self.on_state is not None:
-            self._next_state_s = next_due(self._next_state_s, self._state_period_s, time_s)
-            self.on_state(snapshot)
-        goal_handle = self._active.goal_handle if self._active is not None else None
-        if feedback_due and self.on_feedback is not None and goal_handle is not None:
-            self._next_feedback_s = next_due(self._next_feedback_s, self._monitor_period_s, time_s)
-            self.on_feedback(goal_handle, snapshot)
+        if on_state is not None:
+            on_state(snapshot)
+        if on_feedback is not None and goal_handle is not None:
+            on_feedback(goal_handle, snapshot)

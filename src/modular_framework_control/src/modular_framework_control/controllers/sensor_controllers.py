@@ -6,7 +6,6 @@ They report what force-torque sensors and inertial units measure, and the speed 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +15,7 @@ from modular_framework_control.hardware_interface.interfaces import (
     ImuSensorInterface,
     SpeedScalingInterface,
 )
-from modular_framework_control.realtime.rates import first_due, next_due, period_of
+from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_ros.node_handle import NodeHandle, read_number
 
 
@@ -35,21 +34,19 @@ class SensorController(Controller):
         self.sensor_names: list[str] = []
         self.on_reading: Callable[[float, Any], None] | None = None
         self._handles: list[Any] = []
-        self._next_s = -math.inf
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
-        self._period_s = period_of(read_number(controller_nh, "publish_rate", 50.0))
+        self._turns = Schedule(read_number(controller_nh, "publish_rate", 50.0))
         self.sensor_names = list(hw.names)
         self._handles = [hw.get_handle(name) for name in self.sensor_names]
         return True
 
     def starting(self, time_s: float) -> None:
-        self._next_s = first_due(self._period_s, time_s)
+        self._turns.start(time_s)
 
     def update(self, time_s: float, period_s: float) -> None:
-        if time_s < self._next_s or self.on_reading is None:
+        if self.on_reading is None or not self._turns.take_turn(time_s):
             return
-        self._next_s = next_due(self._next_s, self._period_s, time_s)
         for handle in self._handles:
             self.on_reading(time_s, handle)
 

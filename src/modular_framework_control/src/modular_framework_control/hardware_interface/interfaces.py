@@ -219,33 +219,3 @@ class ControllerInfo:
     name: str
     type: str
     claimed_resources: tuple[InterfaceResources, ...]
-
-
-__all__ = [
-    "COMMAND_INTERFACES",
-    "INTERFACES_BY_NAME",
-    "AnyInterface",
-    "CommandInterface",
-    "ControllerInfo",
-    "EffortJointInterface",
-    "ForceTorqueSensorHandle",
-    "ForceTorqueSensorInterface",
-    "HandleT",
-    "HardwareInterface",
-    "HardwareInterfaceError",
-    "ImuSensorHandle",
-    "ImuSensorInterface",
-    "InterfaceResources",
-    "JointHandle",
-    "JointStateHandle",
-    "JointStateInterface",
-    "PosVelAccJointHandle",
-    "PosVelAccJointInterface",
-    "PosVelJointHandle",
-    "PosVelJointInterface",
-    "PositionJointInterface",
-    "SpeedScalingHandle",
-    "SpeedScalingInterface",
-    "VelocityJointInterface",
-    "interface_from_name",
-]

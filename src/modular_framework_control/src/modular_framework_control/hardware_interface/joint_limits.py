@@ -12,10 +12,10 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
+from modular_framework_control.hardware_interface.handles import JointHandle
 from modular_framework_control.hardware_interface.interfaces import (
     EffortJointInterface,
     HardwareInterface,
-    JointHandle,
     PosVelAccJointInterface,
     PosVelJointInterface,
     VelocityJointInterface,

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import logging
 
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import (
     COMMAND_INTERFACES,
     CommandInterface,
     EffortJointInterface,
-    JointHandle,
-    JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
     VelocityJointInterface,

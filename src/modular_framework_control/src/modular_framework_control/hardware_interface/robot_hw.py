@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, TypeVar, cast
 
+from modular_framework_control.hardware_interface.handles import SpeedScalingHandle
 from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     HardwareInterface,
     HardwareInterfaceError,
     InterfaceResources,
-    SpeedScalingHandle,
     SpeedScalingInterface,
 )
 from modular_framework_ros.node_handle import NodeHandle

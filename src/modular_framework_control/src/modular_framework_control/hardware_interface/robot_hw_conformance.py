@@ -17,10 +17,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from modular_framework_control.hardware_interface.handles import JointHandle
 from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     InterfaceResources,
-    JointHandle,
     JointStateInterface,
     PositionJointInterface,
 )

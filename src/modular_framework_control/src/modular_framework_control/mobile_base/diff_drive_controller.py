@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from modular_framework_control.hardware_interface.interfaces import JointHandle, VelocityJointInterface
+from modular_framework_control.hardware_interface.handles import JointHandle
+from modular_framework_control.hardware_interface.interfaces import VelocityJointInterface
 from modular_framework_control.mobile_base.mobile_base_controller import (
     AT_REST,
     BaseSettings,

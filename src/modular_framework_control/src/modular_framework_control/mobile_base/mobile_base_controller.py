@@ -12,7 +12,7 @@ from typing import Any
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.mobile_base.planar_odometry import PlanarOdometry
 from modular_framework_control.mobile_base.speed_limiter import SpeedLimiter, read_speed_limiter
-from modular_framework_control.realtime.rates import first_due, next_due, period_of
+from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 
 Diagonal = tuple[float, float, float, float, float, float]
@@ -117,7 +117,7 @@ class MobileBaseController(Controller, ABC):
         self._latest: Any = None
         self._latest_seen: Any = None
         self._seen_s = -math.inf
-        self._rate = self._next_s = math.inf
+        self._turns: Schedule | None = None
         self._refusal = "the controller is not running; start it first"
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -168,7 +168,7 @@ class MobileBaseController(Controller, ABC):
     def starting(self, time_s: float) -> None:
         self._brake()
         self._forget()
-        self._rate = math.inf  # no valid rate, so that the settings are applied in the first cycle
+        self._turns = None  # they begin with the first cycle
         self.odometry.start(time_s)
         self._refusal = ""
 
@@ -198,12 +198,11 @@ class MobileBaseController(Controller, ABC):
     def _report(self, time_s: float) -> bool:
         """Publishes the odometry if that is due; returns whether it was."""
         settings, pose = self.settings, self.odometry
-        period_s = period_of(settings.publish_rate)
-        if settings.publish_rate != self._rate:
-            self._rate, self._next_s = settings.publish_rate, first_due(period_s, time_s)
-        if self.on_odometry is None or time_s < self._next_s:
+        if self._turns is None or settings.publish_rate != self._turns.rate:
+            self._turns = Schedule(settings.publish_rate)
+            self._turns.start(time_s)
+        if self.on_odometry is None or not self._turns.take_turn(time_s):
             return False
-        self._next_s = next_due(self._next_s, period_s, time_s)
         self.on_odometry(
             OdometrySnapshot(
                 time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular, settings.enable_odom_tf

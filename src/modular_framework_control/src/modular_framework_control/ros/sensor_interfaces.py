@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rospy
@@ -12,16 +12,17 @@ from geometry_msgs.msg import Quaternion, Vector3, WrenchStamped
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
 
-from modular_framework_control.controllers.sensor_controllers import (
-    ForceTorqueSensorController,
-    ImuSensorController,
-    SensorController,
-    SpeedScalingStateController,
-)
+from modular_framework_control.controllers.sensor_controllers import SensorController
 from modular_framework_control.hardware_interface.handles import (
     ForceTorqueSensorHandle,
     ImuSensorHandle,
     SpeedScalingHandle,
+)
+from modular_framework_control.hardware_interface.interfaces import (
+    ForceTorqueSensorInterface,
+    HardwareInterface,
+    ImuSensorInterface,
+    SpeedScalingInterface,
 )
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.ros.outbox import Outbox
@@ -39,7 +40,7 @@ class SensorRosInterface:
         self, controller: SensorController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
     ) -> None:
         del name
-        kind, to_msg = next(entry for of, entry in _MESSAGES.items() if isinstance(controller, of))
+        kind, to_msg = _MESSAGES[controller.interface_class]
         self._publishers = {
             sensor: rospy.Publisher(join_names(namespace, sensor), kind, queue_size=4)
             for sensor in controller.sensor_names
@@ -89,8 +90,8 @@ def _stamped(message: Any, time_s: float, frame_id: str) -> Any:
     return message
 
 
-_MESSAGES: dict[type[SensorController], tuple[type[Any], Callable[[float, Any], Any]]] = {
-    ForceTorqueSensorController: (WrenchStamped, wrench_to_msg),
-    ImuSensorController: (Imu, imu_to_msg),
-    SpeedScalingStateController: (Float64, pace_to_msg),
+_MESSAGES: Mapping[type[HardwareInterface[Any]], tuple[type[Any], Callable[[float, Any], Any]]] = {
+    ForceTorqueSensorInterface: (WrenchStamped, wrench_to_msg),
+    ImuSensorInterface: (Imu, imu_to_msg),
+    SpeedScalingInterface: (Float64, pace_to_msg),
 }

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modular_framework_control.hardware_interface.interfaces import SpeedScalingHandle
+from modular_framework_control.hardware_interface.handles import SpeedScalingHandle
 from modular_framework_control.trajectory.joint_trajectory import ACCELERATION, VELOCITY, Array
 
 RISE_PER_S = 2.0

@@ -6,12 +6,8 @@ from __future__ import annotations
 import logging
 import time
 
-from modular_framework_control.hardware_interface.interfaces import (
-    JointHandle,
-    JointStateHandle,
-    JointStateInterface,
-    PositionJointInterface,
-)
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
+from modular_framework_control.hardware_interface.interfaces import JointStateInterface, PositionJointInterface
 from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper

@@ -6,14 +6,16 @@ from __future__ import annotations
 import logging
 import time
 
-from modular_framework_control.hardware_interface.interfaces import (
+from modular_framework_control.hardware_interface.handles import (
     ForceTorqueSensorHandle,
-    ForceTorqueSensorInterface,
     JointHandle,
     JointStateHandle,
+    SpeedScalingHandle,
+)
+from modular_framework_control.hardware_interface.interfaces import (
+    ForceTorqueSensorInterface,
     JointStateInterface,
     PositionJointInterface,
-    SpeedScalingHandle,
     SpeedScalingInterface,
 )
 from modular_framework_control.hardware_interface.robot_hw import RobotHW

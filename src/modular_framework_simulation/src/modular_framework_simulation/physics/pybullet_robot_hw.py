@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
     EffortJointInterface,
-    JointHandle,
-    JointStateHandle,
     JointStateInterface,
     PositionJointInterface,
     VelocityJointInterface,
