@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bodies that touch: what collision checks return, errors carry and messages report."""
+"""Contacts between bodies, as collision checks return them, errors carry them and messages report them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LINK, ATTACHED, WORLD = "robot_link", "robot_attached", "world_object"
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What one collision geometry belongs to."""
+    """The body that a collision geometry belongs to."""
 
     name: str
     kind: str

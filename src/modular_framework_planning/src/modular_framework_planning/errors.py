@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives every failure of the planner one type that carries a result code and a reason a person can act on."""
+"""The errors of the planner; each carries a MoveIt error code and a reason that a person can act on."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class PlanningError(Exception):
     """Base of the package's errors.
 
     Attributes:
-        code: the result code in the answer on the wire.
+        code: the error code in the response on the wire.
         reason: where, what was got, what was allowed and what to do.
         contacts: what touches, where that is the reason.
     """

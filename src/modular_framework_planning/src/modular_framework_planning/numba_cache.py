@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says where compiled loops are kept between runs; to be imported before numba.
+"""Chooses the folder in which numba caches compiled loops; to be imported before numba.
 
 The folder is below the user's cache folder, never in the source tree, and is named after the contents of every module
 with compiled loops: numba does not notice that a function which it inlined from another module has changed.

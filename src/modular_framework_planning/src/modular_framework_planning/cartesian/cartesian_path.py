@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Straight lines from pose to pose as joint positions, as far as they go, and why they go no further.
+"""Cartesian paths: straight lines between poses as joint positions, how far they go, and why they end early.
 
 The joints follow the line by continuation, so they cannot change the arm's posture on the way; between two rows the
 straight motion of the joints keeps the link within a tenth of a millimetre of the line for steps of a centimetre.
@@ -48,14 +48,14 @@ NO_JUMP_TEST = JumpThresholds()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightLine:
-    """What was followed.
+    """The part of the lines that was followed.
 
     Attributes:
         rows: joint values of the group, the start first, shape (n, joints).
         fraction: of the lines, each line counting the same, in [0, 1].
         waypoint_rows: the row of each waypoint that was reached.
-        stop: why the lines were not followed to their end; empty where they were.
-        code: of the cause.
+        stop: why the lines were not followed to their end; empty if they were.
+        code: error code of that cause.
     """
 
     rows: Array
@@ -108,7 +108,7 @@ def straight_line(
         waypoints: poses in the planning frame of what follows the lines.
         max_step_m: longest step [m].
         jumps: what counts as a jump.
-        objection: takes the joint values before and after each step; returns why it is not allowed, or nothing.
+        objection: takes the joint values before and after each step; returns why it is not allowed, or "".
         carried: pose, in the link's frame, of what follows the lines (a held object); None: the link itself does.
 
     Raises:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether states and motions collide: compiled bounds and Coal's exact checks."""
+"""Collision checks of states and motions: compiled bounds first, then Coal's exact checks."""

@@ -2,7 +2,7 @@
 """Makes the bounding geometries that compiled checks work on.
 
 Whatever Coal geometry a body has, it gets a surface of triangles, a solid in closed form, or both. Either
-encloses the body; where it is larger, a hit with it is not final and the exact check is asked.
+encloses the body; where it is larger than the body, a hit is not final and the exact check decides.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _lock = threading.Lock()
 
 @dataclass(frozen=True, eq=False)
 class BoundingGeometry:
-    """What a geometry is checked as, in its own frame.
+    """The bounding geometry of one body, in the frame of the body's geometry.
 
     Attributes:
         corners: gives the corners of the surface's triangles, shape (m, 9) [m]; None for no surface.
@@ -64,7 +64,7 @@ class BoundingGeometry:
 
     @cached_property
     def surface(self) -> Surfaces | None:
-        """Sphere tree over the triangles; built when it is asked for, as most solids are checked in closed form."""
+        """Sphere tree over the triangles; built on first use, because most solids are checked in closed form."""
         return None if self.corners is None else _surface(self.corners())
 
     @property

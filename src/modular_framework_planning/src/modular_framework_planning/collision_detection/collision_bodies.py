@@ -84,11 +84,11 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
     result = []
     for first, one in enumerate(parts):
         if one.body.kind == WORLD:
-            break  # the world comes last and cannot move against itself
+            break  # the world comes last, and its bodies do not move relative to each other
         for second in range(first + 1, len(parts)):
             other = parts[second]
             if one.joint_id == other.joint_id and ATTACHED not in (one.body.kind, other.body.kind):
-                continue  # rigid to each other: touching says nothing about a motion
+                continue  # rigidly connected: no motion changes whether they touch
             key = (one.body.kind, one.body.name, other.body.kind, other.body.name)
             allowed = verdicts.get(key)
             if allowed is None:

@@ -41,7 +41,7 @@ class CompiledWorld:
 
     Attributes:
         arguments: the world as compiled functions take it.
-        members: for every pair of the arrays, the watched pairs (by number) it stands for.
+        members: for every pair of the arrays, the watched pairs (by number) that it represents.
         uncompiled: watched pairs that have no bounding geometry and need the exact check at every state.
     """
 
@@ -139,7 +139,7 @@ def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[
 
 
 def _never_interrupt() -> None:
-    """Lets the work go on however long it takes."""
+    """Never interrupts."""
 
 
 def compile_world(
@@ -148,7 +148,7 @@ def compile_world(
     pairs: Sequence[WatchedPair],
     check_interrupt: Callable[[], None] = _never_interrupt,
 ) -> CompiledWorld:
-    """Builds the arrays. What was built for a shape is kept as long as the shape.
+    """Builds the arrays; what is built for a shape is cached as long as the shape exists.
 
     Args:
         model: the robot.
@@ -238,7 +238,7 @@ def _add_others(
 
 @lru_cache(maxsize=KEPT_SCENES)
 def _scene_surfaces(shapes: tuple[BoundingGeometry, ...]) -> tuple[Surfaces, tuple[int, ...]]:
-    """Surfaces of a scene in one set of arrays; the next plan mostly has the same ones."""
+    """Surfaces of a scene in one set of arrays; cached, because consecutive plans mostly have the same ones."""
     together, roots = stacked([shape.surface for shape in shapes if shape.surface is not None])
     return together, tuple(roots)
 

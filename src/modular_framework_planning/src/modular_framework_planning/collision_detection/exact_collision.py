@@ -20,7 +20,7 @@ MAX_CONTACTS = 20  # of a pair, of which the deepest is reported
 
 
 class ExactCollision:
-    """Coal's results for the watched pairs; not for two threads at a time: it holds the poses of one state."""
+    """Coal's results for the watched pairs; not thread-safe, because it holds the poses of one state."""
 
     def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> None:
         """Stores what to check.

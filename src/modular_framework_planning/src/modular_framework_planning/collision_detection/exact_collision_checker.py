@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks states and motions for collisions: compiled bounds first, Coal's exact check of what they leave open.
+"""Checks states and motions for collisions: compiled bounds first, then Coal's exact check of undecided pairs.
 
-A state is called free only where every pair of bodies was proved apart, or where Coal says so.
+A state counts as free only if the bounds prove every pair of bodies apart, or Coal does.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The kinds of constraints on a state: of a joint, of where a link's point is, of how a link is turned.
+"""Kinematic constraints on a state: joint, position and orientation constraints.
 
 The meaning is that of MoveIt's kinematic constraints: a joint within its tolerances, a point of a link within one of
 several regions, the rotation of a link within a tolerance about each axis.
@@ -21,7 +21,7 @@ SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a re
 INSIDE = 1.0e-5  # [m]; projections aim this far inside a region, not at its border
 INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight motions between two states bulge
 TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
-Row = tuple[Array, float]  # one linearised condition: (joint velocities -> change, change that is wanted)
+Row = tuple[Array, float]  # one linearised condition: (gradient over the joints, desired change)
 
 
 class Parameterization(Enum):
@@ -33,13 +33,13 @@ class Parameterization(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ConstraintResult:
-    """What one constraint says of a state.
+    """The result of one constraint for a state.
 
     Attributes:
         kind: "joint", "position" or "orientation".
         name: the joint or the link.
         distance: weighted deviation from the middle of what is allowed, as MoveIt reports it.
-        text: by how much what is off, for people.
+        text: what deviates by how much, for people.
     """
 
     kind: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says whether a state keeps a set of constraints, and moves or draws states so that they do."""
+"""Checks states against a set of constraints, projects states onto it, and samples states from it."""
 
 from __future__ import annotations
 

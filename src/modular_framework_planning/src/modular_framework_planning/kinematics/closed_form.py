@@ -13,7 +13,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-PROBE = 0.37  # [rad]; a value at which no pair of axes is in line by chance
+PROBE = 0.37  # [rad]; a generic value, at which no two axes line up by chance
 MAX_KEPT = 4096  # solvers kept, one for each value of the held joint
 
 
@@ -47,7 +47,7 @@ class ClosedForm:
         raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"group '{name}': no closed-form solution is known")
 
     def solve(self, last_in_base: Transform, held: float = 0.0) -> Array:
-        """Returns candidate joint vectors, shape (k, joints); some may only come near: the caller polishes and checks.
+        """Returns candidate joint vectors, shape (k, joints); some are approximate: the caller refines and checks them.
 
         Args:
             last_in_base: pose of the chain's last link in the frame of its base link.

@@ -332,16 +332,16 @@ def approach_seed(
     back, solved, free = np.empty(width), np.empty(POSE_SIZE), np.ones(width, dtype=np.bool_)
     for _ in range(steps):
         pose_error(chain, values, target, jacobian, error, positions, poses)
-        wish = seed - values
+        towards_seed = seed - values
         for row in range(POSE_SIZE):
             error[row] = 0.0
             for joint in range(width):
-                error[row] += jacobian[row, joint] * wish[joint]
+                error[row] += jacobian[row, joint] * towards_seed[joint]
         _damped_step(jacobian, error, 1.0e-9, free, back, square, solved)
         trial = values.copy()
         widest = 0.0
         for joint in range(width):
-            move = wish[joint] - back[joint]
+            move = towards_seed[joint] - back[joint]
             widest = max(widest, abs(move))
             trial[joint] = min(
                 max(values[joint] + move * min(1.0, 0.3 / max(abs(move), 1e-12)), lower[joint]), upper[joint]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds joint positions that bring a link to a pose: every closed-form solution where there are some, else numeric."""
+"""Inverse kinematics of a link: all closed-form solutions where there is a closed form, else a numeric search."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it
 MAX_TURNS = 4096
 POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 25, 20
 STARTS_A_BATCH = 4
-MIN_BATCHES = 8  # tried even where the time is over, so that a busy machine does not turn poses unreachable
+MIN_BATCHES = 8  # tried even after the timeout, so that a busy machine does not report reachable poses as unreachable
 FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
 ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
 APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
@@ -197,7 +197,7 @@ class InverseKinematics:
         in_base = base.actInv(problem.target)
         if self._closed.locked is None:
             return self._polished(problem, self._closed.solve(in_base))
-        half = 0.5 * (time.monotonic() + problem.deadline)  # the other half of the time is the search's
+        half = 0.5 * (time.monotonic() + problem.deadline)  # the other half of the time is for the numeric search
         step, found = COARSEST_SWEEP, np.empty((0, len(self.group.joints)))
         tried: Array = np.empty(0)
         while not len(found) and step >= self.settings.search_resolution and time.monotonic() < half:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps a link on a path by joint positions that change without jumps: inverse kinematics by continuation.
+"""Follows a path of link poses with joint positions that do not jump: inverse kinematics by continuation.
 
 Each step starts from the joint positions before it and solves for the nearest solution by Newton's method, so the arm
 never changes its posture on the way. Where it cannot go on, the error says which joint would have to jump or leave its
@@ -41,7 +41,7 @@ class LinkMotion:
 
 
 class PoseFollower:
-    """Follows poses of one link with the joints of one group; not for two threads at a time."""
+    """Follows poses of one link with the joints of one group; not thread-safe."""
 
     def __init__(self, solver: InverseKinematics, link: str, rest: Array) -> None:
         """Prepares the working memory.
@@ -92,7 +92,7 @@ class PoseFollower:
 
     @property
     def is_redundant(self) -> bool:
-        """Whether a pose leaves the joints some freedom."""
+        """Whether the group has more joints than a pose determines."""
         return len(self.group.joints) > 6
 
     def step(self, guess: Array, target: Transform, wanted: Array | None = None) -> Array:

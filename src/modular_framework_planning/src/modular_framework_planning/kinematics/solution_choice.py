@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Chooses among solutions of inverse kinematics: the nearest that is free, and of equally near ones the clearest."""
+"""Chooses an inverse kinematics solution: the nearest free one; of equally near ones that with the most clearance."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads moveit_msgs/Constraints, and refuses what has no meaning instead of guessing one."""
+"""Reads moveit_msgs/Constraints; invalid ones are errors, never replaced by guesses."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ class _Reader:
         number = model.index[message.joint_name]
         target = min(max(message.position, model.lower[number]), model.upper[number])
         if abs(target - message.position) > BEYOND_BOUND:
-            target = message.position  # whoever uses the constraint says that it cannot be met
+            target = message.position  # the user of the constraint reports that it cannot be satisfied
         return JointConstraint(
             message.joint_name,
             number,
@@ -218,7 +218,7 @@ class _Reader:
         return tuple(regions)
 
     def _region_pose(self, shape: Any, pose: Any, where: str) -> Transform:
-        """Reads where a region is; a rotation left out is none, as in MoveIt, and for a ball nothing to warn of."""
+        """Reads a region's pose; an unset rotation is the identity, as in MoveIt, without a warning for a sphere."""
         p, q = pose.position, pose.orientation
         rotation = (q.x, q.y, q.z, q.w)
         is_ball = getattr(shape, "type", 0) == SolidPrimitive.SPHERE

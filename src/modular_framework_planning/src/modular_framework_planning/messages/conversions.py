@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where messages meet the planner's own types: states, goals and trajectories."""
+"""Conversions between messages and the planner's own types: states, goals and trajectories."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
 
 
 def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
-    """Raises PlanningError unless the constraints are empty: an answer that left them out would claim too much."""
+    """Raises PlanningError unless the constraints are empty: a response that ignored them would be wrong."""
     if any(
         (
             constraints.joint_constraints,

@@ -18,7 +18,7 @@ from modular_framework_planning.trajectory_execution.controllers import Controll
 
 @dataclass(frozen=True, slots=True)
 class MotionPart:
-    """The share of one controller in a motion."""
+    """The part of a motion that one controller executes."""
 
     controller: ControllerSpec
     trajectory: JointTrajectory
@@ -115,7 +115,7 @@ def trajectory_goal(part: MotionPart) -> FollowJointTrajectoryGoal:
 
 
 def gripper_goal(part: MotionPart) -> GripperCommandGoal:
-    """Returns the goal of a gripper: where the last point is, and the effort it asks for or else the configured one."""
+    """Returns the goal of a gripper: the last point's position, and its effort or else the configured one."""
     names, last = part.trajectory.joint_names, part.trajectory.points[-1]
     columns = [i for i, name in enumerate(names) if name in part.controller.command_joints] or [0]
     goal: Any = GripperCommandGoal()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the messages of pickup and place into manoeuvres; every fault of a message is an error that names the field."""
+"""Reads the goals of pickup and place into manoeuvres; a fault in a message is an error that names the field."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
 
 
 def _allowance(hand: Hand, target: str, surface: str, hand_on_surface: bool, touched: Sequence[str]) -> SceneChange:
-    """What may touch: the hand the object and the named ones, the object its surface, and the hand that, if wanted."""
+    """Allowed collisions: hand and object, hand and named links, object and support; on request hand and support."""
     others = [target, *touched, *([surface] if surface and hand_on_surface else [])]
 
     def allow(scene: PlanningScene) -> PlanningScene:

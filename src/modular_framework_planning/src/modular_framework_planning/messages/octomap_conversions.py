@@ -14,7 +14,7 @@ from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-CLEARED = "cleared"  # type of a map without data: what the scene had is gone
+CLEARED = "cleared"  # type of a map without data: the scene's octomap was cleared
 
 
 def with_octomap_of(scene: PlanningScene, message: OctomapWithPose) -> PlanningScene:

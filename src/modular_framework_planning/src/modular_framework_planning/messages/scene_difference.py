@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes what changed between two snapshots of the scene, so that whoever applies it has the second one."""
+"""Writes the difference of two scene snapshots; applied to the first one it gives the second."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _attached_changes(before: PlanningScene, after: PlanningScene) -> list[Attac
 
 
 def _world_changes(before: PlanningScene, after: PlanningScene) -> list[CollisionObject]:
-    """Changes after those of attached objects: a released one lies in the world then, an attached one does not."""
+    """Changes of world objects, applied after those of attached objects, which add and remove world objects too."""
     frame = after.model.planning_frame
     released = before.attached.keys() - after.attached.keys()
     gone = (before.objects.keys() - after.attached.keys() | released) - after.objects.keys()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Applies a whole PlanningScene message to a snapshot, all of it or nothing, and writes one with the asked parts."""
+"""Applies a PlanningScene message to a snapshot atomically, and writes a message with the requested parts."""
 
 from __future__ import annotations
 

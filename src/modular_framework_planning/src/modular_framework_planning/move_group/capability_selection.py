@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which endpoints the node offers: MoveIt's default set, with those that parameters add and without those they drop."""
+"""Selects the endpoints the node offers: MoveIt's default set, plus and minus those that parameters name."""
 
 from __future__ import annotations
 

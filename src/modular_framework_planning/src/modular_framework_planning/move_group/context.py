@@ -46,5 +46,5 @@ class MoveGroupContext:
         return self.pipelines.default
 
     def pipeline(self, name: str) -> PlanningPipeline:
-        """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
+        """Returns a pipeline, the default one for an empty name; raises PlanningError, which lists the known ones."""
         return self.pipelines.choose(name)

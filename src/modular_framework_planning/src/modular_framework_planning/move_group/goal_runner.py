@@ -77,7 +77,7 @@ class GoalRunner:
             self._forget(handle)
 
     def _on_fault(self, handle: Any, error: Exception) -> None:
-        """Answers a goal that ended by an exception; when the node goes down its topics are closed, and that is all."""
+        """Answers a goal that ended with an exception; at shutdown the topics are closed, and nothing is published."""
         if going_down():
             rospy.logdebug("action goal ended while the node went down: %s", error)
             return

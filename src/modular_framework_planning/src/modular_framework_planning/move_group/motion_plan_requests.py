@@ -78,7 +78,7 @@ def read_request(
 def _path_constraints(
     pipeline: PlanningPipeline, scene: PlanningScene, message: Any, tip: str
 ) -> tuple[KinematicConstraints | None, AuxiliaryPoint | None]:
-    """Returns what the motion must keep, or what the planner takes from the same field instead."""
+    """Returns the path constraints, or the auxiliary point that a planner takes from the same field."""
     given = message.path_constraints
     if given.name and given.name in pipeline.auxiliary_constraints:
         return None, auxiliary_point(scene, given)

@@ -29,7 +29,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolvedSequence:
-    """The answer and the parts it was made of; no part where planning failed."""
+    """The response and the parts it was made of; no part if planning failed."""
 
     response: MotionSequenceResponse
     parts: tuple[SequencePart, ...]

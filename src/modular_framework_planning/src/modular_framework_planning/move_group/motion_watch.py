@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Executes a planned motion, stops it when a change of the scene gets in its way, and records where the robot went."""
+"""Executes a planned motion, stops it when a change of the scene blocks it, and records the measured trajectory."""
 
 from __future__ import annotations
 

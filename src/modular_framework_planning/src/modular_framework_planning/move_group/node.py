@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The move_group node: reads the robot, then offers every endpoint; nothing is advertised before it can answer."""
+"""The move_group node: loads the robot, then offers every endpoint; each is advertised only once it can answer."""
 
 from __future__ import annotations
 

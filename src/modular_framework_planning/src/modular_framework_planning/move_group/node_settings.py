@@ -48,7 +48,7 @@ class PlanExecutionSettings:
 
 @dataclass(slots=True)
 class MotionSettings:
-    """Holds the settings of motions; whoever starts a motion takes them as they are then."""
+    """Holds the settings of motions; each motion uses those in force when it starts."""
 
     plan_execution: PlanExecutionSettings = field(default_factory=PlanExecutionSettings)
     pick_place: PickPlaceSettings = field(default_factory=PickPlaceSettings)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the distances the robot keeps from the world out of robot_description_planning."""
+"""Reads padding and scale of the robot from robot_description_planning."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
 
     @property
     def sampling_settings(self) -> SamplingSettings:
-        """Settings of paths that are searched, of all pipelines; plans that begin later go by them."""
+        """Sampling settings of all pipelines; in force for plans that begin later."""
         return self._sampling
 
     @sampling_settings.setter
@@ -72,7 +72,7 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         return pipeline.plan(request) if seed is None else self._seeded.plan(pipeline, request, seed)
 
     def close(self) -> None:
-        """Ends what runs in other processes."""
+        """Ends the worker processes."""
         self._seeded.close()
 
     def choose(self, name: str) -> PlanningPipeline:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled loops over voxels: which ones rays go through, and which leaves an octree's byte stream holds."""
+"""Compiled loops over voxels: the voxels along rays, and the leaves in an octree's byte stream."""
 
 from __future__ import annotations  # noqa: I001 - numba_cache has to come before numba
 
@@ -227,11 +227,11 @@ def within_regions(
     planes: NDArray[np.float64],
     starts: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Says which points lie within convex regions, or less than a shadow's length behind one as seen from a place.
+    """Returns which points lie in a convex region, or less than a shadow's length behind one as seen from the origin.
 
     Args:
         points: (n, 3) [m].
-        origin: the place they are seen from (3,) [m].
+        origin: where the sensor is (3,) [m].
         shadow: length of the shadow [m]; 0 for none.
         balls: centre and radius of a ball around each region (k, 4) [m].
         planes: half-spaces a*x + b*y + c*z + d <= 0 of all regions (m, 4), unit normals.

@@ -164,7 +164,7 @@ def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values
 
 
 def write_file(path: Path, voxels: VoxelMap) -> None:
-    """Writes a .bt file; an existing file is replaced as a whole or not at all. Raises OSError."""
+    """Writes a .bt file atomically: an existing file stays as it was if that fails. Raises OSError."""
     data, nodes = _binary_nodes(voxels)
     header = BINARY_HEADER + f"\nid {TREE_TYPE}\nsize {nodes}\nres {voxels.resolution!r}\ndata\n".encode()
     handle, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)

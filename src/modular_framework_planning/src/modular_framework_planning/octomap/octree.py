@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shape of an octomap: what a scene holds and collision checks see of a map of voxels."""
+"""The shape of an octomap: the geometry of a voxel map in a scene and in collision checks."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Remembers which cubes of space are occupied and which are free, from what depth sensors saw.
+"""An occupancy map of voxels, updated from depth sensors.
 
 Occupancy is a log-odds value per voxel, updated and clamped as in Hornung et al., "OctoMap: an efficient probabilistic
 3D mapping framework based on octrees", Autonomous Robots 34 (2013), with the constants of their library, so that maps
@@ -45,7 +45,7 @@ def cells_of_keys(keys: Keys) -> Keys:
 
 @dataclass(frozen=True, eq=False)
 class VoxelMap:
-    """What is known of space; a map never changes, updates return another one.
+    """An immutable occupancy map; updates return a new one.
 
     Attributes:
         resolution: edge length of a voxel [m].

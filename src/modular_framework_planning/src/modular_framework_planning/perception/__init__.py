@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What depth sensors see, without the robot and the objects that are known."""
+"""Points of depth sensors, without the robot and the known objects."""

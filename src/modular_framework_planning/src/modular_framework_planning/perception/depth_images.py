@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns depth images and point clouds into points, those whose ray ended within range apart from those beyond it."""
+"""Converts depth images and point clouds to points, and separates those within range from those beyond it."""
 
 from __future__ import annotations
 

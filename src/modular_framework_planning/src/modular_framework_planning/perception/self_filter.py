@@ -148,7 +148,7 @@ def _hull_region(vertices: Array) -> Region:
 
 
 def bodies_in_scene(scene: PlanningScene, positions: Array) -> list[tuple[Any, Transform]]:
-    """Returns the Coal geometry and the pose in the planning frame of all that a sensor sees and the scene knows.
+    """Returns the Coal geometry and the pose in the planning frame of every body of the scene that a sensor can see.
 
     These are links at the given joint positions [rad or m], held objects and world objects; planes, which have no
     inside, and the octomap itself are left out.

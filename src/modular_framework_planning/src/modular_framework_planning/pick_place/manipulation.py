@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans a grasp or a release: to the approach, along it in a straight line, fingers, retreat in a straight line.
+"""Plans a grasp or a release: motion to the approach, straight approach, fingers, straight retreat.
 
-Picking and placing differ in what the fingers and the scene do in the middle, and in what may touch on the two lines.
+Picking and placing differ in the motion of the fingers, the effect on the scene, and the allowed collisions.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Manoeuvre:
         allow: what may touch on the two lines and while the fingers move.
         effect: what becomes of the object when the fingers have moved: attached, or put into the world.
         fingers_before, fingers_after: positions of the gripper's joints; none: they stay.
-        closing_in: go on along the approach until just before something is touched.
+        closing_in: continue along the approach until just before a contact.
         middle: name of the stage in which the fingers move.
     """
 
@@ -117,7 +117,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """What moves, and by whose limits [rad/s, rad/s^2]."""
+    """The group that moves, and its limits [rad/s, rad/s^2]."""
 
     group: JointGroup
     link: str
@@ -127,7 +127,7 @@ class Arm:
 
 
 class ManoeuvrePlanner:
-    """Plans manoeuvres one after the other within one deadline. Not for use from two threads at a time."""
+    """Plans manoeuvres one after the other within one deadline. Not thread-safe."""
 
     def __init__(
         self,
@@ -138,10 +138,10 @@ class ManoeuvrePlanner:
         settings: PickPlaceSettings | None = None,
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
     ) -> None:
-        """Takes what all manoeuvres share.
+        """Stores what all manoeuvres share.
 
         Args:
-            arm: what moves.
+            arm: the group that moves.
             plan: plans the way to the approach.
             request: a template of that plan: scene, planner, time allowed, path constraints.
             contact_tolerance_m: depth at which a held object may already touch something.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a planner is asked, what it may use and what it answers."""
+"""The interface of planners: requests, collision checkers, problems and responses."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What planners, adapters and services ask a collision checker: the one interface of every checker."""
+"""The interface of every collision checker, used by planners, adapters and services."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CollisionChecker(Protocol):
         ...
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
-        """Does now what the first question would have to do first, where that takes long.
+        """Builds now what the first check would have to build, which may take long.
 
         Args:
             check_interrupt: called now and then; raises an exception to stop.
@@ -107,10 +107,10 @@ class CollisionCheckerFactory(Protocol):
 
 @runtime_checkable
 class CollisionCostEstimator(Protocol):
-    """What a checker may offer to optimisers (STOMP), which otherwise take the slower `contacts`."""
+    """An optional method of checkers for optimisers (STOMP), which otherwise use the slower `contacts`."""
 
     def collision_costs(self, states: Array) -> Array:
-        """Returns how bad states are, a smooth guide and not a verdict; costs have shape (n,).
+        """Returns smooth collision costs of states, shape (n,), as a guide for an optimiser; not a collision check.
 
         The cost is the sum of depth and TOUCH_COST_M over the pairs that touch [m], and 0 where none does.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds collision checkers by what the parameter `collision_detector` calls them: MoveIt's names, or `module/Class`.
 
-Nothing else of the package chooses a checker: who needs one is given its factory.
+Nothing else in the package chooses a checker: classes that need one receive a factory.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the goals of a request into free joint vectors, or says why there is none.
+"""Resolves the goals of a request to free joint vectors, or reports why there is none.
 
 The search is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
 """

@@ -11,10 +11,10 @@ from modular_framework_planning.planning_interface.collision_checker import Coll
 
 
 class MotionChecker:
-    """Answers for joint vectors of one group while the rest of the robot stays at given positions."""
+    """Checks joint vectors of one group; all other joints stay at given positions."""
 
     def __init__(self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array) -> None:
-        """Stores what to check.
+        """Stores the checker and the group.
 
         Args:
             checker: of the scene.

@@ -23,7 +23,7 @@ SHAPES: dict[str, type[Any]] = {"box": Box, "cylinder": Cylinder, "sphere": Sphe
 
 @dataclass(frozen=True, slots=True)
 class MotionProblem:
-    """One problem: where it comes from and what is asked."""
+    """One problem: its name, scene and request."""
 
     name: str
     request: PlanningRequest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Problem, path and protocols: the one interface between the pipelines and every planner."""
+"""Problem, path and protocols: the interface between pipelines and planners."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SolutionValidator(Protocol):
         """Returns what is wrong with the timed motion of a path; empty where nothing is.
 
         Args:
-            problem: what was planned; its checker and constraints are asked.
+            problem: the problem that was planned; its checker and constraints are used.
             path: with a trajectory.
 
         Raises:
@@ -151,7 +151,7 @@ class PlanningProblem:
         )
 
     def cancelled(self) -> bool:
-        """Whether somebody asked to stop."""
+        """Whether a stop was requested."""
         return self.request.cancelled()
 
     def interrupted(self) -> bool:
@@ -175,9 +175,9 @@ class PlannedPath:
         trajectory: the timed motion, once there is one.
         path_prefix: number of vertices before the first that has to be free: those that lead out of a colliding start.
         unconstrained: number of vertices before the first that has to satisfy the path constraints.
-        planner_id: what the answer calls the planner; empty for the problem's own planner_id.
+        planner_id: the planner's name in the response; empty for the problem's own planner_id.
         found_s: time.monotonic() when the planner was done.
-        is_short: no shortening is wanted (a planner that follows a given line).
+        is_short: the path must not be shortened (the planner follows a given line).
     """
 
     vertices: Array

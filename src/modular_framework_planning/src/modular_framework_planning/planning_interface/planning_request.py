@@ -65,7 +65,7 @@ class JointGoal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """A link's target pose in the planning frame; `allowed` says which other poses would do as well."""
+    """A link's target pose in the planning frame; `allowed` constrains the other poses that reach the goal."""
 
     link: str
     target: Transform
@@ -88,7 +88,7 @@ class SamplingSettings:
 
 @dataclass(frozen=True, slots=True)
 class PipelineSettings:
-    """How the planner works where a request leaves it open; names as in the config package.
+    """Settings of a pipeline, for what a request leaves open; names as in the config package.
 
     Attributes:
         start_state_max_bounds_error: how far out of bounds a start is pulled back [rad or m].

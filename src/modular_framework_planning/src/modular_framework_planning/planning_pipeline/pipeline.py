@@ -37,7 +37,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
 RESERVED_S, RESERVED_SHARE = 0.25, 0.2  # of the allowed time, for what follows the search
-RESERVED_AFTER_IMPROVING_S = 1.0  # where the planner always uses all of its time, so that the rest is all there is
+RESERVED_AFTER_IMPROVING_S = 1.0  # where the planner always uses all of its time, so that nothing else is left
 COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 LOGGER = logging.getLogger("rosout.planning_pipeline")
 
@@ -82,7 +82,7 @@ class PlanningPipeline:
 
     @property
     def description(self) -> str:
-        """What the planner calls itself."""
+        """The planner's own description."""
         return str(getattr(self._planner, "description", type(self._planner).__name__))
 
     @property
@@ -115,7 +115,7 @@ class PlanningPipeline:
             repeatable: bound searches by iterations; the clock only ends them with a failure.
 
         Raises:
-            PlanningError: with the code and the reason; nothing is returned by halves.
+            PlanningError: with the code and the reason; a partial result is never returned.
         """
         try:
             return self._plan(request, repeatable)
@@ -290,7 +290,7 @@ class PlanningPipeline:
         return kind, parameters
 
     def _kind(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
-        """Returns the planner that a name stands for, and its settings with those of the group."""
+        """Returns the planner of a configuration's name, and its settings with those of the group."""
         own = self.configurations.get(name, group)
         kind = str(own.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
         return kind, {
@@ -346,14 +346,14 @@ def _require_time(request: PlanningRequest, begun_s: float) -> None:
 
 
 def _with_fault(error: PlanningError, fault: str) -> PlanningError:
-    """Adds what an earlier path of the same request failed by."""
+    """Adds the fault of an earlier path of the same request."""
     if not fault:
         return error
     return PlanningError(error.code, f"{error.reason}; a path was found before, but {fault}", error.contacts)
 
 
 def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
-    """Says why paths were found and no motion is returned."""
+    """Describes why no motion is returned although paths were found."""
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled; a path was found, but {fault}")
     spent = time.monotonic() - problem.begun_s

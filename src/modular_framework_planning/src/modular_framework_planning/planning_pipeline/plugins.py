@@ -30,7 +30,7 @@ ADAPTERS = (
     "FixWorkspaceBounds",
     "LimitMaxCartesianLinkSpeed",
 )
-# Names of MoveIt's adapters that have nothing left to do here, and why.
+# Names of MoveIt's adapters that have no effect here, and why.
 NOT_NEEDED = {"Empty": "does nothing", "ResolveConstraintFrames": "frames are resolved when a request is read"}
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 MOVEIT_ADAPTERS = "default_planner_request_adapters"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says which pairs of bodies may touch: explicit entries first, then defaults of a body."""
+"""The allowed collision matrix: explicit entries for pairs of bodies first, then defaults of single bodies."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says how much distance the robot keeps from the world beyond touching: MoveIt's link padding and link scale.
+"""The distance that the robot keeps from the world: MoveIt's link padding and link scale.
 
 Padding is a margin of a pair of bodies, not a changed shape: a pair of a link and a world object counts as touching
 when it comes closer than the margin. That is the shape swept by a ball of the margin's radius, exactly, meshes too.

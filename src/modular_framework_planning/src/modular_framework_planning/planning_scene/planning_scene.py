@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planning scene as immutable snapshots, so that plans under way never see a half-made change."""
+"""The planning scene as immutable snapshots, so that a plan in progress never sees a partial change."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class PlanningScene:
         return self._changed(octomap=body)
 
     def obstacles(self) -> tuple[CollisionObject, ...]:
-        """Returns what stands in the world: every object, and the octomap where it has an occupied voxel."""
+        """Returns the obstacles of the world: every object, and the octomap if it has an occupied voxel."""
         if self.octomap is None or not len(self.octomap.shapes[0][0].centers):  # type: ignore[attr-defined]
             return tuple(self.objects.values())
         return (*self.objects.values(), self.octomap)
@@ -223,7 +223,7 @@ class PlanningScene:
         )
 
     def with_detached(self, name: str) -> PlanningScene:
-        """Puts an attached body back into the world at the place where it is now; raises UnknownNameError."""
+        """Puts an attached body back into the world at its present pose; raises UnknownNameError."""
         if name not in self.attached:
             raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, "attached object", name, self.attached)
         body = replace(self.attached[name].body, pose=self.attached_pose(name))

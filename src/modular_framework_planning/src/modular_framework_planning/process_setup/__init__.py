@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a process does before it plans: compiled loops and settings of its threads."""
+"""Set-up of a process before it plans: compiled loops and settings of its threads."""

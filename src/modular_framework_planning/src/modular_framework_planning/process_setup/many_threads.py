@@ -12,7 +12,7 @@ ARENAS = 2
 
 
 def prepare() -> None:
-    """To be called before the process starts threads.
+    """Reduces waits between threads; to be called before the process starts threads.
 
     A thread that wakes up for a message waits for the interpreter behind every plan in turn, at Python's default up to
     5 ms each and several times a message: a change of the scene beside eight plans would take a third of a second.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sends requests to another process that has the same robot: bytes without the robot and without built geometry."""
+"""Serialises requests for a process with the same robot: without the robot model and without built geometry."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _shape(kind: type[Shape], values: dict[str, Any]) -> Shape:
 
 
 class _Pickler(pickle.Pickler):
-    """Leaves out what the other process has or builds itself."""
+    """Leaves out what the other process already has or builds itself."""
 
     def persistent_id(self, item: Any) -> str | None:
         """Names the robot model instead of writing it."""

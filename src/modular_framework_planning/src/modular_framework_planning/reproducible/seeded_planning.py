@@ -36,7 +36,7 @@ def _never() -> bool:
 
 
 class SeededPlanning:
-    """Hands requests to the worker process, which starts with the first of them; threads may share it."""
+    """Sends requests to the worker process, which is started for the first one; threads may share it."""
 
     def __init__(self, model: RobotModel, specs: Sequence[PipelineSpec]) -> None:
         """Stores what the worker will build.

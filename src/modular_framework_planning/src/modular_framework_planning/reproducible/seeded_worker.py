@@ -110,7 +110,7 @@ def _child(connection: socket.socket, model: RobotModel, pipelines: dict[str, Pl
         name, settings, configurations, seed, request = from_bytes(receive(connection), model)
 
         def cancelled() -> bool:
-            return bool(select.select([connection], [], [], 0.0)[0])  # the parent says nothing more: this is its end
+            return bool(select.select([connection], [], [], 0.0)[0])  # readable means closed: the parent sends no more
 
         pipeline = pipelines[name]
         pipeline.settings = settings

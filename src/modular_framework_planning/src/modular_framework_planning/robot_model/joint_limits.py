@@ -12,7 +12,7 @@ from modular_framework_planning.errors import ModelError
 
 DEFAULT_VELOCITY = 1.0  # [rad/s] or [m/s] where no source names one
 DEFAULT_ACCELERATION = 1.0  # [rad/s^2] or [m/s^2] where no source names one
-BEYOND_BOUND = 1.0e-4  # [rad or m]; a goal no further beyond a joint's bound means the bound: 3.1416 is half a turn
+BEYOND_BOUND = 1.0e-4  # [rad or m]; a goal this little beyond a joint's bound means the bound (3.1416 for pi)
 DEFAULT_JERK = 1000.0  # [rad/s^3] or [m/s^3] where no source names one
 
 
@@ -21,7 +21,7 @@ class JointLimits:
     """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2], jerk [1/s^3].
 
     Attributes:
-        deceleration: most braking, above 0; None where it is that of speeding up.
+        deceleration: largest deceleration, above 0; None if it equals the acceleration.
     """
 
     lower: float
@@ -33,7 +33,7 @@ class JointLimits:
 
     @property
     def braking(self) -> float:
-        """Most braking [1/s^2], above 0."""
+        """Largest deceleration [1/s^2], above 0."""
         return self.acceleration if self.deceleration is None else self.deceleration
 
 

@@ -115,7 +115,7 @@ class RobotModel:
         self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
 
     def _planning_frame(self) -> str:
-        """The root link, as in MoveIt: where a fixed virtual joint's parent frame is, tf says, as of every frame."""
+        """The root link, as in MoveIt; the parent frame of a fixed virtual joint comes from tf, as other frames do."""
         for joint in self.semantics.virtual_joints:
             if joint.child_link == self.document.root_link and joint.kind != "fixed":
                 raise ModelError(

@@ -28,7 +28,7 @@ CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
 
 @dataclass(frozen=True, slots=True)
 class UrdfDocument:
-    """A URDF ready for Pinocchio and what Pinocchio does not keep; the links' geometry is not in `xml`."""
+    """A URDF prepared for Pinocchio, and what Pinocchio does not keep; the links' geometry is not in `xml`."""
 
     xml: str
     robot_name: str
@@ -64,7 +64,7 @@ def package_resolver(uri: str) -> str:
 
         package, _, inner = uri[len("package://") :].partition("/")
         try:
-            path = Path(rospkg.RosPack.get_instance().get_path(package)) / inner  # which has searched once
+            path = Path(rospkg.RosPack.get_instance().get_path(package)) / inner  # get_instance caches its search
         except rospkg.ResourceNotFound as error:
             raise ModelError(
                 f"mesh '{uri}': ROS package '{package}' is not on ROS_PACKAGE_PATH; install it or source the workspace"

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which controllers execute a motion, and whether what is left of it is still free."""
+"""Choice of the controllers that execute a motion, and the check of its remaining path."""

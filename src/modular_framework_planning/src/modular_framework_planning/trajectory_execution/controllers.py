@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which controllers execute a motion: reads controller_list and chooses controllers that cover the motion's joints."""
+"""Reads controller_list, and chooses controllers that cover the joints of a motion."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class JointTolerance:
 
 @dataclass(frozen=True, slots=True)
 class ControllerSpec:
-    """One controller and what the configuration says of it.
+    """One controller with its configuration.
 
     Attributes:
         kind: one of ACTION_KINDS or FAKE_KINDS.
         is_default: preferred where several controllers move the same joints.
-        is_active: whether it would take a goal now.
+        is_active: whether it would accept a goal now.
         command_joints: joints whose positions, added up, are the goal of a gripper.
         allow_failure: a gripper that gives up counts as done (it holds something).
         duration_scaling, duration_margin: of the time the controller may take [-, s]; None: those of all controllers.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says whether what is left of a motion is still free when the scene changes while the robot moves along it."""
+"""Checks the remaining path of a motion in progress when the scene changes."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class PathWatch:
         self._reached = 0
 
     def advance(self, positions: Array) -> None:
-        """Notes where the robot is (positions of the whole robot); the progress along the path never goes back."""
+        """Updates the progress along the path from positions of the whole robot; the progress never decreases."""
         gaps = np.linalg.norm(self._rows - positions[self._indices], axis=1)
         while self._reached + 1 < len(gaps) and gaps[self._reached + 1] <= gaps[self._reached]:
             self._reached += 1
 
     def blocked_by(self, scene: PlanningScene) -> str:
-        """Says what the rest of the motion runs into in this scene; empty where it is free.
+        """Describes what the rest of the motion collides with in this scene; "" if it is free.
 
         States that collided already in the scene the motion was planned in do not count: the planner accepted them
         (a start in contact, a held object on its table).

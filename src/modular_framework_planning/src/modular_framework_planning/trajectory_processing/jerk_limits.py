@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Timings that also keep limits of jerk: Ruckig's along straight lines, averages or slower runs of curved motions."""
+"""Timings within jerk limits: Ruckig's along straight lines; averaged or slowed motions along curves."""
 
 from __future__ import annotations
 

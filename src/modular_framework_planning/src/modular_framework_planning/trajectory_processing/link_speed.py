@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Slows a timed motion down where a link would move faster in space than allowed; elsewhere it keeps its pace."""
+"""Slows a timed motion down where a link's Cartesian speed exceeds a limit; elsewhere the speed stays."""
 
 from __future__ import annotations
 

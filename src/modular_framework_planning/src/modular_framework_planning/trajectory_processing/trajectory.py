@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The timed motion of a group: what every planner returns and the wire carries, and the curve a controller makes of it.
+"""The timed motion of a group, as planners return it, and the curve that a controller interpolates between its points.
 
 A JointTrajectoryController joins points that give positions, velocities and accelerations by quintic polynomials:
 limits hold for the robot only if they hold along that curve, not just at the points.
@@ -101,7 +101,7 @@ class Trajectory:
     def chords(self, first: int = 0) -> list[Array]:
         """Returns polylines of points, from number `first` on, between which the curve leaves the straight line.
 
-        A controller that does without velocities goes straight from point to point.
+        A controller that ignores velocities moves straight from point to point.
         """
         if len(self.times) < 2:
             return []

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drag a goal in RViz, plan and execute."""
+"""Interactive goals in RViz."""

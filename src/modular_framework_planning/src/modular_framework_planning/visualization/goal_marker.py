@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The marker in RViz by which a user drags the goal of the tip, and the menu on it."""
+"""The interactive marker that sets the goal pose of the tip in RViz, and its menu."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drag a goal in RViz, see whether the robot can be there, plan and execute: MoveIt's panel by stock displays."""
+"""An interactive goal in RViz: drag it, see whether it is reachable, plan and execute; needs stock displays only."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class InteractiveGoal:
             rospy.Subscriber(f"/rviz/moveit/{topic}", RobotState, self._on_state, callback_args=take, queue_size=5)
         threading.Thread(target=self._follow_drags, daemon=True).start()
 
-    # ---------------------------------------------------------------- what the menu does
+    # ---------------------------------------------------------------- commands of the menu
     def _fill_menu(self) -> None:
         """Offers commands, the planners of the group and the groups."""
         planners = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a user interface asks of a move_group node, over the wire only, so that any move_group will do."""
+"""Client of a move_group node for user interfaces; uses its public endpoints only, so that any move_group works."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def planners_of_group(planner_ids: Sequence[str], group: str) -> list[str]:
 
 
 class MoveGroupClient:
-    """What the marker asks of move_group.
+    """The requests of the interactive goal to move_group.
 
     Services: get_planning_scene, compute_ik, check_state_validity, query_planner_interface.
     Actions: move_group, execute_trajectory.

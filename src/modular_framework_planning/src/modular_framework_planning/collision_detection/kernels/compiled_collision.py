@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The bodies of a robot and around it as compiled loops see them: where they are and how far apart."""
+"""The bodies of a robot and its environment in arrays for compiled loops: their poses and distances."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ UNKNOWN, APART, NEAR = range(3)
 
 
 class Surfaces(NamedTuple):
-    """Trees over triangles, see build_sphere_tree; roots are told by the bodies."""
+    """Trees over triangles, see build_sphere_tree; the bodies hold the roots."""
 
     spheres: Array
     boxes: Array
@@ -41,7 +41,7 @@ class World(NamedTuple):
 
     Attributes:
         tree: joints of the robot.
-        joints: joint each body hangs on, -1 for the world; shape (b,).
+        joints: joint that moves each body, -1 for the world; shape (b,).
         poses: of each body in its joint's frame; shape (b, 3, 4).
         roots: node of each body's surface; is_environment: whether that is in `scene` and not in `robot`.
         kinds, sizes: closed form of each body (SURFACE for none) and its three numbers.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of what two joints do to a pair of links: filled cell by cell when a path first passes, true for good."""
+"""Tables over two joints of whether a pair of links stays apart; cells are filled on first use and never change."""
 
 from __future__ import annotations
 

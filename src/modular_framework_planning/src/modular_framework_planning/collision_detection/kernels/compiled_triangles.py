@@ -285,7 +285,7 @@ def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def encloses(spheres, links, triangles, root, x, y, z):  # type: ignore[no-untyped-def]
-    """Whether a closed surface goes round a point: a ray from it leaves more often than it enters."""
+    """Whether a closed surface contains a point: a ray from the point leaves the surface more often than it enters."""
     dx, dy, dz = RAY
     stack = np.empty(512, np.int32)
     stack[0] = root

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Service compute_cartesian_path: straight lines through waypoints, timed, with the reason where they end early."""
+"""Service compute_cartesian_path: a timed path of straight lines through waypoints, and the reason if it ends early."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lines:
-    """One request, read; `carried` is the pose of what follows the lines in the frame of `link`, which moves it."""
+    """A parsed request; `carried` is the pose, in the frame of `link`, of the frame that follows the lines."""
 
     scene: PlanningScene
     group: JointGroup
@@ -123,7 +123,7 @@ class CartesianPathService:
         return _Lines(scene, group, solver, link, carried, _waypoints(scene, name, request), motion, checker)
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:
-        """Returns what is asked about each step: path constraints, then collisions."""
+        """Returns the check of each step: path constraints, then collisions."""
         constraints = constraints_from_message(
             lines.scene, request.path_constraints, "path_constraints", tip=lines.link
         )

@@ -35,12 +35,12 @@ MAX_COMPARED = 4  # free solutions whose clearance decides between them
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wanted:
-    """What compute_ik is asked for.
+    """A parsed compute_ik request.
 
     Attributes:
-        link: the one that is moved.
-        placed: pose, in its frame, of what is to be placed: the link itself, a held object or one of its subframes.
-        target: where that shall be, in the planning frame.
+        link: the link that is moved.
+        placed: pose, in the link's frame, of the frame to place: the link itself, a held object or a subframe of it.
+        target: its target pose in the planning frame.
     """
 
     link: str
@@ -127,13 +127,13 @@ class KinematicsService:
 
     @staticmethod
     def _timeout(request: Any) -> float | None:
-        """Returns the time asked for; None for the group's own."""
+        """Returns the requested timeout; None for the group's own."""
         asked = request.timeout.to_sec()
         return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
 
     @staticmethod
     def _target(scene: PlanningScene, group: JointGroup, request: Any) -> _Wanted:
-        """Reads what is to be placed where; raises PlanningError."""
+        """Reads the frame to place and its target; raises PlanningError."""
         links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
         if len(links) > 1 or len(poses) > 1:
             raise PlanningError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action move_group: plans and, unless plan_only is set, executes, watching the scene, and plans again if it must."""
+"""Action move_group: plans and, unless plan_only is set, executes; replans when the scene changes, if allowed."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class MoveAction:
         except PlanningError as error:
             result.error_code.val = int(error.code)
             return result, error.reason
-        if cancelled.is_set():  # a planner that goes on improving has a path by then, but the client has cancelled
+        if cancelled.is_set():  # an improving planner returns a path also when the client has cancelled
             result.error_code.val = ErrorCode.PREEMPTED
             return result, "cancelled while planning"
         result = MoveGroupResult(
@@ -132,7 +132,7 @@ class MoveAction:
 
     @staticmethod
     def _from_here(request: Any) -> Any:
-        """Returns the request with the current state as its start: only from there a motion can be executed."""
+        """Returns the request with the current state as its start, the only one from which a motion can be executed."""
         start = request.start_state
         if start.joint_state.name or start.attached_collision_objects:
             rospy.logwarn("request.start_state is ignored: a motion to execute starts where the robot is")

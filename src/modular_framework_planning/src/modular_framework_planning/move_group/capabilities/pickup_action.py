@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action pickup: takes an object by the best of several grasps that can be done."""
+"""Action pickup: picks an object up by the best feasible one of several grasps."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class PickupAction:
 
 
 def _check(scene: PlanningScene, goal: PickupGoal) -> None:
-    """Refuses goals that no grasp could save; raises PlanningError."""
+    """Refuses goals that fail with every grasp; raises PlanningError."""
     scene.find_object(goal.target_name)
     for name in (goal.support_surface_name, *goal.allowed_touch_objects):
         if name:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action place: puts a held object down at the best of several places that can be reached."""
+"""Action place: puts a held object down at the best feasible one of several locations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 
 class PlaceAction:
-    """Offers place (moveit_msgs/Place). Places are tried from the highest quality to the lowest."""
+    """Offers place (moveit_msgs/Place). Locations are tried from the highest quality to the lowest."""
 
     def __init__(self, context: MoveGroupContext) -> None:
         self._context = context
@@ -51,7 +51,7 @@ class PlaceAction:
 
 
 def _check(scene: PlanningScene, goal: PlaceGoal) -> None:
-    """Refuses goals that no place could save; raises PlanningError."""
+    """Refuses goals that fail at every location; raises PlanningError."""
     for name in (goal.support_surface_name, *goal.allowed_touch_objects):
         if name:
             scene.find_object(name)

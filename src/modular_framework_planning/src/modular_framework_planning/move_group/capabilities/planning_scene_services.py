@@ -53,7 +53,7 @@ class ApplyPlanningSceneService:
 
 
 class ClearOctomapService:
-    """Offers clear_octomap (std_srvs/Empty): nothing is known of space until a sensor's next message."""
+    """Offers clear_octomap (std_srvs/Empty): the octomap is empty until a sensor's next message."""
 
     def __init__(self, context: MoveGroupContext) -> None:
         self._context = context

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Service check_state_validity: says whether a state is free, within bounds and keeps constraints, and what is off."""
+"""Service check_state_validity: whether a state is free, within bounds and satisfies constraints; if not, why."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class StateValidationService:
             return GetStateValidityResponse(valid=False)
 
     def _answer(self, request: Any) -> GetStateValidityResponse:
-        """Looks at the state; raises PlanningError for a request without meaning.
+        """Checks the state; raises PlanningError for an invalid request.
 
         The response lists every contact and one result a constraint (joints, then positions, then orientations, then
         visibility); one that is refused is not satisfied, its distance is infinite, the log has the reason. Cost

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes tf of the objects in the planning scene, so that other nodes can ask where they are."""
+"""Publishes tf frames of the objects in the planning scene, for other nodes."""
 
 from __future__ import annotations
 

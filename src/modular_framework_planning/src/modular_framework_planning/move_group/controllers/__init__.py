@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Execute trajectories by the controllers of a robot."""
+"""Execution of trajectories by the controllers of a robot."""

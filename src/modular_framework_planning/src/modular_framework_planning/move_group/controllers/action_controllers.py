@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers of a robot as the executor sees them: which there are, and how one is commanded."""
+"""Controllers of a robot as the executor sees them, and those of ~controller_list, commanded by actions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class RunningMotion(Protocol):
     """A motion that one controller executes."""
 
     def is_done(self) -> bool:
-        """Whether the controller says that it has done it; raises PlanningError when it failed."""
+        """Whether the controller reports success; raises PlanningError when it failed."""
 
     def cancel(self) -> None:
         """Asks the controller to stop; nothing happens when it has ended."""
@@ -45,7 +45,7 @@ class ControllerManager(Protocol):
         """Starts to connect to the controllers."""
 
     def describe(self) -> str:
-        """Says how many controllers there are, or where they are asked for."""
+        """Describes the controllers: their number, or the controller manager that is asked for them."""
 
     def controllers(self) -> tuple[ControllerSpec, ...]:
         """Returns the controllers there are now; raises PlanningError when they cannot be known."""
@@ -58,7 +58,7 @@ class ControllerManager(Protocol):
 
 
 def listed_controllers(kinds: Sequence[str] = ACTION_KINDS, default_kind: str = "") -> tuple[ControllerSpec, ...]:
-    """Returns the usable controllers of ~controller_list; what is wrong with the others goes to the log."""
+    """Returns the usable controllers of ~controller_list; faults of the others are logged."""
     where = rospy.resolve_name("~controller_list")
     specs, faults = parse_controllers(rospy.get_param(where, None) or [], kinds, default_kind)
     for fault in faults:
@@ -120,7 +120,7 @@ class ActionControllers:
 
 
 class ActionMotion:
-    """A goal some controller's action server works on."""
+    """A goal that a controller's action server executes."""
 
     def __init__(self, spec: ControllerSpec, client: Any) -> None:
         self._spec = spec
@@ -152,6 +152,6 @@ class ActionMotion:
 
 
 def _is_connected(client: actionlib.ActionClient) -> bool:
-    """Whether an action server listens to all that a client says, and the client to all that it says."""
+    """Whether an action server and a client are connected on all topics of the action, in both directions."""
     ends = (client.pub_goal, client.pub_cancel, client.result_sub, client.feedback_sub, client.status_sub)
     return all(end.get_num_connections() > 0 for end in ends)

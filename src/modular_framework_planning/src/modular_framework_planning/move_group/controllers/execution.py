@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Executes trajectories: chooses controllers, checks the start, watches the time, listens for a stop."""
+"""Executes trajectories: chooses controllers, checks the start state, monitors the duration, reacts to stop events."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class TrajectoryExecution:
             self.manager.connect()
 
     def close(self) -> None:
-        """Stops a motion under way and waits for that; to be called while topics are still open."""
+        """Stops the present motion and waits until it has stopped; to be called while topics are still open."""
         self._stop.set()
         if self._busy.acquire(timeout=STOP_TIMEOUT_S):
             self._busy.release()
@@ -81,7 +81,7 @@ class TrajectoryExecution:
             )
 
     def describe(self) -> str:
-        """Says whose controllers execute motions."""
+        """Describes the controllers that execute motions."""
         return "no execution of motions" if self.manager is None else self.manager.describe()
 
     def execute(self, trajectory: Any, cancelled: threading.Event) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers of a robot that is not there: they publish the joint positions a trajectory asks for."""
+"""Fake controllers, for a robot without hardware or simulation: they publish the joint positions of a trajectory."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class FakeControllers:
         self._publisher: Any = None
 
     def connect(self) -> None:
-        """Puts the robot where it starts."""
+        """Publishes the initial positions."""
         self._publisher = rospy.Publisher(names.FAKE_JOINT_STATES_TOPIC, JointState, queue_size=100, latch=True)
         positions, faults = initial_positions(self._monitor.model, rospy.get_param("~initial", []))
         for fault in faults:
@@ -160,7 +160,7 @@ class FakeMotion:
         return not away
 
     def cancel(self) -> None:
-        """Stops where it is."""
+        """Stops at the present positions."""
         self._stopped.set()
         self._thread.join(1.0)
 

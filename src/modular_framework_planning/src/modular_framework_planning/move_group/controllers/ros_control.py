@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers a controller manager of ros_control has loaded; stopped ones are started where a motion needs them."""
+"""Controllers loaded by a controller manager of ros_control; stopped ones are started when a motion needs them."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class RosControlControllers(ActionControllers):
         self._asked_s = -KEPT_S
 
     def describe(self) -> str:
-        """Says where they are asked for."""
+        """Describes which controller manager is asked."""
         return f"controllers of {'all controller managers' if self._namespace is None else self._namespace}"
 
     def controllers(self) -> tuple[ControllerSpec, ...]:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Show the scene, paths and the octomap in an RViz without MoveIt's plugin."""
+"""Markers of the scene, paths and the octomap, for an RViz without MoveIt's plugin."""

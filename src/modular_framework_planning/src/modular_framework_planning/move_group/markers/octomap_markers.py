@@ -22,7 +22,7 @@ SHADES = [ColorRGBA(*colorsys.hsv_to_rgb(hue, 0.8, 0.9), 1.0) for hue in np.lins
 
 
 class OctomapMarkers:
-    """Publishes ~octomap_markers (MarkerArray, latched) when the octomap is another one."""
+    """Publishes ~octomap_markers (MarkerArray, latched) when the octomap changes."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher(names.OCTOMAP_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)

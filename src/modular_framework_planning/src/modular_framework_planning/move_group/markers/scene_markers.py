@@ -22,7 +22,7 @@ from modular_framework_planning.planning_scene.planning_scene import Color, Plan
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_ros.publishing import publish
 
-OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz draws transparent markers in no order of depth
+OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz does not sort transparent markers by depth
 ATTACHED_COLOR = (0.75, 0.3, 0.75, 1.0)
 GHOST_COLOR = (1.0, 0.6, 0.1)
 INTERMEDIATE_GHOSTS = 3
@@ -66,7 +66,7 @@ class MarkerPublisher:
         publish(self._scene, MarkerArray(markers))
 
     def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
-        """Publishes the planned motion: a line along which the tip goes and ghosts of the robot on its way."""
+        """Publishes the planned motion: the path of the tip as a line, and the robot at states along it."""
         publish(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
         group = scene.model.group(response.group_name)
         rows = answer.trajectory.positions
@@ -157,7 +157,7 @@ def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, num
 
 
 def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> list[Marker]:
-    """The line along which the tip goes; none for a motion of one point, which RViz would call an error."""
+    """The path of the tip as a line; none for a motion of one point, which RViz reports as an error."""
     if len(rows) < 2:
         return []
     line = _marker(Marker.LINE_STRIP, scene.model.planning_frame, "tip")
@@ -172,7 +172,7 @@ def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> list[M
 
 
 def robot_markers(model: RobotModel, positions: Array, namespace: str, color: Color) -> list[Marker]:
-    """Markers of what is seen of every link, at the given positions (of the whole robot), in one colour.
+    """Markers of the visual geometry of every link, at the given positions (of the whole robot), in one colour.
 
     Their ids are 0: number them, or give each robot a namespace and number within it, before publishing.
     """

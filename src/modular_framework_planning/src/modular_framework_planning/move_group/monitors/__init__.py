@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keep the planning scene up to date with what topics, tf and sensors say."""
+"""Monitors that keep the planning scene up to date from topics, tf and sensors."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Remembers where the joints were a moment ago, for sensor data that arrive later than they were taken."""
+"""Stores recent joint positions, because sensor data are processed some time after they were taken."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ KEPT = 2000
 
 
 class JointHistory:
-    """Joint positions with their times, the last KEPT of them; not for two threads at once."""
+    """The last KEPT joint positions with their times; not thread-safe."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=KEPT)
         self._positions: deque[Array] = deque(maxlen=KEPT)
 
     def add(self, stamp_s: float, positions: Array) -> None:
-        """Remembers positions [rad or m]; a time before the last one means the clock was set back: all is forgotten."""
+        """Stores positions [rad or m]; a time before the last one means a reset clock, and clears the history."""
         if self._times and stamp_s < self._times[-1] - 1.0:
             self._times.clear()
             self._positions.clear()
         if self._times and stamp_s <= self._times[-1]:
-            self._positions[-1] = positions  # of several sources the last message has all that is known
+            self._positions[-1] = positions  # with several sources, the last message includes all joints known so far
             return
         self._times.append(stamp_s)
         self._positions.append(positions)
@@ -35,7 +35,7 @@ class JointHistory:
         return bool(self._times) and self._times[-1] >= stamp_s
 
     def at(self, stamp_s: float) -> Array:
-        """Returns the positions at a time, between two known ones in proportion.
+        """Returns the positions at a time, linearly interpolated.
 
         Raises:
             PlanningError: the time is later than the last known one, or earlier than the first.

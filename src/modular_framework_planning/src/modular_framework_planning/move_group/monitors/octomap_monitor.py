@@ -79,7 +79,7 @@ class OctomapMonitor:
     def insert_point_cloud(
         self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker, shadow: float = 0.0
     ) -> Array:
-        """Puts what a sensor saw at one moment into the map.
+        """Inserts one point cloud of a sensor into the map.
 
         Args:
             frame: of the points.
@@ -116,7 +116,7 @@ class OctomapMonitor:
         )
 
     def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
-        """The scene's map to go on with; an empty one where it has none, or one of other voxels from elsewhere."""
+        """The scene's map to update; an empty one if it has none, or one of another frame or resolution."""
         voxels = voxels_of(scene)
         if (
             voxels is None
@@ -151,7 +151,7 @@ class OctomapMonitor:
         return done[0]
 
     def free_new_objects(self, scene: PlanningScene) -> None:
-        """Takes what is now known as an object out of the map."""
+        """Frees the voxels of bodies that the scene now knows as objects."""
         bodies = {**scene.objects, **scene.attached}
         fresh = [name for name, body in bodies.items() if self._known.get(name) is not body]
         self._known = bodies

@@ -29,7 +29,7 @@ FLOAT_POINT = np.dtype("<f4")
 
 
 class InsertPointCloud(Protocol):
-    """Puts what a sensor saw into the map; see OctomapMonitor.insert_point_cloud."""
+    """Inserts a point cloud into the map; see OctomapMonitor.insert_point_cloud."""
 
     def __call__(
         self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker, shadow: float = 0.0
@@ -93,7 +93,7 @@ class PointCloudUpdater(_Updater):
         super().__init__(settings, insert, 1)
 
     def connect(self) -> None:
-        """Starts to listen."""
+        """Subscribes."""
         self._connect(self._settings.point_cloud_topic, PointCloud2, PointCloud2)
 
     def _process(self, message: PointCloud2) -> None:
@@ -117,7 +117,7 @@ class DepthImageUpdater(_Updater):
         self._camera: Pinhole | None = None
 
     def connect(self) -> None:
-        """Starts to listen."""
+        """Subscribes."""
         beside = rospy.resolve_name(self._settings.image_topic).rsplit("/", 1)[0]
         rospy.Subscriber(f"{beside}/camera_info", CameraInfo, self._on_info, queue_size=1)
         self._connect(self._settings.image_topic, Image, Image)

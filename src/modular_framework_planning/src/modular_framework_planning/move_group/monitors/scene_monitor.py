@@ -31,7 +31,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 
 class SceneMonitor:
-    """The one place that changes the scene; readers get immutable snapshots.
+    """Owns the scene: all changes are made here, and readers get immutable snapshots.
 
     A thread of its own publishes what changed and calls the listeners, so that nobody waits for large messages; changes
     that follow each other closely are published as one.
@@ -88,7 +88,7 @@ class SceneMonitor:
                 publish(scene_message(self._published_scene, 0))
 
     def _publish_changes(self) -> None:
-        """Publishes changes of the scene as they come, and of joints and frames as often as the settings say."""
+        """Publishes changes of the scene at once, and of joints and frames at the configured rate."""
         while not rospy.is_shutdown():
             settings = self.settings
             changed = self._scene_changed.wait(1.0 / settings.publish_planning_scene_hz)

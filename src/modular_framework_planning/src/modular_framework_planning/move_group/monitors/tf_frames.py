@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames outside the robot that only tf knows, such as a camera's or a map's, so that requests may be given in them."""
+"""Frames outside the robot that only tf has, such as a camera's or a map's, so that requests may use them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Searches under path constraints that random states do not satisfy: every step of the search is projected onto them.
+"""A search under path constraints that random states rarely satisfy: each step is projected onto the constraints.
 
 Two trees grow from the start and from the goals as in CBiRRT (Berenson, Srinivasa, Ferguson, Kuffner: Manipulation
 planning on constraint manifolds, ICRA 2009): a tree steps towards a target, projects the step onto the constraints and
@@ -78,7 +78,7 @@ class ConstrainedSearch:
     def __init__(
         self, problem: PlanningProblem, step: float, goals: Array | None = None, most_states: float = np.inf
     ) -> None:
-        """Takes what to search.
+        """Stores the problem.
 
         Args:
             problem: with constraints.

@@ -130,7 +130,7 @@ def edge_step(problem: PlanningProblem) -> float:
 
 
 class _EdgeValidator(ob.MotionValidator):
-    """Hands whole edges to the search; `release` breaks the tie to the collision world afterwards."""
+    """OMPL's motion validator, for whole edges; `release` drops the reference to the collision world afterwards."""
 
     def __init__(self, information: Any, search: _Search) -> None:
         super().__init__(information)
@@ -141,7 +141,7 @@ class _EdgeValidator(ob.MotionValidator):
         return self._search is not None and self._search.edge_is_valid(first, second)
 
     def release(self) -> None:
-        """Lets go of the collision world."""
+        """Drops the reference to the collision world."""
         self._search = None
 
 
@@ -265,5 +265,5 @@ class _Search:
         if not definition.hasExactSolution():
             return None
         if self._problem.repeatable and self._problem.interrupted():
-            return None  # what was found until the clock ran out is not what the next run finds
+            return None  # a search that the clock ends is not repeatable
         return np.array([list(state[0 : self._count]) for state in definition.getSolutionPath().getStates()])

@@ -98,10 +98,10 @@ PLANNERS: dict[str, tuple[type, dict[str, Setting]]] = {
 }
 # Planners that look for solutions in a thread of their own: it must not need the interpreter, whose lock solve() holds.
 THREADED = frozenset({"PRM", "PRMstar"})
-# Planners that go on to improve what they found until they are stopped.
+# Planners that improve their path until they are stopped.
 ANYTIME = frozenset({"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"})
 PATH_LENGTH = "PathLengthOptimizationObjective"
-# Keys of ompl_planning.yaml that are read elsewhere, and those whose other values this OMPL has nothing for.
+# Keys of ompl_planning.yaml that are read elsewhere, and those of which this OMPL supports one value only.
 GENERAL_KEYS = (
     "type",
     "projection_evaluator",

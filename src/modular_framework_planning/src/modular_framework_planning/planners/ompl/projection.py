@@ -16,7 +16,7 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 
 
 class _LinkPosition(ob.ProjectionEvaluator):
-    """Projects to where a link is; `release` breaks the tie to the robot model afterwards."""
+    """Projects a state to a link's position; `release` drops the reference to the robot model."""
 
     def __init__(self, space: Any, position: Callable[[Array], Array], count: int) -> None:
         super().__init__(space)
@@ -33,7 +33,7 @@ class _LinkPosition(ob.ProjectionEvaluator):
             projection[:] = self._position(np.array(state[0 : self._count]))
 
     def release(self) -> None:
-        """Lets go of the robot model."""
+        """Drops the reference to the robot model."""
         self._position = None
 
 

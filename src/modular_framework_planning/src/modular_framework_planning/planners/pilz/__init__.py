@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Industrial motions that run exactly as asked: point to point, straight lines, arcs, and sequences of them."""
+"""Pilz's industrial motions: point to point (PTP), straight lines (LIN), arcs (CIRC), and sequences of them."""

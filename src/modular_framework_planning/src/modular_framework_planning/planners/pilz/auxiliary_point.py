@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the point of a circle from path_constraints, where Pilz's planner has it: it is an input and no constraint."""
+"""Reads the auxiliary point of a circle from path_constraints, where Pilz's planner expects it; it is no constraint."""
 
 from __future__ import annotations
 

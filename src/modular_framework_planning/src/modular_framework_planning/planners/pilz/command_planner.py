@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planner of the pipeline pilz_industrial_motion_planner: one request, one motion of a known shape.
+"""The planner of the pipeline pilz_industrial_motion_planner: one motion of a known shape per request.
 
-It goes around nothing: the motion is what was asked for, or it is refused with the reason.
+It does not avoid obstacles: it returns exactly the requested motion, or refuses it with the reason.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 DEFAULT_SAMPLING_TIME_S = 0.1
-STANDING_STILL = 0.01  # [rad/s or m/s]; what a measured joint at rest may show
+MAX_START_VELOCITY = 0.01  # [rad/s or m/s]; measured velocities of a joint at rest stay below it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
-    """Where a link has to be at the end, and with which joint values if they were given."""
+    """The goal pose of a link, and its joint values if the goal was given by joints."""
 
     link: str
     pose: Transform
@@ -81,7 +81,7 @@ class CommandPlanner:
         """Plans one motion; raises PlanningError with the reason."""
         if problem.cancelled():
             raise PlanningError(ErrorCode.PREEMPTED, f"{problem.planner_id} was cancelled before it began")
-        _require_standing(problem)
+        _require_start_at_rest(problem)
         if len(problem.request.goals) != 1:
             raise PlanningError(
                 ErrorCode.INVALID_GOAL_CONSTRAINTS,
@@ -132,13 +132,13 @@ class CommandPlanner:
         return self._limits
 
 
-def _require_standing(problem: PlanningProblem) -> None:
+def _require_start_at_rest(problem: PlanningProblem) -> None:
     for name, velocity in problem.request.start_velocities.items():
-        if name in problem.group.joints and not abs(velocity) <= STANDING_STILL:
+        if name in problem.group.joints and not abs(velocity) <= MAX_START_VELOCITY:
             raise PlanningError(
                 ErrorCode.INVALID_ROBOT_STATE,
                 f"start state: joint '{name}' moves at {velocity}; "
-                f"{problem.planner_id} starts from rest (at most {STANDING_STILL})",
+                f"{problem.planner_id} starts from rest (at most {MAX_START_VELOCITY})",
             )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The three motions: PTP moves the joints together, LIN leads a link along a line, CIRC along an arc."""
+"""The three motions: PTP moves the joints synchronously, LIN moves a link along a line, CIRC along an arc."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GOAL_TOLERANCE = 1.0e-4  # [rad or m] between the end of a line and the joint va
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast a motion runs and how densely it is described.
+    """Speed and sampling period of a motion.
 
     Attributes:
         velocity_scaling, acceleration_scaling: shares of the limits, in (0, 1].
@@ -41,7 +41,7 @@ def standstill(joints: tuple[str, ...], values: Array) -> Trajectory:
 
 
 def point_to_point(start: Array, goal: Array, rates: JointRates, pace: Pace) -> Trajectory:
-    """Moves all joints in common phases under the strictest limits of any of them; the widest move leads."""
+    """Moves all joints with common phases under the strictest limits of any; the joint with the longest way leads."""
     change = goal - start
     lead = float(np.abs(change).max())
     if lead < SAME_POSITION:
@@ -62,7 +62,7 @@ def point_to_point(start: Array, goal: Array, rates: JointRates, pace: Pace) -> 
 def along_path(
     path: PosePath, follower: PoseFollower, start: Array, limits: CartesianLimits, pace: Pace, goal: Array | None = None
 ) -> Trajectory:
-    """Leads a link along a path.
+    """Moves a link along a path.
 
     Args:
         path: of the follower's link.

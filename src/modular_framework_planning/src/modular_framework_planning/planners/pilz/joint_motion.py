@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns a link's motion over time into a trajectory of joints, each sample checked against the joints' limits."""
+"""Converts a link's motion over time to a joint trajectory, and checks each sample against the joint limits."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Posture = Callable[[float], JointState]  # over the time of a motion
 
 
 def at_rest(positions: Array) -> JointState:
-    """Returns joints that stand still."""
+    """Returns a joint state at rest."""
     return JointState(positions, np.zeros_like(positions), np.zeros_like(positions))
 
 
@@ -64,7 +64,7 @@ class PoseMotion(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRates:
-    """What a group's joints can do, in their order [1/s, 1/s^2]."""
+    """Velocity and acceleration limits of a group's joints, in their order [1/s, 1/s^2]."""
 
     joints: tuple[str, ...]
     velocity: Array

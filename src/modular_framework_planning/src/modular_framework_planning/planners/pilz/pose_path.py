@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths of a link in space: straight lines and circular arcs, the orientation turning evenly about one axis."""
+"""Paths of a link in space: lines and circular arcs, along which the orientation turns evenly about one axis."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def arc_through_interim(start: Transform, end: Transform, interim: Array) -> Arc
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedPath:
-    """A path with a speed: what a link does over time."""
+    """A path with a velocity profile: the motion of a link over time."""
 
     path: PosePath
     profile: TrapezoidalProfile

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joins the motions of a sequence: each starts where the one before ends, and is blended into it where that is asked.
+"""Joins the motions of a sequence: each starts at the end of the one before, and is blended with it on request.
 
 The motions of one group that follow each other become one trajectory; a change of group begins another.
 """
@@ -31,7 +31,7 @@ CheckerSource = Callable[[PlanningScene, JointGroup, Array], CollisionChecker]
 
 @dataclass(frozen=True, slots=True)
 class ItemSpec:
-    """What the rules of a sequence are about.
+    """One item of a sequence, as the rules of sequences see it.
 
     Attributes:
         group: planning group.

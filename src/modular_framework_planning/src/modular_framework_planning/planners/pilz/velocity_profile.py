@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs along a path with a trapezoid of speed whose corners are rounded, so that the acceleration never jumps.
+"""Trapezoidal velocity profiles with rounded corners, so that the acceleration is continuous.
 
 A controller joins trajectory points by polynomials of position, velocity and acceleration. A plain trapezoid has jumps
 of acceleration, and such a polynomial overshoots the limits there. Averaging the trapezoid over a short window keeps
-distance and limits (an average never exceeds what it averages) and makes it a chain of cubics, which a controller
+distance and limits (an average never exceeds the averaged values) and makes it a chain of cubics, which a controller
 follows exactly.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a state of a motion costs: depth in obstacles, violation of path constraints."""
+"""Cost of the states of a motion: penetration of obstacles and violation of path constraints."""
 
 from __future__ import annotations
 

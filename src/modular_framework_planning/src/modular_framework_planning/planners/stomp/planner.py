@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planner of the pipeline `stomp`: several attempts to bend a straight motion around obstacles."""
+"""The planner of the pipeline `stomp`: several attempts to deform a straight motion around obstacles."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class _Attempt:
         return valid is not None
 
     def _step(self, copies: Array, costs: Array, cost: float) -> tuple[bool, float]:
-        """Takes the cheaper one of the weighted average and the best copy, where it is cheaper than the motion."""
+        """Replaces the motion by the weighted average or the best rollout, whichever is cheaper, if cheaper at all."""
         candidates = [
             self._on_constraints(item)
             for item in (self._optimiser.update(self.motion, copies, costs), copies[int(np.argmin(costs.sum(axis=1)))])
@@ -145,7 +145,7 @@ class _Attempt:
         return float(self._optimiser.costs(motion[None], self._costs).sum())
 
     def _on_constraints(self, motion: Array) -> Array:
-        """Moves states onto the path constraints where that works; the ends stay."""
+        """Projects the states onto the path constraints where that succeeds; the ends stay."""
         constraints = self._problem.constraints
         if constraints is None:
             return motion

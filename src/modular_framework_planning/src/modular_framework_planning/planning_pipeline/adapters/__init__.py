@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Request adapters: steps around a planner that correct a request before and complete a path after."""
+"""Request adapters: steps around a planner that correct a request before planning and complete the path after it."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Leads a start state that collides a little out to a free state nearby."""
+"""Replaces a start state in slight collision by a free state nearby."""
 
 from __future__ import annotations
 

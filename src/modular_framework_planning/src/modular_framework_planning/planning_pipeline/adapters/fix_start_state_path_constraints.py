@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Leads a start state that violates the path constraints to the nearest one that satisfies them."""
+"""Replaces a start state that violates the path constraints by the nearest one that satisfies them."""
 
 from __future__ import annotations
 

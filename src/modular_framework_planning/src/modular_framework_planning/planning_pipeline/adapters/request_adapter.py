@@ -19,8 +19,8 @@ class RequestAdapter:
         """Plans through the rest of the chain.
 
         Args:
-            problem: what the steps further out made of the request; parameters are in `problem.settings`.
-            plan_next: the steps further in and the planner.
+            problem: the request as the outer adapters changed it; parameters are in `problem.settings`.
+            plan_next: the inner adapters and the planner.
 
         Raises:
             PlanningError: with code and reason.
