@@ -17,8 +17,8 @@ from moveit_commander.robot_state import current_state
 from moveit_commander.servers import Servers
 
 
-class Joint:
-    """A joint with its bounds and its present value [rad or m]; a fixed joint has neither."""
+class _RobotPart:
+    """Something of a robot that has a name."""
 
     def __init__(self, robot: RobotCommander, name: str) -> None:
         self._robot = robot
@@ -27,6 +27,10 @@ class Joint:
     def name(self) -> str:
         """Returns its name."""
         return self._name
+
+
+class Joint(_RobotPart):
+    """A joint with its bounds and its present value [rad or m]; a fixed joint has neither."""
 
     def variable_count(self) -> int:
         """Returns how many numbers describe its position."""
@@ -66,16 +70,8 @@ class Joint:
         return commander.go(wait)
 
 
-class Link:
+class Link(_RobotPart):
     """A link with its current pose."""
-
-    def __init__(self, robot: RobotCommander, name: str) -> None:
-        self._robot = robot
-        self._name = name
-
-    def name(self) -> str:
-        """Returns its name."""
-        return self._name
 
     def pose(self) -> PoseStamped:
         """Returns where it is now, in the planning frame."""

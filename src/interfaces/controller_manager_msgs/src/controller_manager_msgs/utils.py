@@ -16,6 +16,7 @@ import rosservice
 from controller_manager_msgs.msg import ControllerState
 from controller_manager_msgs.srv import ListControllers
 
+Controllers = Iterable[ControllerState]
 LIST_SERVICE = "list_controllers"
 MANAGER_SERVICES = {
     LIST_SERVICE: "controller_manager_msgs/ListControllers",
@@ -111,29 +112,23 @@ class ControllerLister:
             service.close()
 
 
-def filter_by_name(
-    ctrl_list: Iterable[ControllerState], ctrl_name: str, match_substring: bool = False
-) -> list[ControllerState]:
+def filter_by_name(ctrl_list: Controllers, ctrl_name: str, match_substring: bool = False) -> list[ControllerState]:
     """The controllers of that name, or with it in their name."""
     return _filter(ctrl_list, lambda controller: _matches(controller.name, ctrl_name, match_substring))
 
 
-def filter_by_type(
-    ctrl_list: Iterable[ControllerState], ctrl_type: str, match_substring: bool = False
-) -> list[ControllerState]:
+def filter_by_type(ctrl_list: Controllers, ctrl_type: str, match_substring: bool = False) -> list[ControllerState]:
     """The controllers of that type, or with it in their type."""
     return _filter(ctrl_list, lambda controller: _matches(controller.type, ctrl_type, match_substring))
 
 
-def filter_by_state(
-    ctrl_list: Iterable[ControllerState], ctrl_state: str, match_substring: bool = False
-) -> list[ControllerState]:
+def filter_by_state(ctrl_list: Controllers, ctrl_state: str, match_substring: bool = False) -> list[ControllerState]:
     """The controllers in that state, or with it in the name of their state."""
     return _filter(ctrl_list, lambda controller: _matches(controller.state, ctrl_state, match_substring))
 
 
 def filter_by_hardware_interface(
-    ctrl_list: Iterable[ControllerState], hardware_interface: str, match_substring: bool = False
+    ctrl_list: Controllers, hardware_interface: str, match_substring: bool = False
 ) -> list[ControllerState]:
     """The controllers that claim resources of that hardware interface, or of one with it in its name."""
     return _filter(
@@ -146,7 +141,7 @@ def filter_by_hardware_interface(
 
 
 def filter_by_resources(
-    ctrl_list: Iterable[ControllerState],
+    ctrl_list: Controllers,
     resources: Iterable[str],
     hardware_interface: str | None = None,
     match_any: bool = False,
@@ -176,7 +171,7 @@ def _matches(value: str, wanted: str, match_substring: bool) -> bool:
     return wanted in value if match_substring else wanted == value
 
 
-def _filter(controllers: Iterable[ControllerState], fits: Callable[[ControllerState], bool]) -> list[ControllerState]:
+def _filter(controllers: Controllers, fits: Callable[[ControllerState], bool]) -> list[ControllerState]:
     return [controller for controller in controllers if fits(controller)]
 
 

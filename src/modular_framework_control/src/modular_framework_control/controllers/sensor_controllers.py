@@ -45,10 +45,9 @@ class SensorController(Controller):
         self._turns.start(time_s)
 
     def update(self, time_s: float, period_s: float) -> None:
-        if self.on_reading is None or not self._turns.take_turn(time_s):
-            return
-        for handle in self._handles:
-            self.on_reading(time_s, handle)
+        if self.on_reading is not None and self._turns.take_turn(time_s):
+            for handle in self._handles:
+                self.on_reading(time_s, handle)
 
 
 class ForceTorqueSensorController(SensorController):

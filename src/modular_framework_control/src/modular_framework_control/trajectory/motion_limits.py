@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +35,10 @@ _VELOCITY_BASIS = np.arange(6) * _NODES[:, np.newaxis] ** np.maximum(np.arange(6
 
 
 class _Kind(Enum):
-    POINT_POSITION = "position"
-    POINT_VELOCITY = "velocity"
-    CURVE_POSITION = "position on the way"
-    CURVE_VELOCITY = "velocity on the way"
+    POINT_POSITION = auto()
+    POINT_VELOCITY = auto()
+    CURVE_POSITION = auto()
+    CURVE_VELOCITY = auto()
 
 
 @dataclass(frozen=True, slots=True)

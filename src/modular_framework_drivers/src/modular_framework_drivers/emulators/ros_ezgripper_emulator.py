@@ -11,10 +11,10 @@ from modular_framework_drivers.emulators.command_port import CommandPort
 from modular_framework_drivers.emulators.dynamixel_finger import Finger
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-from modular_framework_drivers.emulators.ros_commands import offer_commands
+from modular_framework_drivers.emulators.ros_emulator_node import offer_commands, run_emulator
 from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
-from modular_framework_ros.node_handle import ParameterError, read_number
+from modular_framework_ros.node_handle import read_number
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 
 COMMAND_PORT = 29900
@@ -57,21 +57,13 @@ class EzGripperEmulatorNode:
             "emulated gripper at %s; commands at TCP port %d (`help` lists them)", self._line.link, self._commands.port
         )
 
-    def close(self) -> None:
-        """Pull the plug."""
+    def run(self) -> None:
+        """Serves until the node is shut down, then pulls the plug."""
+        rospy.spin()
         self._commands.close()
         self._line.close()
 
 
 def main() -> int:
     """Runs the node; returns its exit code."""
-    rospy.init_node("ezgripper_emulator")
-    try:
-        node = EzGripperEmulatorNode()
-        node.connect()
-    except (ParameterError, OSError) as error:
-        rospy.logfatal("%s: %s", rospy.get_name(), error)
-        return 1
-    rospy.spin()
-    node.close()
-    return 0
+    return run_emulator("ezgripper_emulator", EzGripperEmulatorNode)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import rospy
 
-from modular_framework_drivers.emulators.ros_commands import offer_commands
+from modular_framework_drivers.emulators.ros_emulator_node import offer_commands, run_emulator
 from modular_framework_drivers.emulators.ur_controller import HOME
 from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT, UrEmulator
 
@@ -50,13 +50,5 @@ class UrEmulatorNode:
 
 
 def main() -> int:
-    """Run the node; returns its exit code."""
-    rospy.init_node("ur_emulator")
-    try:
-        node = UrEmulatorNode()
-        node.connect()
-    except (OSError, ValueError, TypeError) as error:
-        rospy.logfatal("%s: %s", rospy.get_name(), error)
-        return 1
-    node.run()
-    return 0
+    """Runs the node; returns its exit code."""
+    return run_emulator("ur_emulator", UrEmulatorNode)

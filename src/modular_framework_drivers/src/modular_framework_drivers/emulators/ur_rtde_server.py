@@ -51,16 +51,41 @@ class Variable:
     set: Callable[[Value], None] | None = None
 
 
+_CONSTANT_OUTPUTS: dict[str, tuple[str, Value]] = {
+    "actual_execution_time": ("DOUBLE", 0.0002),
+    "joint_temperatures": ("VECTOR6D", (30.0,) * 6),
+    "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
+    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, -9.81)),
+    "joint_mode": ("VECTOR6INT32", (253,) * 6),
+    "actual_main_voltage": ("DOUBLE", 48.0),
+    "actual_robot_voltage": ("DOUBLE", 48.0),
+    "actual_digital_input_bits": ("UINT64", 0),
+    "elbow_position": ("VECTOR3D", (0.0,) * 3),
+    "elbow_velocity": ("VECTOR3D", (0.0,) * 3),
+    "target_qdd": ("VECTOR6D", (0.0,) * 6),
+    "target_current": ("VECTOR6D", (0.0,) * 6),
+    "target_moment": ("VECTOR6D", (0.0,) * 6),
+    "actual_current": ("VECTOR6D", (0.0,) * 6),
+    "joint_control_output": ("VECTOR6D", (0.0,) * 6),
+    "actual_TCP_speed": ("VECTOR6D", (0.0,) * 6),
+    "target_TCP_speed": ("VECTOR6D", (0.0,) * 6),
+    "payload_inertia": ("VECTOR6D", (0.0,) * 6),
+    "actual_current_as_torque": ("VECTOR6D", (0.0,) * 6),
+    "actual_momentum": ("DOUBLE", 0.0),
+    "actual_robot_current": ("DOUBLE", 0.0),
+    "standard_analog_input0": ("DOUBLE", 0.0),
+    "standard_analog_input1": ("DOUBLE", 0.0),
+    "standard_analog_output0": ("DOUBLE", 0.0),
+    "standard_analog_output1": ("DOUBLE", 0.0),
+}
+"""Type and value of the variables that this emulator does not model."""
+
+
 def output_variables(controller: UrController) -> dict[str, Variable]:
     """The variables a client can ask for, by name."""
-    motion, zeros6, zeros3 = controller.motion, (0.0,) * 6, (0.0,) * 3
-
-    def temperatures() -> Value:
-        return (30.0,) * 6
-
+    motion = controller.motion
     values: dict[str, tuple[str, Callable[[], Value]]] = {
         "timestamp": ("DOUBLE", lambda: controller.time_s),
-        "actual_execution_time": ("DOUBLE", lambda: 0.0002),
         "target_q": ("VECTOR6D", lambda: controller.target_positions),
         "target_qd": ("VECTOR6D", lambda: motion.velocities),
         "actual_q": ("VECTOR6D", lambda: motion.positions),
@@ -69,51 +94,24 @@ def output_variables(controller: UrController) -> dict[str, Variable]:
         "target_TCP_pose": ("VECTOR6D", lambda: flange_pose(controller.target_positions)),
         "actual_TCP_force": ("VECTOR6D", lambda: controller.wrench),
         "ft_raw_wrench": ("VECTOR6D", lambda: controller.wrench),
-        "joint_temperatures": ("VECTOR6D", temperatures),
-        "actual_joint_voltage": ("VECTOR6D", lambda: (48.0,) * 6),
-        "actual_tool_accelerometer": ("VECTOR3D", lambda: (0.0, 0.0, -9.81)),
         "payload": ("DOUBLE", lambda: controller.payload_kg),
         "payload_cog": ("VECTOR3D", lambda: controller.payload_centre_m),
         "robot_mode": ("INT32", lambda: controller.robot_mode),
         "safety_mode": ("INT32", lambda: controller.safety_mode),
-        "joint_mode": ("VECTOR6INT32", lambda: (253,) * 6),
         "runtime_state": ("UINT32", lambda: controller.runtime_state),
         "robot_status_bits": ("UINT32", lambda: controller.robot_status_bits),
         "safety_status_bits": ("UINT32", lambda: controller.safety_status_bits),
         "speed_scaling": ("DOUBLE", lambda: controller.speed_scaling),
         "target_speed_fraction": ("DOUBLE", lambda: controller.speed_slider),
-        "actual_main_voltage": ("DOUBLE", lambda: 48.0),
-        "actual_robot_voltage": ("DOUBLE", lambda: 48.0),
-        "actual_digital_input_bits": ("UINT64", lambda: 0),
         "actual_digital_output_bits": ("UINT64", lambda: controller.digital_outputs),
-        "elbow_position": ("VECTOR3D", lambda: zeros3),
-        "elbow_velocity": ("VECTOR3D", lambda: zeros3),
     }
-    for name in (
-        "target_qdd",
-        "target_current",
-        "target_moment",
-        "actual_current",
-        "joint_control_output",
-        "actual_TCP_speed",
-        "target_TCP_speed",
-        "payload_inertia",
-        "actual_current_as_torque",
-    ):
-        values[name] = ("VECTOR6D", lambda: zeros6)
-    for name in (
-        "actual_momentum",
-        "actual_robot_current",
-        "standard_analog_input0",
-        "standard_analog_input1",
-        "standard_analog_output0",
-        "standard_analog_output1",
-    ):
-        values[name] = ("DOUBLE", lambda: 0.0)
     for index in range(REGISTERS):
         values[f"output_int_register_{index}"] = ("INT32", _getter(controller.outputs.ints, index))
         values[f"output_double_register_{index}"] = ("DOUBLE", _getter(controller.outputs.doubles, index))
-    return {name: Variable(type_name, get=get) for name, (type_name, get) in values.items()}
+    return {
+        **{name: Variable(kind, get=get) for name, (kind, get) in values.items()},
+        **{name: Variable(kind, get=_constant(value)) for name, (kind, value) in _CONSTANT_OUTPUTS.items()},
+    }
 
 
 def input_variables(controller: UrController) -> dict[str, Variable]:
@@ -139,6 +137,10 @@ def input_variables(controller: UrController) -> dict[str, Variable]:
         variables[f"input_int_register_{index}"] = Variable("INT32", set=_setter(controller.inputs.ints, index))
         variables[f"input_double_register_{index}"] = Variable("DOUBLE", set=_setter(controller.inputs.doubles, index))
     return variables
+
+
+def _constant(value: Value) -> Callable[[], Value]:
+    return lambda: value
 
 
 def _getter(values: Sequence[float], index: int) -> Callable[[], Value]:

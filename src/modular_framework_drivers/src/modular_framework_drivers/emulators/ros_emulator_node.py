@@ -1,16 +1,48 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Offers the commands of an emulator as ROS services too."""
+"""What the nodes of emulators share: their main function, and the commands as ROS services."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_drivers.emulators.command_port import Command
+from modular_framework_ros.node_handle import ParameterError
+
+
+class EmulatorNode(Protocol):
+    """The node of an emulator."""
+
+    def connect(self) -> None:
+        """Opens what clients connect to."""
+
+    def run(self) -> None:
+        """Serves until the node is shut down."""
+
+
+def run_emulator(name: str, make_node: Callable[[], EmulatorNode]) -> int:
+    """Runs an emulator until ROS ends it.
+
+    Args:
+        name: of the ROS node.
+        make_node: reads its parameters.
+
+    Returns:
+        The exit code: 1 when a parameter is wrong or a port is taken, which is logged.
+    """
+    rospy.init_node(name)
+    try:
+        node = make_node()
+        node.connect()
+    except (ParameterError, OSError, ValueError, TypeError) as error:
+        rospy.logfatal("%s: %s", rospy.get_name(), error)
+        return 1
+    node.run()
+    return 0
 
 
 def offer_commands(commands: Mapping[str, Command]) -> list[rospy.Service]:
