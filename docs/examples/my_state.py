@@ -7,9 +7,9 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 
@@ -20,22 +20,11 @@ class MyState(FrameworkState):
     Args:
         side: One of several words; the annotation is what a task file is checked against.
         timeout: A number above 0, with its unit [s].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written; ``chosen_side`` receives the side when it is listed.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state; ``chosen_side`` receives the side if it is an output key.
     """
 
-    def __init__(
-        self,
-        side: Literal["left", "right"],
-        timeout: Positive = 5.0,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, side: Literal["left", "right"], timeout: Positive = 5.0, **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._side, self._timeout_s = side, float(timeout)
 
     def execute(self, userdata: Any) -> str:

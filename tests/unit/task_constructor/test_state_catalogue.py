@@ -44,6 +44,37 @@ def test_a_state_without_constructor_has_that_of_its_base(tmp_path: Path) -> Non
     assert list(catalogue(tmp_path, plan=text).get("plan").options) == ["a"]
 
 
+@pytest.mark.parametrize("call", ["super().__init__(**keys)", "FrameworkState.__init__(self, **keys)"])
+def test_the_keys_of_every_state_are_options_of_one_that_passes_them_on(tmp_path: Path, call: str) -> None:
+    text = (
+        "class Plan(FrameworkState):\n    DEFAULT_IO_KEYS = ('arm',)\n"
+        f"    def __init__(self, a=1, **keys: Unpack[StateKeys]):\n        {call}\n"
+    )
+    source = catalogue(tmp_path, plan=text).get("plan")
+    assert list(source.options) == ["a", "outcomes", "input_keys", "output_keys", "io_keys"]
+    assert not source.takes_any_option
+    assert source.default_names("outcomes") == ("success", "fail")
+    assert (source.default_names("input_keys"), source.default_names("io_keys")) == ((), ("arm",))
+
+
+def test_keys_that_a_constructor_changes_before_it_passes_them_on_are_not_known(tmp_path: Path) -> None:
+    text = (
+        "class Plan(FrameworkState):\n    def __init__(self, **keys: Unpack[StateKeys]):\n"
+        "        keys['outcomes'] = ['a', 'b']\n        super().__init__(**keys)\n"
+    )
+    assert catalogue(tmp_path, plan=text).get("plan").default_names("outcomes") is None
+
+
+def test_default_io_keys_are_those_of_the_class_before_those_of_its_base(tmp_path: Path) -> None:
+    text = (
+        "class Base(FrameworkState):\n    DEFAULT_IO_KEYS = ('arm',)\n"
+        "class Plan(Base):\n    DEFAULT_IO_KEYS = ('hand',)\n"
+        "class Move(Base):\n    pass\n"
+    )
+    found = catalogue(tmp_path, plan=text, move=text)
+    assert [found.get(name).default_names("io_keys") for name in ("plan", "move")] == [("hand",), ("arm",)]
+
+
 CALLS = {
     "smach.State.__init__(self, outcomes=['a', 'b'], input_keys=['x'], output_keys=('y',))": (
         ("a", "b"),

@@ -2,7 +2,7 @@
 """Reads from a state's constructor which outcomes and userdata keys it declares itself, whatever its options say.
 
 A state of the framework has options named ``outcomes``, ``input_keys``, ``output_keys`` and ``io_keys``, and passes
-them on as they are. The usual smach state declares its own::
+them on as they are, most simply as ``**keys: Unpack[StateKeys]``. The usual smach state declares its own::
 
     def __init__(self):
         smach.State.__init__(self, outcomes=["opened", "stuck"], input_keys=["door"])
@@ -11,10 +11,26 @@ them on as they are. The usual smach state declares its own::
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypedDict
 
-STATE_KEYS = ("outcomes", "input_keys", "output_keys", "io_keys")
-"""Options every state of the framework has, in the order of smach's constructor."""
+
+class StateKeys(TypedDict, total=False):
+    """Options every state of the framework has, in the order of smach's constructor."""
+
+    outcomes: Sequence[str]
+    input_keys: Sequence[str]
+    output_keys: Sequence[str]
+    io_keys: Sequence[str]
+
+
+STATE_KEYS = tuple(StateKeys.__annotations__)
+KEY_MEANINGS = {
+    "outcomes": "First positive, last negative.",
+    "input_keys": "Userdata that is read.",
+    "output_keys": "Userdata that is written.",
+    "io_keys": "Userdata that is read and written.",
+}
 
 _REGISTERS = {f"register_{key}": key for key in STATE_KEYS}
 _COPIES = ("list", "tuple")
@@ -40,11 +56,13 @@ def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str,
         if isinstance(item, ast.Call) and isinstance(item.func, ast.Attribute) and item.func.attr == "__init__"
     ]
     options = {argument.arg for argument in (*constructor.args.args, *constructor.args.kwonlyargs)}
+    passed_on = keys_argument(constructor)
+    uses = sum(isinstance(item, ast.Name) and item.id == passed_on for item in ast.walk(constructor))
     found: dict[str, Names] = {}
-    if len(calls) > 1:
+    if len(calls) > 1 or uses > 1:
         found = dict.fromkeys(STATE_KEYS)
     elif calls:
-        given, rest_unknown = _given(calls[0], of_smach)
+        given, rest_unknown = _given(calls[0], of_smach, passed_on)
         for key in STATE_KEYS:
             if key in given and not _is_option(given[key], key):
                 found[key] = _names(given[key], aliases)
@@ -53,12 +71,23 @@ def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str,
     return found | dict.fromkeys(_changed(constructor))
 
 
-def _given(call: ast.Call, of_smach: bool) -> tuple[dict[str, ast.expr], bool]:
+def keys_argument(constructor: ast.FunctionDef) -> str | None:
+    """Returns the name of the argument ``**keys: Unpack[StateKeys]`` of a constructor, None when it has none."""
+    match constructor.args.kwarg:
+        case ast.arg(arg=name, annotation=ast.Subscript(value=ast.Name("Unpack"), slice=ast.Name("StateKeys"))):
+            return name
+    return None
+
+
+def _given(call: ast.Call, of_smach: bool, passed_on: str | None) -> tuple[dict[str, ast.expr], bool]:
     """Returns the arguments of a call of the base's constructor, and whether it may be given others."""
     is_super = isinstance(call.func, ast.Attribute) and isinstance(call.func.value, ast.Call)
     positional = call.args if is_super else call.args[1:]
     given = {str(item.arg): item.value for item in call.keywords if item.arg is not None}
-    starred = any(isinstance(item, ast.Starred) for item in positional) or any(not item.arg for item in call.keywords)
+    mappings = [item.value for item in call.keywords if not item.arg]
+    starred = any(isinstance(item, ast.Starred) for item in positional) or any(
+        not (isinstance(value, ast.Name) and value.id == passed_on) for value in mappings
+    )
     if of_smach and not starred:
         given.update(zip(STATE_KEYS, positional, strict=False))
     return given, starred or not of_smach

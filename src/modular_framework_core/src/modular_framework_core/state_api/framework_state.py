@@ -7,9 +7,10 @@ services and actions through ``modular_framework_ros.calls`` below it, end when 
 written as::
 
     class OpenDoor(FrameworkState):
-        def __init__(self, door_name, timeout=5.0, outcomes=("success", "fail"),
-                     input_keys=(), output_keys=(), io_keys=("arm_commander",)):
-            super().__init__(outcomes, input_keys, output_keys, io_keys)
+        DEFAULT_IO_KEYS = ("arm_commander",)
+
+        def __init__(self, door_name: str, timeout: Positive = 5.0, **keys: Unpack[StateKeys]):
+            super().__init__(**keys)
             ...
 
         def execute(self, userdata):
@@ -24,7 +25,7 @@ import functools
 import threading
 import time
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, ClassVar
 
 import smach
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
@@ -38,10 +39,13 @@ class FrameworkState(smach.State):
     """A state whose first outcome is the positive one and whose last outcome is the negative one.
 
     Attributes:
+        DEFAULT_IO_KEYS: Userdata keys that the state reads and writes unless it is given other ``io_keys``.
         outcomes: The outcomes in the order they were declared.
         reason: Why the last execution did not succeed; "" after a success or before the first execution.
         feedback: What the state is doing now, in words, for whoever watches the task; a state may set it while it runs.
     """
+
+    DEFAULT_IO_KEYS: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Checks options against their annotations; lets a request to stop end the waits in ``execute``."""
@@ -56,7 +60,7 @@ class FrameworkState(smach.State):
         outcomes: Iterable[str] = DEFAULT_OUTCOMES,
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        io_keys: Iterable[str] | None = None,
     ) -> None:
         """Declares the interface of the state.
 
@@ -65,7 +69,7 @@ class FrameworkState(smach.State):
             input_keys: Userdata keys that are only read (ordinary Python objects arrive read-only).
             output_keys: Userdata keys that are only written.
             io_keys: Userdata keys that are read and written; commanders and clients, whose methods the state
-                calls, must be declared here.
+                calls, must be declared here. None for ``DEFAULT_IO_KEYS``.
 
         Raises:
             ValueError: When fewer than two different outcomes are given.
@@ -77,7 +81,10 @@ class FrameworkState(smach.State):
                 "the first for success and the last for failure, for example [success, fail]"
             )
         super().__init__(
-            outcomes=names, input_keys=list(input_keys), output_keys=list(output_keys), io_keys=list(io_keys)
+            outcomes=names,
+            input_keys=list(input_keys),
+            output_keys=list(output_keys),
+            io_keys=list(self.DEFAULT_IO_KEYS if io_keys is None else io_keys),
         )
         self.outcomes = names
         self.reason = ""

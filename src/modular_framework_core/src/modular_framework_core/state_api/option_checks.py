@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from collections.abc import Mapping as MappingABC
 from types import SimpleNamespace
-from typing import Any, get_type_hints
+from typing import Any, Unpack, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -71,7 +71,11 @@ def declared_types(constructor: Callable[..., None]) -> dict[str, OptionType]:
     """Returns the types of a constructor's options, by name, as its annotations say once Python has evaluated them."""
     written = inspect.unwrap(constructor)
     hints = getattr(written, "__annotations__", {})
-    return {name: from_hint(_evaluated(hint, getattr(written, "__globals__", {}))) for name, hint in hints.items()}
+    types: dict[str, Any] = {}
+    for name, hint in hints.items():
+        evaluated = _evaluated(hint, getattr(written, "__globals__", {}))
+        types |= get_type_hints(get_args(evaluated)[0]) if get_origin(evaluated) is Unpack else {name: evaluated}
+    return {name: from_hint(hint) for name, hint in types.items()}
 
 
 def _evaluated(hint: Any, names: dict[str, Any]) -> Any:

@@ -7,7 +7,7 @@ import inspect
 import re
 import textwrap
 
-from modular_framework_core.state_api.constructor_keys import STATE_KEYS
+from modular_framework_core.state_api.constructor_keys import KEY_MEANINGS, STATE_KEYS
 from modular_framework_core.task_constructor.generator import GenerationError, literal
 from modular_framework_core.task_constructor.machine_keys import MachineKey, machine_keys
 from modular_framework_core.task_constructor.state_catalogue import StateOption, StateSource
@@ -16,6 +16,7 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateS
 _WIDTH = 110
 _SECTION = re.compile(r"^(Args|Arguments|Raises|Returns|Attributes|Example|Examples):\s*$", re.MULTILINE)
 _ENTRY = re.compile(r"^(\w+)(?: \([^)]*\))?:\s*(.*)$")
+_STATE_KEYS_ENTRY = "**keys"
 
 
 def explain(source: StateSource) -> str:
@@ -52,14 +53,19 @@ def explain_template(template: TemplateSource) -> str:
 
 
 def option_meanings(doc: str) -> dict[str, str]:
-    """Returns the text of the section ``Args`` of a docstring about each option, on one line each."""
+    """Returns the text of the section ``Args`` of a docstring about each option, on one line each.
+
+    An entry ``**keys`` stands for the outcomes and userdata keys that every state has.
+    """
     parts = _SECTION.split(inspect.cleandoc(doc))
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
     meanings: dict[str, str] = {}
     name = ""
     for line in textwrap.dedent(sections.get("Args", sections.get("Arguments", ""))).splitlines():
         entry = _ENTRY.match(line)
-        if entry:
+        if line.startswith(_STATE_KEYS_ENTRY):
+            name, meanings = "", meanings | KEY_MEANINGS
+        elif entry:
             name, meanings[entry[1]] = entry[1], entry[2].strip()
         elif name and line.startswith(" "):
             meanings[name] = f"{meanings[name]} {line.strip()}"

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import ast
 import functools
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from modular_framework_core.state_api.constructor_keys import STATE_KEYS, own_keys
-from modular_framework_core.state_api.option_annotations import from_annotation, uses_in
+from modular_framework_core.state_api.constructor_keys import STATE_KEYS, keys_argument, own_keys
+from modular_framework_core.state_api.option_annotations import from_annotation, from_hint, uses_in
 from modular_framework_core.state_api.option_types import Anything, OptionType
 from modular_framework_core.state_api.option_uses import Use
 from modular_framework_core.task_constructor.state_imports import missing_imports
@@ -24,6 +24,8 @@ BASE_DEFAULTS: dict[str, tuple[str, ...]] = {
     "State": (),
 }
 """Default outcomes of the base classes a state may leave its constructor to."""
+
+_NAMES = from_hint(Sequence[str])
 
 
 class StateSourceError(Exception):
@@ -168,6 +170,8 @@ def _read_state(name: str, file: Path) -> StateSource:
     aliases = {**_imported(tree, file), **_aliases(tree)}
     options, takes_any = _constructor_options(classes[wanted], classes, aliases)
     is_ours = _is_framework_state(classes[wanted], classes)
+    if is_ours and "io_keys" in options and options["io_keys"].default_known and options["io_keys"].default is None:
+        options["io_keys"] = _default_io_keys(classes[wanted], classes, aliases)
     doc = ast.get_docstring(classes[wanted]) or ""
     return StateSource(
         name,
@@ -237,15 +241,38 @@ def _constructor_options(
     """Returns the options of a class and whether it takes others: its own constructor's, or that of its base."""
     for item in node.body:
         if isinstance(item, ast.FunctionDef) and item.name == "__init__":
-            return _arguments(item.args, aliases)
+            options, takes_any = _arguments(item.args, aliases)
+            if not keys_argument(item):
+                return options, takes_any
+            inherited, takes_any = _base_options(node, classes, aliases)
+            return options | {key: inherited[key] for key in STATE_KEYS if key in inherited}, takes_any
+    return _base_options(node, classes, aliases)
+
+
+def _base_options(
+    node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
+) -> tuple[dict[str, StateOption], bool]:
+    """Returns the options of the constructor of a class's base, and whether it takes others."""
     for base in node.bases:
         base_name = _base_name(base)
         if base_name in classes and base_name != node.name:
             return _constructor_options(classes[base_name], classes, aliases)
         if base_name in BASE_DEFAULTS:
-            defaults: dict[str, tuple[str, ...]] = {"outcomes": BASE_DEFAULTS[base_name]}
-            return {key: StateOption(key, False, defaults.get(key, ()), True) for key in STATE_KEYS}, False
+            defaults = {"outcomes": BASE_DEFAULTS[base_name], "io_keys": None}
+            return {key: StateOption(key, False, defaults.get(key, ()), True, _NAMES) for key in STATE_KEYS}, False
     return {}, True
+
+
+def _default_io_keys(node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]) -> StateOption:
+    """Returns the option ``io_keys`` with the ``DEFAULT_IO_KEYS`` of a class, or those of its base, as its default."""
+    for item in node.body:
+        match item:
+            case ast.Assign(targets=[ast.Name("DEFAULT_IO_KEYS")], value=value):
+                return replace(_option(ast.arg("io_keys"), value, aliases), type=_NAMES)
+    inner = next((name for name in map(_base_name, node.bases) if name in classes and name != node.name), None)
+    if inner is None:
+        return StateOption("io_keys", False, (), True, _NAMES)
+    return _default_io_keys(classes[inner], classes, aliases)
 
 
 def _own_keys(

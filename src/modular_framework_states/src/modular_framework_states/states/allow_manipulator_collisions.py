@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Unpack
 
 import rospy
 
 from modular_framework_core.managers.ros_acm_services import apply_matrix
 from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest, ModifyACM, ModifyACMRequest
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
@@ -37,10 +38,7 @@ class AllowManipulatorCollisions(FrameworkState):
         objects: Names of the objects; none means all that are known: those that were added and, in simulation, every
             object that is free to move. ``userdata`` takes the object of ``selected_grasp``.
         links: Names of links of the robot, instead of those of the manipulator.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
     def __init__(
@@ -49,12 +47,9 @@ class AllowManipulatorCollisions(FrameworkState):
         collision_type: Literal["", "self-collision", "object-collision"] = "",
         objects: Objects = (),
         links: Sequence[str] = (),
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         if links and not collision_type:
             raise ValueError("AllowManipulatorCollisions: links are of use with a collision_type only; give one")
         self._type, self._allow, self._links = collision_type, bool(allow), list(links)

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Unpack
 
 import actionlib
 import roslib.message
@@ -12,6 +12,7 @@ import rospy
 import rostopic
 from actionlib_msgs.msg import GoalStatus
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result, wait_until
@@ -39,11 +40,7 @@ class CallAction(FrameworkState):
         keep: Userdata key to the field of the result that it receives; the keys must be output keys.
         timeout: Longest wait for the end of the goal [s]; a goal that takes longer is cancelled.
         server_timeout: Longest wait for the action server [s].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
-            ``result`` receives the result when it is listed.
+        **keys: Outcomes and userdata keys of any state; ``result`` receives the result if it is an output key.
     """
 
     def __init__(
@@ -56,12 +53,9 @@ class CallAction(FrameworkState):
         outcome_field: str = "",
         outcome_values: OutcomeValues | None = None,
         keep: KeptFields | None = None,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._name, self._goal, self._expected = str(action_name), dict(goal or {}), dict(expect or {})
         self._timeout_s, self._server_timeout_s = float(timeout), float(server_timeout)
         self._rules = AnswerRules(outcome_field, dict(outcome_values or {}), dict(keep or {}))

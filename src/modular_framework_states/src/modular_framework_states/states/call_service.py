@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import rospy
 import rosservice
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, call_service, wait_until
@@ -36,11 +36,7 @@ class CallService(FrameworkState):
             is a failure.
         keep: Userdata key to the field of the answer that it receives; the keys must be output keys.
         timeout: Longest wait for the service, and again for its answer [s].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
-            ``response`` receives the answer when it is listed.
+        **keys: Outcomes and userdata keys of any state; ``response`` receives the answer if it is an output key.
     """
 
     def __init__(
@@ -52,12 +48,9 @@ class CallService(FrameworkState):
         outcome_field: str = "",
         outcome_values: OutcomeValues | None = None,
         keep: KeptFields | None = None,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._name, self._request, self._expected = str(service_name), dict(request or {}), dict(expect or {})
         self._timeout_s = float(timeout)
         self._rules = AnswerRules(outcome_field, dict(outcome_values or {}), dict(keep or {}))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 import rospy
@@ -13,6 +13,7 @@ from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest, GetPositi
 from scipy.spatial.transform import Rotation
 
 from modular_framework_core.commander.moveit_requests import error_name, robot_state
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Limits, Share, Vector
 from modular_framework_core.state_api.option_uses import Named
@@ -33,11 +34,10 @@ class CartesianMove(FrameworkState):
         min_fraction: Share of the line that must be free; anything less is not moved at all.
         speed: Bound on the speed of the tip [m/s]; 0 for none.
         avoid_collisions: False moves through contacts on purpose.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+        **keys: Outcomes and userdata keys of any state.
     """
+
+    DEFAULT_IO_KEYS = ("arm_commander",)
 
     def __init__(
         self,
@@ -48,12 +48,9 @@ class CartesianMove(FrameworkState):
         min_fraction: Share = 1.0,
         speed: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 0.0,
         avoid_collisions: bool = True,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("arm_commander",),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         if bool(pose_name) == (offset is not None):
             raise ValueError("CartesianMove: give either pose_name or offset")
         self._pose_name, self._offset, self._in_tip = pose_name, offset, offset_in_tip

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Limits
 
@@ -18,22 +18,12 @@ class Counter(FrameworkState):
 
     Args:
         count: How many times it is positive.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
-            ``counter`` receives how often it was passed, from 1, when it is listed.
+        **keys: Outcomes and userdata keys of any state; ``counter`` receives how often it was passed, from 1, if it is
+            an output key.
     """
 
-    def __init__(
-        self,
-        count: Annotated[int, Limits(at_least=1)],
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, count: Annotated[int, Limits(at_least=1)], **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._count, self._passed = int(count), 0
 
     def execute(self, userdata: Any) -> str:

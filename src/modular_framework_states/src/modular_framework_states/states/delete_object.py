@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 from modular_framework_core.scene.manage_object import request_to_delete
 from modular_framework_core.scene.ros_manage_object import RefusedError, delete
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 
 
@@ -16,21 +16,11 @@ class DeleteObject(FrameworkState):
 
     Args:
         object_name: Name of the object.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
-    def __init__(
-        self,
-        object_name: str,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, object_name: str, **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._object_name = object_name
 
     def execute(self, userdata: Any) -> str:

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 import rospy
@@ -14,6 +14,7 @@ from moveit_msgs.srv import GetStateValidity, GetStateValidityRequest
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_core.commander.moveit_requests import robot_state
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative, Positive
 from modular_framework_core.state_api.option_uses import Named
@@ -35,23 +36,19 @@ class ExecuteTrajectory(FrameworkState):
             ``selected_trajectory`` is taken instead when it is an input key.
         step: Distance of the collision checks [rad or m]; 0 leaves them out.
         goal_tolerance: Greatest distance from the last point that counts as there [rad or m].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+        **keys: Outcomes and userdata keys of any state.
     """
+
+    DEFAULT_IO_KEYS = ("arm_commander",)
 
     def __init__(
         self,
         trajectory_name: Annotated[str, Named("trajectory")] = "",
         step: NotNegative = 0.05,
         goal_tolerance: Positive = 0.03,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("arm_commander",),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._name, self._step, self._goal_tolerance = trajectory_name, float(step), float(goal_tolerance)
 
     def execute(self, userdata: Any) -> str:

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
@@ -20,23 +20,15 @@ class Grasp(FrameworkState):
         grasp_name: Name of the grasp; empty takes the oldest anonymous one. Userdata ``selected_grasp`` is taken
             instead when it is an input key.
         timeout: Longest wait for the end of the motion [s].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
+        **keys: Outcomes and userdata keys of any state.
     """
 
+    DEFAULT_IO_KEYS = ("manipulator_controller_client", "max_torque")
+
     def __init__(
-        self,
-        grasp_type: Stage,
-        grasp_name: str = "",
-        timeout: Positive = 60.0,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque"),
+        self, grasp_type: Stage, grasp_name: str = "", timeout: Positive = 60.0, **keys: Unpack[StateKeys]
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._type, self._name, self._timeout_s = grasp_type, grasp_name, float(timeout)
 
     def execute(self, userdata: Any) -> str:

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Unpack
 
 from modular_framework_core.commander.robot_groups import RobotModelError
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Finite, Positive, Share
 from modular_framework_core.state_api.option_uses import Named
@@ -23,11 +24,10 @@ class Gripper(FrameworkState):
         grip: True closes on an object: it is positive when something stops the fingers before they are shut.
         torque: Share of the greatest torque.
         timeout: Longest wait for the end of the motion [s].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
+        **keys: Outcomes and userdata keys of any state.
     """
+
+    DEFAULT_IO_KEYS = ("manipulator_controller_client", "max_torque")
 
     def __init__(
         self,
@@ -36,12 +36,9 @@ class Gripper(FrameworkState):
         grip: bool = False,
         torque: Share = 1.0,
         timeout: Positive = 30.0,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque"),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         if bool(posture) == bool(positions):
             raise ValueError("Gripper: give either posture or positions")
         self._posture, self._positions = posture, dict(positions or {})

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
 import rospy
 from std_msgs.msg import String
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Finite
 from modular_framework_core.state_api.option_uses import Key
@@ -26,10 +26,7 @@ class LogMetric(FrameworkState):
         value: The figure; left out it is taken from the userdata key ``from_key``.
         from_key: Userdata key that holds the figure; must be an input key.
         unit: Its unit.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
     def __init__(
@@ -38,12 +35,9 @@ class LogMetric(FrameworkState):
         value: Finite | None = None,
         from_key: Annotated[str, Key("input")] = "",
         unit: str = "",
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         if (value is None) == (not from_key):
             raise ValueError("LogMetric: give either value or from_key")
         if from_key and from_key not in self.get_registered_input_keys():

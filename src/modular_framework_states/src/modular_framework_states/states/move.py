@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_core.state_api.option_uses import Named
@@ -21,23 +21,19 @@ class Move(FrameworkState):
             when it is an input key.
         start_tolerance: Greatest distance of a joint from the first point of the plan before the motion [rad or m].
         goal_tolerance: Greatest distance of a joint from the last point afterwards [rad or m].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+        **keys: Outcomes and userdata keys of any state.
     """
+
+    DEFAULT_IO_KEYS = ("arm_commander",)
 
     def __init__(
         self,
         plan_name: Annotated[str, Named("plan")] = "",
         start_tolerance: NotNegative = 0.02,
         goal_tolerance: NotNegative = 0.03,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("arm_commander",),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._plan_name = plan_name
         self._start_tolerance, self._goal_tolerance = float(start_tolerance), float(goal_tolerance)
 

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Unpack
 
 from modular_framework_core.commander.arm_commander import CommanderError
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_uses import FROM_USERDATA, Named, kind_of
 from modular_framework_states.grasp_stages import (
@@ -36,11 +37,10 @@ class Plan(FrameworkState):
         starting_state_type: As the target's; empty starts from where the arm is.
         starting_state_name: As the target's.
         group: Planning group to plan for; empty for that of the arm commander (``arm_group_name``).
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written; ``selected_plan`` receives the plan when it is listed.
-        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+        **keys: Outcomes and userdata keys of any state; ``selected_plan`` receives the plan if it is an output key.
     """
+
+    DEFAULT_IO_KEYS = ("arm_commander",)
 
     def __init__(
         self,
@@ -50,12 +50,9 @@ class Plan(FrameworkState):
         starting_state_type: StateType | Literal[""] = "",
         starting_state_name: StartName = "",
         group: Annotated[str, Named("group")] = "",
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("arm_commander",),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._target_type, self._target_name = target_state_type, target_state_name
         self._start_type, self._start_name = starting_state_type, starting_state_name
         self._plan_name, self._group = plan_name, group

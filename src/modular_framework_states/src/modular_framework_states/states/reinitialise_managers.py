@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_states.manager_clients import Kind, ManagerError, all_kinds, file_request
 
@@ -15,21 +16,11 @@ class ReinitialiseManagers(FrameworkState):
 
     Args:
         kinds: Which managers; all of them by default.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
-    def __init__(
-        self,
-        kinds: Sequence[Kind] = (),
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, kinds: Sequence[Kind] = (), **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._kinds = tuple(kinds) or all_kinds()
 
     def execute(self, userdata: Any) -> str:

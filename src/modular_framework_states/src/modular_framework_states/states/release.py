@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
 import rospy
 
 from modular_framework_core.commander.robot_groups import RobotModelError
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 from modular_framework_core.state_api.option_uses import Named
@@ -30,22 +30,15 @@ class Release(FrameworkState):
     Args:
         posture: Name of a state of the manipulator's planning group, as wide as it opens.
         timeout: Longest wait for the end of the motion, and again for the simulation to let go [s].
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``manipulator_controller_client`` and ``max_torque``.
+        **keys: Outcomes and userdata keys of any state.
     """
 
+    DEFAULT_IO_KEYS = ("manipulator_controller_client", "max_torque")
+
     def __init__(
-        self,
-        posture: Annotated[str, Named("posture")] = "open",
-        timeout: Positive = 30.0,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("manipulator_controller_client", "max_torque"),
+        self, posture: Annotated[str, Named("posture")] = "open", timeout: Positive = 30.0, **keys: Unpack[StateKeys]
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._posture, self._timeout_s = posture, float(timeout)
 
     def execute(self, userdata: Any) -> str:

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_uses import Key, Named, kind_of
 from modular_framework_states.manager_clients import ManagerError, fetch
@@ -26,22 +27,11 @@ class Select(FrameworkState):
     Args:
         message_type: joint_state, trajectory, plan, pose, grasp, pregrasp or postgrasp.
         message_names: Names to take one after the other; None takes anonymous messages.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written; must hold ``selected_<type>``.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state; ``selected_<type>`` must be an output key.
     """
 
-    def __init__(
-        self,
-        message_type: MessageType,
-        message_names: Names = None,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, message_type: MessageType, message_names: Names = None, **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._kind = kind_of(message_type)
         self._key = f"selected_{self._kind}"
         self._names = [message_names] if isinstance(message_names, str) else list(message_names or [""])

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Limits, Share
 from modular_framework_core.state_api.option_uses import Named
@@ -20,11 +20,10 @@ class SetPlanner(FrameworkState):
         attempts: How often a plan is tried for.
         speed_factor: Share of the joints' velocity and acceleration limits.
         group: Planning group whose settings change; empty for that of the arm commander (``arm_group_name``).
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written; must hold ``arm_commander``.
+        **keys: Outcomes and userdata keys of any state.
     """
+
+    DEFAULT_IO_KEYS = ("arm_commander",)
 
     def __init__(
         self,
@@ -33,12 +32,9 @@ class SetPlanner(FrameworkState):
         attempts: Annotated[int, Limits(at_least=1)] | None = None,
         speed_factor: Share | None = None,
         group: Annotated[str, Named("group")] = "",
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = ("arm_commander",),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._planner_id, self._group = planner_id, group
         self._settings = {
             "set_planning_time": planning_time,

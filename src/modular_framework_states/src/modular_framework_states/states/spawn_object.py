@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import rospy
 
 from modular_framework_core.scene.manage_object import ObjectRequestError, request_to_spawn
 from modular_framework_core.scene.ros_manage_object import RefusedError, spawn
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Vector
 
@@ -23,10 +23,7 @@ class SpawnObject(FrameworkState):
         position: x, y, z [m].
         orientation: Roll, pitch, yaw [rad].
         reference_frame: Frame of the pose.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
     def __init__(
@@ -36,12 +33,9 @@ class SpawnObject(FrameworkState):
         position: Vector = (0.0, 0.0, 0.0),
         orientation: Vector = (0.0, 0.0, 0.0),
         reference_frame: str = "world",
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._object_type, self._object_name = object_type, object_name or object_type
         self._position, self._orientation = tuple(position), tuple(orientation)
         self._frame = reference_frame

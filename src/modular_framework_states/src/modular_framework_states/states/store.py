@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_states.manager_clients import Kind, ManagerError, file_request
 
@@ -16,22 +16,11 @@ class Store(FrameworkState):
     Args:
         kind: Kind of messages.
         path: A .yaml file; a relative path starts in the folder of the managers, below ``$ROS_HOME``.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
-    def __init__(
-        self,
-        kind: Kind,
-        path: str,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, kind: Kind, path: str, **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._kind, self._path = kind, str(path)
 
     def execute(self, userdata: Any) -> str:

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import rospy
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative, Positive
 
@@ -19,22 +19,11 @@ class Wait(FrameworkState):
         duration: How long [s].
         timeout: Longest wait of wall time [s], for a clock that stands still; None waits three times the duration and
             ten seconds more.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
-    def __init__(
-        self,
-        duration: NotNegative,
-        timeout: Positive | None = None,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, duration: NotNegative, timeout: Positive | None = None, **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._duration_s = float(duration)
         self._timeout_s = 3.0 * self._duration_s + 10.0 if timeout is None else float(timeout)
 

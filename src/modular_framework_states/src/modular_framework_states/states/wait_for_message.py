@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Unpack
 
 import roslib.message
 import rospy
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 from modular_framework_states.answers import MessageFields
@@ -26,11 +27,7 @@ class WaitForMessage(FrameworkState):
         timeout: Longest wait [s]; None waits without limit.
         expect: Field to value, nested as the message is; other messages are passed over. A text ``userdata.<key>``
             stands for what userdata has there, and ``userdata.<key>.<field>`` for a field of it.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
-            ``message`` receives the message when it is listed.
+        **keys: Outcomes and userdata keys of any state; ``message`` receives the message if it is an output key.
     """
 
     def __init__(
@@ -38,12 +35,9 @@ class WaitForMessage(FrameworkState):
         topic_name: str,
         timeout: Positive | None = None,
         expect: MessageFields | None = None,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
+        **keys: Unpack[StateKeys],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+        super().__init__(**keys)
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._expected = dict(expect or {})

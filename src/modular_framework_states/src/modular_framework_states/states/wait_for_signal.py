@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import rospy
 from std_msgs.msg import Bool, String
 
+from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 
@@ -25,22 +25,11 @@ class WaitForSignal(FrameworkState):
     Args:
         topic_name: Topic of the signal (std_msgs/Bool).
         timeout: Longest wait [s]; None waits without limit, until stopped.
-        outcomes: First positive, last negative.
-        input_keys: Userdata that is read.
-        output_keys: Userdata that is written.
-        io_keys: Userdata that is read and written.
+        **keys: Outcomes and userdata keys of any state.
     """
 
-    def __init__(
-        self,
-        topic_name: str,
-        timeout: Positive | None = None,
-        outcomes: Sequence[str] = ("success", "fail"),
-        input_keys: Sequence[str] = (),
-        output_keys: Sequence[str] = (),
-        io_keys: Sequence[str] = (),
-    ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, io_keys)
+    def __init__(self, topic_name: str, timeout: Positive | None = None, **keys: Unpack[StateKeys]) -> None:
+        super().__init__(**keys)
         self._topic = str(topic_name)
         self._timeout_s = None if timeout is None else float(timeout)
         self._lock = threading.Lock()
