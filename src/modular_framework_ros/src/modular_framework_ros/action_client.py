@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A simple action client that does not lose the answer of a quick server."""
+"""A simple action client that does not lose the answer of a fast server."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An action server whose clients learn of the end of every goal, also of one that ends at once."""
+"""An action server that reports the end of every goal to its client, also of a goal that ends at once."""
 
 from __future__ import annotations
 

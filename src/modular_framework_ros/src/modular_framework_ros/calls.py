@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls services and actions of other nodes without ever waiting for ever, or longer than a task that is stopped.
+"""Calls services and actions of other nodes; every wait has a timeout and ends when the task is stopped.
 
 All limits are wall time: a simulation that is paused or has died stops the clock of ROS, and every wait on it.
 """
@@ -24,7 +24,7 @@ POLL_PERIOD_S = 0.01
 STOP_PERIOD_S = 0.05
 
 CANCEL_WAIT_S = 0.5
-"""How long the answer to a cancelled goal is waited for [s]; a task has to end within a second of a request to stop."""
+"""Longest wait for the result of a cancelled goal [s]; a task has to end within a second of a request to stop."""
 
 
 class CallError(RuntimeError):

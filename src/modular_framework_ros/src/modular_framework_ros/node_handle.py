@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where controllers and hardware read their parameters from, without knowing whether a ROS master is there.
+"""The parameters of controllers and hardware, readable with and without a ROS master.
 
 `NodeHandle` is the small part of a ROS node handle they need. `MappingNodeHandle` serves it from a plain mapping
 (tests, programs without a master); the ROS edge has one that asks the parameter server.

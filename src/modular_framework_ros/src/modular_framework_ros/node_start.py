@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Begins a node so that a launch that ends meanwhile does not print where its import was interrupted."""
+"""Starts a node such that an interrupt during its imports prints no traceback."""
 
 from __future__ import annotations
 

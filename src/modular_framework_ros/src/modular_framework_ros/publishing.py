@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes from threads that are still at work while the node goes down, without an error nobody can use."""
+"""Publishes from threads that still run during the shutdown of the node, without useless errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def going_down() -> bool:
 
 
 def publish(publisher: rospy.Publisher, message: Any) -> None:
-    """Publishes a message; of a topic that is closed because the node goes down nothing more is said.
+    """Publishes a message; a topic that is closed because the node shuts down is no error.
 
     Raises:
         rospy.ROSException: the topic is closed, or the message does not fit, while the node runs on.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets settings be adjusted while a node runs, by dynamic_reconfigure, without the code its generator makes."""
+"""Serves dynamic_reconfigure for settings of a running node, without generated code."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ class Reconfiguration:
         Args:
             namespace: absolute, or beginning with "~".
             table: the settings that may be changed.
-            holder: what has the settings.
-            attribute: where it has them: a frozen dataclass that is replaced as a whole, so that its readers see the
+            holder: the object that has the settings.
+            attribute: its attribute with them: a frozen dataclass that is replaced, never changed: readers see the
                 old settings or the new ones, never some of each.
         """
         self._namespace, self._table = namespace, tuple(table)
@@ -75,7 +75,7 @@ class Reconfiguration:
         """Start to serve."""
         settings = getattr(self._holder, self._attribute)
         defaults = {item.name: getattr(settings, item.name) for item in self._table}
-        for name, value in defaults.items():  # the server reads them, and knows no faulty ones
+        for name, value in defaults.items():  # the server reads these parameters and does not check them
             rospy.set_param(f"{self._namespace}/{name}", value)
         self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
 

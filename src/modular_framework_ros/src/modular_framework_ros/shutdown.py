@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a node that handles its signals itself finish its work before ROS goes down, also after `rosnode kill`."""
+"""Lets a node that handles its signals itself finish its work before ROS shuts down, also after `rosnode kill`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def hold_shutdown(ended: threading.Event, longest_s: float = LONGEST_END_S) -> t
     """Makes a shutdown of this node set `ended` and then wait; topics and services work as long as it waits.
 
     Args:
-        ended: tells the main thread that it is to end.
+        ended: set to request that the main thread ends.
         longest_s: how long the shutdown waits [s].
 
     Returns:
-        What the main thread sets when its work is done, before it asks for the shutdown itself.
+        An event that the main thread sets when its work is done, before it requests the shutdown itself.
     """
     finished = threading.Event()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waits for what other nodes bring at the start: as long as a slow machine needs, and never without saying for what."""
+"""Waits at the start for other nodes, long enough for a slow machine, and logs what is waited for."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def start_timeout() -> float:
 
 
 class WaitReport:
-    """Says every ten seconds what is waited for.
+    """Logs every ten seconds what is waited for.
 
     Args:
         what: Name of what is missing, or what gives it.
@@ -43,7 +43,7 @@ class WaitReport:
         self._begun_s = self._said_s = time.monotonic()
 
     def remind(self) -> None:
-        """Says it when ten seconds have passed since the last time."""
+        """Logs it when ten seconds have passed since the last time."""
         now_s = time.monotonic()
         if now_s - self._said_s >= REPORT_PERIOD_S:
             self._said_s = now_s

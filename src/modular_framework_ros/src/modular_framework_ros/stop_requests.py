@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells calls that wait whether the state that made them has been asked to stop, however deep below it they are."""
+"""Passes a state's request to stop to the waits in its thread, at any depth of the call stack."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _THREAD = threading.local()
 
 @contextmanager
 def stoppable(requested: Callable[[], bool]) -> Iterator[None]:
-    """Makes calls of this thread that wait heed a request to stop, as long as the context lasts.
+    """Makes waiting calls of this thread end on a request to stop, as long as the context lasts.
 
     Args:
         requested: Whether there is such a request; asked several times a second.
@@ -26,6 +26,6 @@ def stoppable(requested: Callable[[], bool]) -> Iterator[None]:
 
 
 def stop_requested() -> bool:
-    """Returns whether what this thread is doing has been asked to stop; outside of ``stoppable`` it never has."""
+    """Returns whether this thread has been asked to stop; always False outside of ``stoppable``."""
     requested: Callable[[], bool] | None = getattr(_THREAD, "requested", None)
     return requested is not None and requested()

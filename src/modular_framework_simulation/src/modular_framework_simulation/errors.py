@@ -47,4 +47,4 @@ class DuplicateModelError(SimulationError):
 
 
 class LoopTimeoutError(SimulationError):
-    """The simulation loop did not get to a request in time."""
+    """The simulation loop did not process a request in time."""

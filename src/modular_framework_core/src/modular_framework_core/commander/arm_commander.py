@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plans and executes arm motions through move_group, so that several states may share one commander.
 
-Every call carries its own start state and target; nothing is remembered between calls but the planner's settings.
+Every call carries its own start state and target; only the planner's settings are kept between calls.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ IK_TIMEOUT_S = 1.0
 
 
 class CommanderError(RuntimeError):
-    """The commander cannot work; the text names what is missing."""
+    """The commander cannot be used; the text names what is missing."""
 
 
 class ArmCommander:
@@ -207,7 +207,7 @@ class ArmCommander:
         return sorted(names)
 
     def set_num_planning_attempts(self, attempts: int) -> None:
-        """Sets how often a plan is tried for.
+        """Sets the number of planning attempts.
 
         Raises:
             CommanderError: The number is below 1.
@@ -302,7 +302,7 @@ class ArmCommander:
             return IkResult({}, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
 
     def contacts(self, joints: Mapping[str, float], start: StartState = None) -> str:
-        """Says what collides with the arm at given joint positions.
+        """Returns what collides with the arm at given joint positions.
 
         Args:
             joints: {joint: position} [rad or m].
@@ -430,7 +430,7 @@ class ArmCommander:
         return group
 
     def _no_tip(self) -> str:
-        """Says that the group has no tip link; nothing when it has one."""
+        """Returns why no pose can be a target if the group has no tip link; "" when it has one."""
         return (
             ""
             if self.group.tip_link

@@ -22,8 +22,8 @@ class JointMonitor:
     Subscribers: ``joint_states`` (sensor_msgs/JointState).
 
     Args:
-        queue_size: Messages of a node that wait for the callback. Several, where joints must not be missed whose
-            states a node publishes in messages of their own; 1, where a message that waited would count as new.
+        queue_size: Length of the subscriber's queue. Above 1 where one node publishes its joints in several messages
+            and none may be missed; 1 where a queued, old message must not count as new.
     """
 
     def __init__(self, queue_size: int = 10) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the framework's own states and templates are, in devel and install space, and where it writes."""
+"""Folders of the framework's own states and templates, in devel and install space, and of the files it writes."""
 
 from __future__ import annotations
 

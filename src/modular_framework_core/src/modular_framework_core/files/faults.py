@@ -55,22 +55,22 @@ class FaultList:
         self._faults: list[Fault] = []
         self._settled: set[SourceLocation] = set()
         self.harmless = 0
-        """Number of faults in spite of which the states and userdata of the task are known."""
+        """Number of faults that do not affect the known states and userdata of the task."""
 
     def add(self, location: SourceLocation, message: str) -> None:
-        """Notes a fault, unless a fault noted with ``add_cause`` at the same location explains it."""
+        """Adds a fault, unless a fault added with ``add_cause`` at the same location explains it."""
         if location not in self._settled:
             self._faults.append(Fault(location, message))
 
     def add_cause(self, location: SourceLocation, message: str) -> None:
-        """Notes a fault of a value that cannot be read at all: more faults of that value would only follow from it."""
+        """Adds a fault of a value that cannot be read at all, and hides later faults of that value."""
         self.add(location, message)
         self._settled.add(location)
 
     def add_unknown(
         self, location: SourceLocation, what: str, found: str, allowed: Iterable[str], given: Container[str] = ()
     ) -> None:
-        """Notes a name that is none of those allowed, with the closest one where one is similar.
+        """Adds a fault for a name that is not allowed, with the closest allowed one where one is similar.
 
         Args:
             location: Where the name is.
@@ -93,7 +93,7 @@ class FaultList:
 
 
 def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
-    """Says which names are allowed: ``allowed: a, b``; ``empty`` when there are none."""
+    """Returns the allowed names as text: ``allowed: a, b``; ``empty`` when there are none."""
     names = list(dict.fromkeys(allowed))
     return f"allowed: {', '.join(names)}" if names else empty
 

@@ -16,7 +16,7 @@ from modular_framework_core.files.faults import Fault, FaultList, SourceLocation
 from modular_framework_core.files.shallow_yaml import MAX_DEPTH
 
 MAX_NODES = 500_000
-"""Largest number of values in a file after its aliases are expanded: a guard against files that blow up."""
+"""Largest number of values in a file after its aliases are expanded: a guard against exponential expansion."""
 
 _TAG = "tag:yaml.org,2002:"
 _MERGE_KEY = "<<"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads YAML that anyone may have written: what is nested too deeply is refused before it costs stack or time."""
+"""Reads untrusted YAML: too deep nesting is refused before it costs stack or time."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads YAML files entry by entry with line numbers, so that one bad entry is named and the others survive."""
+"""Reads YAML files entry by entry with line numbers, so that one bad entry is reported and the others are used."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks what a grasp command asks of the manipulator, and decides whether the manipulator reached it."""
+"""Checks a grasp command for the manipulator, and decides whether the manipulator reached it."""
 
 from __future__ import annotations
 

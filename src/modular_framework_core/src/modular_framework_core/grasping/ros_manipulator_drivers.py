@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What moves the manipulator for the grasp server.
+"""Drivers that move the manipulator for the grasp server.
 
-Its controller, whichever of the two kinds of action it offers, or a device's own driver.
+They use its ROS controller, with either kind of action, or a device's own driver.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ STALL_ERROR_CODES = (
     FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
     FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
 )
-"""How a trajectory ends whose joints are blocked; any other end is no stall."""
+"""Result codes of a trajectory whose joints are blocked; any other result is no stall."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from modular_framework_core.grasping.grasp_server import Outcome
 
 MOVED_SHARE = 0.2
-"""Fingers have moved when they came farther than this share of the tolerance."""
+"""Fingers count as moved beyond this share of the tolerance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Attempt:
 
 
 class StallEvidence:
-    """Judges stalls by what the fingers did before.
+    """Judges stalls by the earlier motions of the fingers.
 
     Args:
         tolerance: Greatest distance that counts as reached [rad or m]; it has to be a small share of the joints'
@@ -52,8 +52,8 @@ class StallEvidence:
     def judge(self, outcome: Outcome, attempt: Attempt) -> Outcome:
         """Accepts a stall only when it was not a lack of torque that kept the fingers from moving.
 
-        Some joint that is short of its target must have moved toward it, or press, or go on holding since the stall
-        before, or have moved this way earlier with no more effort: then something new is in its way.
+        Some joint short of its target must have moved toward it, or press, or still hold since the stall
+        before, or have moved this way earlier with no more effort: then a new object stops it.
 
         Args:
             outcome: Result reported by the controller.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Starts a launch and says how it ended; starts controllers and the node of the manipulator."""
+"""Runs a launch and reports how it ended; starts controllers and the node of the manipulator."""

@@ -31,7 +31,7 @@ def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
 
 
 def check_arguments(path: str, arguments: list[str]) -> None:
-    """Refuses arguments that the launch file does not have, and values that lead nowhere.
+    """Refuses arguments that the launch file does not have, and values that name missing files.
 
     Args:
         path: Launch file.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs a launch file to its end and says how it ended, which roslaunch itself does not.
+"""Runs a launch file to its end and reports how it ended, which roslaunch itself does not.
 
 roslaunch always exits with 0. Whoever starts a task from a script needs the task's own exit code, and the name of the
 node when a node died instead.
@@ -31,7 +31,7 @@ ENDINGS = {0: "the task succeeded", 1: "the task did not succeed", 2: "the task 
 
 @dataclass
 class EndWatcher(roslaunch.pmon.ProcessListener):
-    """Remembers the first process that ended badly, and how the task ended.
+    """Stores the first process that failed, and how the task ended.
 
     Attributes:
         task_name: Name of the node whose exit code is the launch's own.
@@ -113,7 +113,7 @@ def _master_port() -> int | None:
 
 
 def _verdict(watcher: EndWatcher, cause: str) -> int:
-    """Prints how it ended, below what roslaunch says of the nodes it stops; returns the exit code."""
+    """Prints how the launch ended, after roslaunch's messages about the nodes it stops; returns the exit code."""
     because = f": {cause.removeprefix('The task could not be run: ')}" if cause else ""
     if watcher.dead_node is not None:
         name, exit_code = watcher.dead_node

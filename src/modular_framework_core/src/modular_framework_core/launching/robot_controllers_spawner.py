@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a controller file asks for: which controllers, with which parameters, and what is still to do for them."""
+"""Reads controller files, and plans which of their controllers have to be loaded and started."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class ControllerFile:
 
 @dataclass(frozen=True, slots=True)
 class SpawnPlan:
-    """What is to do so that all controllers run.
+    """The loads and starts that are needed until all controllers run.
 
     Attributes:
-        load: Controllers the manager does not know yet.
-        start: Controllers that do not run yet.
+        load: Controllers that are not loaded yet.
+        start: Controllers that are not running yet.
     """
 
     load: tuple[str, ...]

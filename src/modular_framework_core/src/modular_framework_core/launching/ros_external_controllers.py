@@ -23,7 +23,7 @@ from modular_framework_core.launching.external_controllers import (
 POLL_PERIOD_S = 0.2
 STOP_TIMEOUT_S = 5.0
 END_WITH_SPAWNER = ("setpriv", "--pdeathsig", "TERM")
-"""Put before the node's command: the node gets SIGTERM when the spawner is killed, which could not stop it itself."""
+"""Prefix of the node's command: the node gets SIGTERM also when the spawner is killed and cannot stop it."""
 
 
 def main() -> int:

@@ -35,7 +35,7 @@ from modular_framework_ros.calls import CallError, call_service
 from modular_framework_ros.start_up import start_timeout
 
 CALL_TIMEOUT_S = 30.0
-"""Longest wait for the answer of the controller manager [s]; it waits 10 s itself for a loop that stands still."""
+"""Longest wait for the controller manager's answer [s]; the manager itself waits 10 s for a stopped loop."""
 
 
 class SpawnError(Exception):

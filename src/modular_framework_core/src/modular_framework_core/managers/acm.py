@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides which pairs of links and objects may touch, and changes no other pair than those of a request.
+"""Keeps the allowed collision matrix of links and objects; a request changes no other pairs than its own.
 
 The reference matrix comes from the planning scene. Objects that appear later are added to it; the manipulator may then
 be allowed to touch itself or some objects. Forbidding again restores the reference.
@@ -127,7 +127,7 @@ class AcmManager:
             return ""
 
     def reinitialise(self) -> None:
-        """Drops every permission given so far; the objects stay, for they are still there.
+        """Drops every permission given so far; the objects stay in the matrix.
 
         Raises:
             AcmError: There is no reference matrix.

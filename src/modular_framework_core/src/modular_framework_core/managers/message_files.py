@@ -58,7 +58,7 @@ def path_of(text: str, folder: Path, others: Iterable[Path] = ()) -> Path:
 
 
 def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[Any]) -> int:
-    """Writes messages in one step: the file is there as a whole or stays as it was.
+    """Writes messages to a file atomically.
 
     Args:
         path: File to write; its folder is made when it is not there.
@@ -187,7 +187,7 @@ def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any
 
 
 def _built(message_type: Any, value: Any) -> Any:
-    """Makes a message of what ``save`` writes, ten times as fast as genpy fills one.
+    """Makes a message of the output of ``save``, ten times as fast as genpy does.
 
     Raises:
         LookupError, TypeError: The value is not the mapping of all fields that ``save`` writes.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds positions in a message that are no finite numbers: no robot can go there, and no planner takes them."""
+"""Finds positions in a message that are not finite numbers, which no robot can reach and planners refuse."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _COORDINATES = ("geometry_msgs/Point", "geometry_msgs/Quaternion")
 
 
 def unusable_position(message: Any, where: str = "") -> str:
-    """Says which position of a message is not finite, and what it is; nothing when all are.
+    """Describes the first position of a message that is not finite; "" when all are.
 
     Args:
         message: Any message; its joint positions, points and orientations are checked at any depth.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Remembers which model each simulated object was made from."""
+"""Stores which model each simulated object was made from."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ObjectTypes:
             return self._types[object_name]
 
     def delete(self, object_name: str) -> None:
-        """Forgets an object.
+        """Removes an object.
 
         Raises:
             ObjectTypeError: No such object.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves the allowed collision matrix of the manipulator on the wire."""
+"""Services of the allowed collision matrix of the manipulator."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
 
 
 def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
-    """Sends a matrix to move_group, and waits until it plans with it.
+    """Sends a matrix to move_group, and waits until it is in force there.
 
     Raises:
         CallError: move_group is not there within this time [s], or does not take the matrix.
@@ -211,7 +211,7 @@ class AcmServices:
                 )
 
     def _add_simulated_objects(self) -> None:
-        """Adds what a world file or another node has put into the simulation since the last request."""
+        """Adds objects that a world file or another node has put into the simulation since the last request."""
         try:
             for name in new_movable_objects(self.manager.objects):
                 self.manager.add_object(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves message stores on the wire: the services of each kind of message, and what changed."""
+"""Services of the message stores, one set for each kind of message, and the topic of their changes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; m
 
 @dataclass(frozen=True, slots=True)
 class MessageKind:
-    """How one kind of message travels.
+    """The services and message types of one kind of message.
 
     Attributes:
         noun: Word for the message in log lines.
@@ -257,7 +257,7 @@ class MessageServices:
         return srv.ReinitManagerResponse(success=answer.success)
 
     def _read(self, file: NamedFile) -> tuple[int, list[EntryError]]:
-        """Replaces what is stored by what is usable of a file; keeps it when nothing of the file is."""
+        """Replaces the stored messages by the usable ones of a file; keeps them when the file has none."""
         named, faults = file.read(file.path)
         if faults and not named:
             return 0, faults

@@ -26,7 +26,7 @@ from modular_framework_core.managers.ros_object_type_services import ObjectTypeS
 from modular_framework_ros.start_up import start_timeout
 
 TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
-COLLECT_AFTER = 50_000  # objects; messages are freed by their counts, and five plans are some thousand objects
+COLLECT_AFTER = 50_000  # objects; messages are freed by reference counts, and five plans are a few thousand objects
 
 
 def start(node_name: str) -> list[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves the types of simulated objects on the wire."""
+"""Services of the types of simulated objects."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Adds an object to the simulation or removes it, everywhere or nowhere.
+"""Adds an object to the simulation or removes it, in all places or in none.
 
 The simulation, the map of object types and the collision matrix must agree on which objects exist. When one of them
 refuses, what was done before is undone, and the exit code says so.
@@ -49,7 +49,7 @@ def call(name: str, service_type: Any, request: Any, refusal: str = "its node lo
 
 
 def ask(name: str, service_type: Any, request: Any) -> Any:
-    """Calls a service whose refusal is an answer like any other.
+    """Calls a service whose refusal is no error.
 
     Raises:
         RefusedError: It is absent or fails.

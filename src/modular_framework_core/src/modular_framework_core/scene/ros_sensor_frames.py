@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes where the sensors stand, so that TF knows their frames."""
+"""Publishes the frames of the sensors on /tf_static."""
 
 from __future__ import annotations
 

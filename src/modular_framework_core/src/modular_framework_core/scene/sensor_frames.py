@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads where the sensors stand, as fixed transforms between frames."""
+"""Reads the poses of sensors, as fixed transforms between frames."""
 
 from __future__ import annotations
 

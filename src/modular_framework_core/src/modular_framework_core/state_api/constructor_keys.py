@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads from a state's constructor which outcomes and userdata keys it declares itself, whatever its options say.
+"""Reads from a state's constructor the outcomes and userdata keys that it declares itself, apart from its options.
 
 A state of the framework has options named ``outcomes``, ``input_keys``, ``output_keys`` and ``io_keys``, and passes
 them on as they are, most simply as ``**keys: Unpack[StateKeys]``. The usual smach state declares its own::

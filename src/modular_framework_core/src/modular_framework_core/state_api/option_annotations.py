@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads what values an option may have from its annotation: as source that is not run, or as the type itself."""
+"""Reads the allowed values of an option from its annotation: from source that is not run, or from the type itself."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which numbers and how many items an option of a state takes, declared once: in the annotation of its constructor.
+"""Limits of the numbers and lengths of an option of a state, declared once in the annotation of its constructor.
 
 ``--check`` reads it from the source before a task runs, ``--explain`` and ``--schema`` show it, and ``FrameworkState``
 holds to it where the state is made::
@@ -55,7 +55,7 @@ class Limits:
         return {name: bound for name in _BOUNDS if (bound := getattr(self, name)) is not None}
 
     def remedy(self, number: float) -> str:
-        """Says what to do about a number that is not allowed; nothing when it is."""
+        """Returns what to do about a number that is not allowed; "" when it is allowed."""
         bounded_infinity = self.bounds() and abs(number) == math.inf
         if not bounded_infinity and not abs(number) <= sys.float_info.max:
             return "write a finite number"
@@ -63,7 +63,7 @@ class Limits:
         return next((_BOUNDS[name][2].format(self.bounds()[name]) for name in broken), "")
 
     def describe(self, what: str) -> str:
-        """Says which numbers are allowed; ``what`` is "a number" or "a whole number"."""
+        """Describes the allowed numbers; ``what`` is "a number" or "a whole number"."""
         parts = [f"{name.replace('_', ' ')} {bound:g}" for name, bound in self.bounds().items()]
         if not parts:
             return what.replace("a ", "a finite ", 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an option of a state stands for beyond its value: a name that must exist, or userdata the state needs.
+"""What an option of a state refers to: a name that must exist, or userdata that the state needs.
 
 It is declared once, in the annotation of the state's constructor; ``--check`` reads it from the source::
 

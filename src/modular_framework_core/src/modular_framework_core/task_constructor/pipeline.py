@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The task constructor as one call, and its command line."""
+"""The task constructor as one function, and its command line."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds out whether Python finds the modules that a state's file imports, without importing or running any of them."""
+"""Checks that Python finds the modules that a state's file imports, without importing or running any of them."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ def _leaving(child: ChildSpec, path: str, outcome: str) -> tuple[str, str]:
 
 
 def _edge(graph: graphviz.Digraph, start: str, label: str, target: ChildSpec, path: str) -> None:
-    """Draws an arrow to a child; to a machine it ends at the frame."""
+    """Draws an arrow to a child; an arrow to a machine ends at its frame."""
     first, frame = path, {"lhead": f"cluster_{path}"} if isinstance(target, MachineSpec) else {}
     while isinstance(target, MachineSpec):
         target = target.first_states()[0]

@@ -157,7 +157,7 @@ class TaskRecorder:
     def _notify(self, number: int) -> None:
         if self._listener is None:
             return
-        with self._notify_lock:  # so that the last notification is the current state
+        with self._notify_lock:  # so that the last notification has the current states
             with self._lock:
                 record, active = self._records[number], tuple(path for path, _ in self._active.values())
             self._listener(record, active)
@@ -173,7 +173,7 @@ class TaskRecorder:
             return tuple(path for path, _ in self._active.values())
 
     def running(self) -> tuple[RunningState, ...]:
-        """Returns what the states that run now say about themselves."""
+        """Returns the running states with their elapsed times and feedback."""
         now = self.elapsed_s()
         with self._lock:
             return tuple(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fills the userdata of a framework state machine with what the framework's states expect.
+"""Fills the userdata of a framework state machine with the keys that the framework's states expect.
 
 Keys: ``selected_grasp``, ``selected_joint_state``, ``selected_trajectory``, ``selected_pose``, ``selected_plan`` (None
 until a state selects something), ``arm_commander`` (ArmCommander), ``manipulator_controller_client``

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows the state machine of a running task to viewers, without the task ever waiting for it or failing because of it.
+"""Publishes the state machine of a running task for viewers; the task never waits for this or fails because of it.
 
 Publishers: ``<node>/smach/container_structure``, ``<node>/smach/container_status`` (smach_msgs). Viewers can watch, but
 not change the task: there is no subscriber.
@@ -15,7 +15,7 @@ import rospy
 import smach
 
 START_DELAY_S = 0.3
-"""How long the start of the task has the process for itself [s]."""
+"""Delay of the publishers, so that they do not slow the start of the task down [s]."""
 
 
 def shown(name: str, factory: Callable[[], smach.Container]) -> Callable[[], smach.Container]:

@@ -54,7 +54,7 @@ STATUS_PERIOD_S = 0.5
 """Time between two messages about states that are still running [s]."""
 
 PUBLISH_TIME_S = 0.2
-"""Time for the last messages to leave the process [s]."""
+"""Time for the last messages to be sent before the process exits [s]."""
 
 _PROCESS_START = time.time()
 _UUID_EPOCH_S = 12219292800
@@ -145,7 +145,7 @@ class TaskReporter:
             }
         )
         print("\n".join(result.lines()), flush=True)
-        if not result.succeeded:  # for run_framework, which prints it last; not on the screen twice
+        if not result.succeeded:  # run_framework reads this and prints it last, so it is not printed twice
             reasons = "; ".join([*map(str, result.failures), *([result.error] if result.error else [])])
             logging.getLogger("modular_framework_core.task").critical(
                 "outcome '%s'%s", result.outcome, f": {reasons}" if reasons else ""

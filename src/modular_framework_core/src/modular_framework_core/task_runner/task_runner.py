@@ -17,8 +17,8 @@ EXIT_FAILED = 1
 EXIT_NOT_RUN = 2
 
 
-PLACE_MARK = "(  # defined in "
-"""What generated modules write between the call of a state's class and its place in the task."""
+LOCATION_MARK = "(  # defined in "
+"""Separator that generated modules write between the call of a state's class and its location in the task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class TaskRun:
     """One run of one task. Making the machine and executing it both happen in the run's own thread."""
 
     def __init__(self, name: str, factory: Callable[[], smach.Container], recorder: TaskRecorder) -> None:
-        """Prepare a run.
+        """Stores the parts of a run.
 
         Args:
             name: Name of the task.
@@ -116,7 +116,7 @@ class TaskRun:
         try:
             with stoppable(self._stop.is_set):
                 machine = self._factory()
-        except Exception as error:  # whatever a state's constructor raises is the user's to read, not ours to handle
+        except Exception as error:  # a state's constructor may raise anything, which is reported to the user
             smach.logdebug(traceback.format_exc())
             if self._stop.is_set():
                 self._result = self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
@@ -150,7 +150,7 @@ class TaskRun:
 
 
 def _where_defined(error: Exception) -> str:
-    """Returns the place in the task of the state whose constructor raised, and ": "; nothing where it is not known."""
+    """Returns the location in the task of the state whose constructor raised, and ": "; "" where it is not known."""
     lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__)]
-    places = [line.partition(PLACE_MARK)[2] for line in lines if PLACE_MARK in line]
+    places = [line.partition(LOCATION_MARK)[2] for line in lines if LOCATION_MARK in line]
     return f"{places[-1]}: " if places else ""

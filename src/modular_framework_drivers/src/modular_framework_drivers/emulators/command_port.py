@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A TCP port for commands to an emulator, with which tests and people inject faults.
+"""A TCP port for commands to an emulator, by which tests and users inject faults.
 
 Text lines over TCP, on the loopback interface if no other is given: `command key=value ...`; one line is the answer to
 each, `ok ...` or `error ...`. `help` lists the commands. From a shell: `echo unplug | nc 127.0.0.1 29900`.
@@ -24,7 +24,7 @@ class CommandError(Exception):
 
 
 def parse_value(text: str) -> Value:
-    """The value a text stands for: true, false, an integer, a number, or the text itself."""
+    """Parses a value: true, false, an integer, a number, or else the text itself."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -95,7 +95,7 @@ class CommandPort:
         return int(self._server.server_address[1]) if self._server is not None else self._wanted[1]
 
     def connect(self) -> None:
-        """Listens.
+        """Opens the port.
 
         Raises:
             OSError: the port is taken; the text names it.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What hangs on the shaft of an emulated gripper servo: motor, fingers with their two stops, and perhaps an object.
+"""Model of the mechanics behind an emulated gripper servo: motor, fingers with their two stops, and possibly an object.
 
 A simple model, enough for what a driver sees: speed follows the motor's duty with one time constant, friction eats a
-share of the duty, and whatever the fingers press on pushes back like a spring.
+share of the duty, and contacts push back like a spring.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROOM_TICKS = 100
 
 @dataclass(frozen=True, slots=True)
 class FingerModel:
-    """Numbers of the model.
+    """Parameters of the model.
 
     Attributes:
         closed_ticks: shaft angle at which the pads meet [ticks], any turn.
@@ -58,8 +58,8 @@ class Finger:
 
     Args:
         servo: whose registers command it.
-        model: numbers of the model.
-        opening: where it stands at first, counted from the closed fingers [ticks].
+        model: parameters of the model.
+        opening: initial position, counted from the closed fingers [ticks].
     """
 
     def __init__(self, servo: DynamixelServo, model: FingerModel | None = None, opening: float = 400.0) -> None:
@@ -90,13 +90,13 @@ class Finger:
         self._publish()
 
     def _take_offered(self) -> None:
-        """An object on offer comes between the fingers once they have been shut, as for calibration, and are open."""
+        """Places an offered object between the fingers once they have been closed, as for calibration, and are open."""
         self._was_shut |= self.opening < SHUT_TICKS
         if self.offered_opening is not None and self._was_shut and self.opening > self.offered_opening + ROOM_TICKS:
             self.object_opening, self.offered_opening = self.offered_opening, None
 
     def power_cycle(self) -> None:
-        """The servo forgets how often its shaft has turned: the encoder knows one turn only."""
+        """Resets the servo's count of turns after a loss of power: the encoder measures one turn only."""
         turns = math.floor(self.angle / mx64.TICKS_PER_TURN) * mx64.TICKS_PER_TURN
         self.angle -= turns
         self.model = replace(self.model, closed_ticks=self.model.closed_ticks - turns)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A serial line with emulated servos at its end: a pseudo-terminal under a name that stays, and faults on command."""
+"""A serial line with emulated servos: a pseudo-terminal with a fixed path, and faults on command."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 BAUDRATE_MARGIN = 0.03
-"""Share by which the two ends of a line may differ and still understand each other."""
+"""Relative difference of the baud rates of the two ends up to which they can communicate."""
 IDLE_S = 0.01
 SPEED_NAMES = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
 
 
 @dataclass(slots=True)
 class LineFaults:
-    """What goes wrong on the line.
+    """Faults of the line.
 
     Attributes:
-        delay_s: answers come so much late [s].
+        delay_s: delay of each answer [s].
         garbage: random bytes before each answer.
-        lose_every: each so manieth answer is lost; 0 for none.
-        corrupt_every: each so manieth answer has a flipped bit; 0 for none.
+        lose_every: every n-th answer is lost; 0 for none.
+        corrupt_every: every n-th answer has a flipped bit; 0 for none.
     """
 
     delay_s: float = 0.0
@@ -268,7 +268,7 @@ class DynamixelLine:
 
     def _send(self, now_s: float) -> None:
         while self._answers and self._answers[0][0] <= now_s:
-            with suppress(BlockingIOError):  # nobody reads: lost, as on a wire
+            with suppress(BlockingIOError):  # without a reader the bytes are lost, as on a wire
                 os.write(self._master, heapq.heappop(self._answers)[2])
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A Dynamixel MX-64 as it looks from its serial line: packets of protocol 1.0, and the table of registers behind them.
+"""An emulated Dynamixel MX-64, as seen on its serial line: packets of protocol 1.0 and the register table.
 
-The motor is elsewhere (`dynamixel_finger`): it reads the goals of the servo and gives it the measured values.
+The motor is a model of its own (`dynamixel_finger`): it reads the servo's goals and writes the measured values.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ class DynamixelServo:
         return from_bytes(self._table[register.address : register.address + register.size])
 
     def set(self, register: Register, value: int) -> None:
-        """Sets a register from inside; no rule applies."""
+        """Sets a register without the checks of an instruction."""
         data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
         self._table[register.address : register.address + register.size] = data
 
@@ -259,7 +259,7 @@ class DynamixelServo:
 
 
 def answer_bus(servos: Iterable[DynamixelServo], instruction: Instruction) -> bytes:
-    """What the servos of one line answer to an instruction, one after the other."""
+    """Returns the answers of the servos of one line to an instruction, one after the other."""
     listed = list(servos)
     if instruction.kind == SYNC_WRITE and instruction.servo_id == BROADCAST:
         if instruction.intact and len(instruction.parameters) > 2:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the program that ur-rtde uploads does on a controller, without an interpreter of URScript.
+"""The effect of the program that ur-rtde uploads to a controller, without an interpreter of URScript.
 
 ur-rtde's control script reads a command from an integer register and its arguments from the registers beside it, every
 cycle. Streamed commands are carried out at once. Any other is carried out when the register changes from none to it;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the emulated dashboard server answers; texts as the real one's, which clients compare."""
+"""The emulated dashboard server; its answers are those of the real one, because clients compare them."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class DashboardReceiver:
         }
 
     def receive(self, data: bytes) -> bytes:
-        """What to answer to what has arrived."""
+        """Returns the answer to received bytes."""
         self._text += data.decode("utf-8", errors="replace")
         *lines, self._text = self._text.split("\n")
         return "".join(self.answer(line.strip()) + "\n" for line in lines).encode()
 
     def answer(self, line: str) -> str:
-        """The answer to one line."""
+        """Returns the answer to one line."""
         lowered = line.lower()
         if lowered in self._answers:
             return self._answers[lowered]()

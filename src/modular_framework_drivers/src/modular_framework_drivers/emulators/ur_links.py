@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The network side of the emulated controller: ports, connections, and what can go wrong with them."""
+"""The network side of the emulated controller: ports, connections, and their faults."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _MAX_WAITING = 2_000  # packages that may wait for a client that does not read
 
 @dataclass(slots=True)
 class LinkFaults:
-    """What is wrong with the network at the moment.
+    """The present faults of the network.
 
     Attributes:
         frozen: nothing gets through in either direction, though all connections stay open.
         delay_s: how late everything the controller sends arrives [s].
-        lose_every: of the data packages each one of this number is lost; 0 for none.
+        lose_every: every n-th data package is lost; 0 for none.
     """
 
     frozen: bool = False
@@ -30,11 +30,11 @@ class LinkFaults:
 
 
 class Session:
-    """What a port does with one connection; the methods may raise ValueError to have it closed.
+    """The functions that serve one connection of a port; they may raise ValueError to have it closed.
 
     Args:
-        receive: answers what has arrived.
-        cycle: what to send in each cycle.
+        receive: returns the answer to received bytes.
+        cycle: returns the data to send in each cycle.
         close: called when the connection is gone.
         greeting: sent at once.
     """

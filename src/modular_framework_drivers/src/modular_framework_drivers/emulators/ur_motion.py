@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the joints of the emulated arm move: they follow what the program wants within a UR5's speed and acceleration."""
+"""Motion of the joints of the emulated arm: they follow the program within a UR5's speed and acceleration."""
 
 from __future__ import annotations
 

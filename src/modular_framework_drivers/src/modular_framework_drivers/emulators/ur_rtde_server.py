@@ -33,7 +33,7 @@ Value = float | Sequence[float]
 
 
 class RtdeProtocolError(ValueError):
-    """A client sent what is no RTDE; its connection is to be closed."""
+    """A client violated the protocol; its connection is to be closed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +196,7 @@ class Recipe:
 
 
 class RtdeServer:
-    """What all clients share: the variables, and who sets which.
+    """The state that all clients share: the variables, and which client sets which input.
 
     Args:
         controller: whose variables they are.
@@ -234,7 +234,7 @@ class RtdeSession:
         }
 
     def receive(self, data: bytes) -> bytes:
-        """What to answer to what has arrived.
+        """Returns the answer to received bytes.
 
         Raises:
             RtdeProtocolError: it is no RTDE.

@@ -166,7 +166,7 @@ class DynamixelBus:
 
     @staticmethod
     def _discard_late(port: _Port, late_bytes: int, end_s: float) -> None:
-        """Discards late answers to earlier tries, which cannot be told from the answer to the last one."""
+        """Discards late answers to earlier tries, which cannot be distinguished from the answer to the last one."""
         while late_bytes > 0 and select.select([port.ser.fileno()], [], [], max(0.0, end_s - time.monotonic()))[0]:
             late_bytes -= len(port.ser.read(late_bytes))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An EZGripper as hardware for controllers, alone or beside an arm in a combination."""
+"""An EZGripper as a `RobotHW`, alone or combined with an arm."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the words of a Dynamixel MX-64 (protocol 1.0) mean: its registers, its units and its error bits.
+"""The register table of a Dynamixel MX-64 (protocol 1.0): registers, units and error bits.
 
 Source: the public manual of the maker, ROBOTIS e-Manual, "MX-64" and "DYNAMIXEL Protocol 1.0".
 """
@@ -16,16 +16,16 @@ TICKS_PER_TURN = 4096
 SPEED_UNIT_TICKS_S = 0.114 / 60.0 * TICKS_PER_TURN
 """One unit of the speed registers, 0.114 turns a minute [ticks/s]."""
 TORQUE_MAX = 1023
-"""Largest word of the torque registers: everything the motor can do."""
+"""Largest word of the torque registers: the full torque of the motor."""
 CLOCKWISE = 1 << 10
-"""Bit of the speed, load and torque words that says which way."""
+"""Bit of the speed, load and torque words that holds the direction."""
 MULTI_TURN_LIMIT = 4095
 """Both angle limits at this word: positions go on beyond one turn, signed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """A place in a servo's table.
+    """A register in a servo's table.
 
     Attributes:
         address: first byte.

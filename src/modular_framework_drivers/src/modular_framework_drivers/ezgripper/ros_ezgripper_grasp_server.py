@@ -123,7 +123,7 @@ class EzGripperManipulator:
                 return
             time.sleep(POLL_S)
         rospy.logwarn(
-            "%s: told to stop, the fingers still moved after %.1f s", self._gripper.settings.name, STOP_TIMEOUT_S
+            "%s: the fingers still moved %.1f s after the request to stop", self._gripper.settings.name, STOP_TIMEOUT_S
         )
 
     def _publish(self) -> None:

@@ -17,7 +17,7 @@ from modular_framework_drivers.ur.command_check import CheckedJoint
 from modular_framework_drivers.ur.rtde_link import LinkSettings
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
 
-# what an arm can do at most: turns, its maker's speed, and the acceleration that URScript accepts of a joint
+# Largest limits of an arm: range in turns, its maker's speed, and the acceleration that URScript accepts of a joint
 _UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, max_velocity=math.pi, max_acceleration=40.0)
 
 

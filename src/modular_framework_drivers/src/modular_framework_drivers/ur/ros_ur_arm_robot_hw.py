@@ -16,7 +16,7 @@ from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 from modular_framework_ros.node_handle import NodeHandle, join_names
 from modular_framework_ros.publishing import publish
 
-# services of the dashboard under the names of ur_robot_driver: what to ask, and how the answer begins when it was done
+# Dashboard services under the names of ur_robot_driver: the request, and how the answer begins after a success
 DASHBOARD_SERVICES = {
     "power_on": ("power on", "Powering on"),
     "power_off": ("power off", "Powering off"),

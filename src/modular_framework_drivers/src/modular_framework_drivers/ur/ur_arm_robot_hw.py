@@ -142,7 +142,7 @@ class UrArmHardware(RobotHW):
         self._scaling.factor = min(max(state.speed_fraction * state.speed_scaling, 0.0), 1.0) if playing else 0.0
 
     def _stop_with_the_program(self, state: ArmState | None) -> None:
-        """Gives up a program that has ended, for any reason, until `resume` is called."""
+        """Stops commanding after the program has ended, for any reason, until `resume` is called."""
         if self._link is None or not self._link.commanding or not self._following:
             return
         fault = self._robot_fault.partition(";")[0]
@@ -232,7 +232,7 @@ class UrArmHardware(RobotHW):
         return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
 
     def _cause_may_follow(self, link: RtdeLink) -> bool:
-        """Whether a state may still come that explains the end of the program.
+        """Whether a state that explains the end of the program may still arrive.
 
         The end may be reported before the stop of the arm that caused it.
         """

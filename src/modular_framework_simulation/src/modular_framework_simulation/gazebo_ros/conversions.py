@@ -22,7 +22,7 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 
 LARGEST_COORDINATE_M = LARGEST_LENGTH_M
 LARGEST_VELOCITY = 1e3
-"""Beyond these the physics engine loses its numbers; larger ones in requests are refused [m/s, rad/s]."""
+"""Largest values with which the physics engine stays stable; larger ones in requests are refused [m/s, rad/s]."""
 
 
 def pose_to_msg(pose: Pose) -> PoseMsg:
@@ -126,7 +126,7 @@ def mesh_to_msg(mesh: TriangleMesh) -> MeshMsg:
 
 
 def attached_object(item: CollisionObject, link: str, touch_links: list[str]) -> AttachedCollisionObject:
-    """Returns an object fastened to a robot link.
+    """Returns an object attached to a robot link.
 
     Args:
         item: The object, its pose in the frame of the link.

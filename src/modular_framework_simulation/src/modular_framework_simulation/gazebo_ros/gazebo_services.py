@@ -98,7 +98,7 @@ class GazeboServices:
             except (SimulationError, ValueError) as error:
                 rospy.logerr("%s: %s", name, error)
                 return response(success=False, status_message=f"{name}: {error}")
-            except Exception as error:  # a request, however odd, must get an answer and not end the node
+            except Exception as error:  # any request must get an answer and must not end the node
                 rospy.logerr("%s: unexpected %s: %s", name, type(error).__name__, error)
                 return response(success=False, status_message=f"{name}: {type(error).__name__}: {error}")
 
@@ -117,7 +117,7 @@ class GazeboServices:
 
     def _spawner(self, name: str, read: Callable[[str, str, Resources], Model]) -> Callable[[Any], Any]:
         def spawn(request: Any) -> Any:
-            # Reading and cutting meshes may take seconds: that is done here, while the world goes on.
+            # Reading and decomposing meshes may take seconds: it is done in this thread, while the loop continues.
             model = read(request.model_xml, f"spawn request of '{request.model_name}'", self._resources)
             model = dataclasses.replace(model, name=request.model_name or model.name)
             prepared = self._world.prepare(model)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows the simulated world to move_group, so that its planning scene need not be kept up by hand.
+"""Keeps the planning scene of move_group equal to the simulated world, so that nobody has to do it by hand.
 
 A thread of its own compares the latest snapshot of the world with what the scene has and sends the differences to
 move_group's service. What the scene has is read back after changes and from time to time: other nodes change it too,
@@ -41,7 +41,7 @@ _SYNC_PERIOD_S = 0.1
 _PRESENCE_PERIOD_S = 0.5
 _RETRY_PERIOD_S = 0.5
 _COMPARE_PERIOD_S = 2.0
-"""At most so long the scene differs from the world unnoticed while no change of the scene is published."""
+"""Longest time between two comparisons while no change of the scene is published [s]."""
 _COMPARE_PAUSE_S, _COMPARE_SHARE = 0.3, 0.1
 """After a comparison, while the scene changes all the time, as it does while the robot moves: so long at least, and so
 long that comparisons take no more than this share of the time (a held mesh comes with all its triangles)."""
@@ -51,7 +51,7 @@ _OBJECTS = PlanningSceneComponents(
 
 
 class PlanningScenePublisher:
-    """Keeps the planning scene of move_group like the simulated world.
+    """Sends the simulated world to the planning scene of move_group.
 
     Client of /apply_planning_scene (moveit_msgs/ApplyPlanningScene) and /get_planning_scene
     (moveit_msgs/GetPlanningScene), whenever they are there.
@@ -76,7 +76,7 @@ class PlanningScenePublisher:
         self._last_problem = ""
 
     def connect(self) -> None:
-        """Starts the thread and listens for changes that others make."""
+        """Starts the thread and subscribes to changes by other nodes."""
         rospy.Subscriber(ros_names.MONITORED_PLANNING_SCENE, rospy.AnyMsg, self._on_scene_change, queue_size=1)
         self._thread.start()
 
@@ -88,7 +88,7 @@ class PlanningScenePublisher:
             self._thread.join(timeout=1.0)
 
     def show(self, snapshot: WorldSnapshot) -> None:
-        """Hands over the latest state of the world; never waits."""
+        """Passes the latest state of the world to the thread; never waits."""
         self._snapshot = snapshot
         self._news.set()
 
@@ -105,7 +105,7 @@ class PlanningScenePublisher:
                 continue
             try:
                 pause_s = self._synchronise(snapshot)
-            except Exception as error:  # this thread outlives whatever move_group or the network do
+            except Exception as error:  # this thread must survive any failure of move_group or the network
                 pause_s = self._fail(f"{type(error).__name__}: {error}")
             end = time.monotonic() + pause_s
             # A change of what is held is urgent: the next motion is planned with it.
@@ -153,7 +153,7 @@ class PlanningScenePublisher:
             )
 
     def _server_is_there(self) -> bool:
-        """Asks the master twice a second; a server at another address was started anew and has no objects."""
+        """Asks the master twice a second; a server at another address is a new one and has no objects."""
         now = time.monotonic()
         if now >= self._next_lookup_s:
             self._next_lookup_s = now + _PRESENCE_PERIOD_S

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Works out what has to change in a planning scene so that it shows the simulated world.
+"""Computes the changes that make a planning scene equal to the simulated world.
 
 Sent are new, moved and vanished objects, and objects that the gripper took or let go. Small movements are left out:
-physics never stands entirely still.
+a simulated body is never completely at rest.
 
 Other nodes change the scene too. An object that one of them removed, attached or detached by its name stays like that
 until it moves, is spawned again, or the gripper takes it or lets it go. A scene in which none of the objects is left
@@ -83,7 +83,7 @@ class _Target:
 
 
 class SceneChanges:
-    """Remembers what was sent, and where the scene really has it.
+    """Stores what was sent, and what the scene actually has.
 
     Args:
         translation_m: Smaller movements are not reported [m].
@@ -129,10 +129,10 @@ class SceneChanges:
         return sorted(gone)
 
     def towards(self, snapshot: WorldSnapshot) -> list[Change]:
-        """Returns what has to be sent; call `confirm` once the scene accepted it.
+        """Returns the changes to send; call `confirm` once the scene accepted them.
 
         Args:
-            snapshot: The world as it is now.
+            snapshot: The present world.
         """
         targets = _targets_of(snapshot)
         self._pending = dict(self._sent)
@@ -147,7 +147,7 @@ class SceneChanges:
         return changes
 
     def confirm(self) -> None:
-        """Notes that the scene has the changes of the last `towards`."""
+        """Marks the changes of the last `towards` as in force."""
         changed = {key for key, sent in self._pending.items() if self._sent.get(key) is not sent}
         kept = self._pending.keys() - changed
         taken = {key: sent.carrier_link for key in changed if (sent := self._pending[key]).carrier_link is not None}

@@ -129,7 +129,7 @@ class SimulationNode:
             self._show_snapshot()
 
     def _on_paused_tick(self) -> None:
-        """Models may be spawned, moved and deleted while time stands still."""
+        """Publishes the state while time is paused, because models may be spawned, moved and deleted then."""
         self._topics.publish_clock()
         self._show_snapshot()
 

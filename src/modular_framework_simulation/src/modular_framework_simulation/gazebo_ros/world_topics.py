@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes what the world is doing: the clock, the states of models and links, and what the gripper holds."""
+"""Publishes the clock, the states of models and links, and the object that the gripper holds."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ class WorldTopics:
         self._clock.publish(Clock(rospy.Time(*divmod(self._world.time_ns, 1_000_000_000))))
 
     def publish_models(self) -> None:
-        """Publishes the states of all models, if somebody listens."""
+        """Publishes the states of all models, if there is a subscriber."""
         if self._models.get_num_connections():
             states = [(name, self._world.body(name).state()) for name in self._world.names()]
             self._models.publish(_filled(ModelStates(), states))
 
     def publish_links(self) -> None:
-        """Publishes the states of all links, if somebody listens."""
+        """Publishes the states of all links, if there is a subscriber."""
         if self._links.get_num_connections():
             bodies = [(name, self._world.body(name)) for name in self._world.names()]
             links = [(name, body, link) for name, body in bodies for link in body.link_names()]

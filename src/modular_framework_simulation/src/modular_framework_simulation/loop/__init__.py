@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers, physics and simulated time advance together; requests from outside wait their turn."""
+"""The simulation loop, which advances controllers, physics and time, and serves requests between the steps."""

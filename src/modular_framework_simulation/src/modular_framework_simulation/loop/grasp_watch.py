@@ -26,7 +26,7 @@ class GraspWatch:
         self.held: str | None = None
 
     def reset(self) -> None:
-        """Forgets everything."""
+        """Clears all contacts."""
         self._touched_since.clear()
         self._missed_since = None
         self.held = None

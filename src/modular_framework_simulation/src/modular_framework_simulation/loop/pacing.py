@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 _LARGEST_DEBT_S = 1.0
-"""How much lost real time is made good afterwards [s]; a longer stall (a suspended machine) is forgiven."""
+"""Longest lag that is caught up [s]; after a longer stall (a suspended machine) the rest is dropped."""
 
 
 @dataclass(frozen=True, slots=True)
 class PaceReport:
-    """What a stretch of the simulation cost.
+    """Figures of the simulation since the last report.
 
     Attributes:
         factor: Simulated time over real time.
@@ -57,7 +57,7 @@ class Pacer:
         self.start(0.0)
 
     def start(self, simulated_s: float) -> None:
-        """Begins anew, after a pause or a reset of time.
+        """Restarts, after a pause or a reset of time.
 
         Args:
             simulated_s: Present simulated time [s].
@@ -83,7 +83,7 @@ class Pacer:
             self._start_real_s -= ahead + _LARGEST_DEBT_S
 
     def report(self, simulated_s: float) -> PaceReport:
-        """Returns how the time since the last report went, and begins the next stretch."""
+        """Returns the figures since the last report, and resets them."""
         now = self._clock()
         real = max(now - self._report_real_s, 1e-9)
         busy = max(real - self._slept_s, 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hands work from any thread to the simulation loop: the physics engine must be used from one thread only."""
+"""Passes work from any thread to the simulation loop: the physics engine must be used from one thread only."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class RequestQueue:
         Args:
             what: Named in the error, for example "spawn_sdf_model".
             work: Called in the loop's thread.
-            timeout_s: Longest wait for the loop to get to it [s of real time].
+            timeout_s: Longest wait until the loop begins it [s of real time].
 
         Raises:
-            LoopTimeoutError: The loop did not get to it; the work is then not done later either.
+            LoopTimeoutError: The loop did not begin it in time; the work is then not done later either.
             Exception: Whatever the work raised.
         """
         request = _Request(work)

@@ -24,7 +24,7 @@ _AT_REST = 0.01
 
 
 class Controllers(Protocol):
-    """What the loop needs of a controller manager."""
+    """The methods of a controller manager that the loop calls."""
 
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
         """Runs one control cycle."""
@@ -84,7 +84,7 @@ class SimulationLoop:
 
     @property
     def paused(self) -> bool:
-        """Whether time stands still."""
+        """Whether time is paused."""
         return self._paused
 
     def add_hook(self, hook: Hook) -> None:
@@ -96,12 +96,12 @@ class SimulationLoop:
         self._paused = True
 
     def unpause(self) -> None:
-        """Lets time go on."""
+        """Resumes time."""
         self._paused = False
         self.pacer.start(self._time_s())
 
     def reset_poses(self) -> None:
-        """Puts models and robot where they started, at rest; time goes on."""
+        """Puts models and robot at their initial poses, at rest; time continues."""
         self.world.reset_poses()
         self.grasp_watch.reset()
         if self._actors is not None:
@@ -120,7 +120,7 @@ class SimulationLoop:
             self._restart_control()
 
     def _restart_control(self) -> None:
-        """Has hardware and controllers start from where the joints now are."""
+        """Restarts hardware and controllers from the present joint positions."""
         if self._actors is not None:
             self._actors.hardware.read(self._time_s(), 0.0)
             self._actors.hardware.hold()
@@ -144,7 +144,7 @@ class SimulationLoop:
             if self._paused:
                 self._on_paused_tick()
                 if self._actors is not None:
-                    # Controllers can be loaded and started while time stands still.
+                    # Controllers can be loaded and started while time is paused.
                     self._actors.controllers.update(self._time_s(), 0.0)
                 self.requests.wait(_PAUSED_TICK_S)
                 continue
@@ -154,7 +154,7 @@ class SimulationLoop:
             self._halt(self._actors.robot)
 
     def _halt(self, robot: RobotBody) -> None:
-        """Has the controllers hold the robot where it is, and goes on until it stands."""
+        """Lets the controllers hold the robot at its present position, and continues until it is at rest."""
         self._restart_control()
         begun_s = self._time_s()
         for shortest_s in _HALT_S:

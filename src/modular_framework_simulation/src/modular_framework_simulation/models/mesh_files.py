@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives the meshes of descriptions to the physics engine: as they are, as hulls or cut into convex parts.
+"""Prepares the meshes of descriptions for the physics engine: exact, as hulls, or decomposed into convex parts.
 
 The engine computes contacts of convex bodies only, so a mesh that is not convex is decomposed by CoACD. That takes
 seconds, therefore the parts are kept in a cache folder under a name made of the mesh's own content.

@@ -186,7 +186,7 @@ def _require_sizes(link: str, shape: Element) -> None:
 
 
 def _give_frames_no_weight(root: Element) -> None:
-    """Links without mass are mere frames; the engine would take each of them for a kilogram."""
+    """Gives links without mass a negligible one: they are only frames, but the engine would assume 1 kg."""
     for link in root.findall("link"):
         if link.find("inertial") is None:
             inertial = xml_text.add_child(link, "inertial")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Works out where the frames of an SDF model are: `<pose relative_to="...">` may chain through links and frames."""
+"""Resolves the frames of an SDF model: `<pose relative_to="...">` may chain through links and frames."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 
 What is read: includes, poses (with relative_to between links, frames and the model), static models, links with their
 inertia, collision and visual shapes, friction, and the joints of simple multi-link models. Sensors, plugins, lights
-and settings of other physics engines mean nothing here and are read over.
+and settings of other physics engines have no effect here and are ignored.
 """
 
 from __future__ import annotations

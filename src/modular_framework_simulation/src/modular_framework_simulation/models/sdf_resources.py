@@ -12,13 +12,13 @@ from modular_framework_urdf.mesh_paths import PackageFinder
 
 
 def no_packages(name: str) -> str:
-    """Stands for an environment without ROS packages."""
+    """Finds nothing: the lookup for an environment without ROS packages."""
     raise LookupError(f"package '{name}' cannot be looked up here")
 
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """Where URIs lead.
+    """The folders and packages that URIs refer to.
 
     Attributes:
         model_folders: Folders holding one folder a model, searched in order.

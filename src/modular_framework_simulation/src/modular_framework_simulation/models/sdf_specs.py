@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a world or model file says, as plain values."""
+"""The contents of a world or model file, as plain values."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The numbers that decide how well the simulated world behaves, each with its reason."""
+"""Settings of the physics engine, each with its reason."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class PhysicsWorld:
         self._initial_poses: dict[str, Pose] = {}
         self._steps = 0
         self.revision = 0
-        """Changes whenever a model appears, disappears or is put elsewhere by a request."""
+        """Changes whenever a model is spawned, deleted or moved by a request."""
 
     @property
     def time_ns(self) -> int:

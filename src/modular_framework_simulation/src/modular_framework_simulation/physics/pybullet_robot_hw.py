@@ -100,7 +100,7 @@ class PyBulletRobotHW(RobotHW):
         self._saturations.setdefault(handle.name, {})[mode] = limiter
 
     def hold(self) -> None:
-        """Makes the present positions the commands; to be called after the robot was put somewhere."""
+        """Makes the present positions the commands; to be called after the joints were reset."""
         for name, handles in self._handles.items():
             position = next(iter(handles.values())).position
             for mode, handle in handles.items():
@@ -120,7 +120,7 @@ class PyBulletRobotHW(RobotHW):
             state.effort = reading.effort
 
     def write(self, time_s: float, period_s: float) -> None:
-        """Saturates the commands and hands them to the motors for the coming physics steps."""
+        """Saturates the commands and passes them to the motors for the next physics steps."""
         del time_s
         for name, drive in self._drives.items():
             handle = self._handles[name][drive.mode]
@@ -133,7 +133,7 @@ class PyBulletRobotHW(RobotHW):
         self._robot.drive(self._drives)
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        """Lets every joint obey the interface through which a starting controller claims it."""
+        """Switches each joint to the interface through which a starting controller claims it."""
         del stop
         for mode, joints in _claims(start):
             for name in joints:

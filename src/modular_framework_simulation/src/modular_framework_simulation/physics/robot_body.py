@@ -27,7 +27,7 @@ _COUPLING_FACTOR = 2.0
 
 
 class Role(Enum):
-    """What moves a joint."""
+    """The source of a joint's motion."""
 
     DRIVEN = "driven"
     COUPLED = "coupled"

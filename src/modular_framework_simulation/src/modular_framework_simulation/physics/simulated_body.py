@@ -85,13 +85,13 @@ class SimulatedBody:
         return list(self.link_indices)
 
     def state(self) -> BodyState:
-        """Returns where the model frame is in the world and how it moves."""
+        """Returns pose and velocity of the model frame in the world."""
         centre_in_world, twist = self._centre_state()
         model_in_world = centre_in_world @ self._root_in_centre @ self._model_in_root
         return BodyState(model_in_world, _twist_at(twist, centre_in_world, model_in_world))
 
     def link_state(self, link: str) -> BodyState:
-        """Returns where a link frame is in the world and how it moves.
+        """Returns pose and velocity of a link frame in the world.
 
         Raises:
             UnknownEntityError: The model has no such link.
