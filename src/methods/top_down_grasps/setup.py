@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells catkin where the Python library of this package lives."""
+"""Installs the Python library of this package for catkin."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import find_packages, setup

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs a motion of the arm to its end, and compares where the joints are with where they should be."""
+"""Runs a motion of the arm to its end, and compares the joint positions with those of its last point."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sends stages of a grasp to the manipulator's action server and understands the answer, on behalf of the states."""
+"""Sends stages of a grasp to the manipulator's action server and evaluates the result, for the states."""
 
 from __future__ import annotations
 

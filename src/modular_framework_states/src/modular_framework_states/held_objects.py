@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads from the planning scene what the manipulator holds, and detaches it."""
+"""Reads from the planning scene the objects that the manipulator holds, and detaches them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def held_objects() -> dict[str, str]:
 
 
 def detach(objects: dict[str, str]) -> None:
-    """Makes attached objects objects of the world again, where they are.
+    """Detaches objects, which stay in the world at their present poses.
 
     Args:
         objects: {object: link it is attached to}.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What robot and world descriptions refer to, read in one place."""
+"""Readers of robot descriptions (URDF, SRDF) and of the meshes they refer to, for all packages."""

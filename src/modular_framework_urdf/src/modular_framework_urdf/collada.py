@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a COLLADA file says besides its vertices: the length of its unit, and how many triangles its scene shows."""
+"""Reads from a COLLADA file what a mesh reader does not check: the length of its unit, and its number of triangles."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def unit(root: Element) -> float:
 
 
 def without_materials(root: Element) -> bytes:
-    """Returns the file without what only its looks need: a reader gives up a part whose texture is missing."""
+    """Returns the file without materials, because a reader drops a part whose texture is missing."""
     root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
     for parent in list(root.iter()):
         for child in [one for one in parent if one.tag == "bind_material" or one.tag in _LOOKS]:

@@ -31,7 +31,7 @@ _PLY_SIZES = {
 
 
 def declared_triangles(kind: str, content: bytes) -> int:
-    """Returns how many triangles an STL, OBJ or PLY file says it holds; n corners of a polygon count as n - 2 of them.
+    """Returns how many triangles an STL, OBJ or PLY file declares; a polygon of n corners counts as n - 2 of them.
 
     Raises:
         ValueError, IndexError, KeyError, struct.error: the structure is broken before a count can be had.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joints that mimic others: what they follow in the end, and where their leaders have to be for them."""
+"""Mimic joints: the leader at the end of each chain, and the leader's position for a position of the mimic joint."""
 
 from __future__ import annotations
 

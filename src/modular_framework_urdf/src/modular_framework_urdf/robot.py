@@ -101,7 +101,7 @@ class PlacedShapes:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link and what it looks and feels like."""
+    """A link with its visual and collision shapes."""
 
     name: str
     visuals: tuple[PlacedShapes, ...]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jacobian and end of a chain of joints, from the robot's description alone."""
+"""Jacobian and end pose of a chain of joints, from the robot's description."""
 
 from __future__ import annotations
 

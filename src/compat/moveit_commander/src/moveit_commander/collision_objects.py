@@ -14,7 +14,7 @@ from moveit_commander.exception import MoveItCommanderException
 
 
 def existing(name: str) -> CollisionObject:
-    """Stands for an object that is in the scene already."""
+    """Returns an object that refers to one that is in the scene already."""
     return CollisionObject(id=name, operation=CollisionObject.ADD)
 
 
@@ -62,6 +62,6 @@ def _empty(name: str, pose: PoseStamped) -> CollisionObject:
 
 
 def _turn(orientation: Quaternion) -> Quaternion:
-    """Returns an orientation that was left all 0 means: not turned."""
+    """Returns an orientation; all zeros means the identity."""
     turned = any((orientation.x, orientation.y, orientation.z, orientation.w))
     return orientation if turned else Quaternion(0.0, 0.0, 0.0, 1.0)

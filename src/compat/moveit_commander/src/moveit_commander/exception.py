@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exceptions of the commander: what goes wrong while a robot is commanded."""
+"""Exceptions of the commander."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The words of the command line that concern one planning group: each is one method, all are in one table."""
+"""The commands of the command line for one planning group: each is one method, all are in one table."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ ELEMENT = re.compile(rf"(\w+)\s*\[\s*(\d+)\s*\]\s*=\s*({VALUE})")
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What one word takes and does.
+    """The arguments and the method of one command.
 
     Attributes:
         usage: the line help shows, with the numbers of arguments it allows in `counts`.
@@ -236,7 +236,7 @@ class GroupCommands:
             self.group.set_pose_target(list_to_pose(values))
 
     def ground(self, _: Words) -> Answer:
-        """Puts a plate below the robot."""
+        """Adds a ground plate below the robot."""
         pose = PoseStamped()
         pose.header.frame_id = self._root_link
         pose.pose.position.z = -GROUND_SIZE[2] / 2.0 - GROUND_GAP

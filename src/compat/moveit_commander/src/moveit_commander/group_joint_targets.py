@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a group shall go, in joint space: values, names, random states, and joint values found from a pose."""
+"""Joint targets of a group: values, names, random states, and joint values found from a pose."""
 
 from __future__ import annotations
 

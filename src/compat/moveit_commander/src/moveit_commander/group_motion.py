@@ -34,7 +34,7 @@ MOTION_TIMEOUT_S = 600.0
 
 
 class GroupMotion(GroupPoseTargets):
-    """Everything of a group that plans or moves.
+    """The methods of a group that plan or move.
 
     Publishes: trajectory_execution_event (std_msgs/String).
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a group holds: attach and detach objects, pick and place them."""
+"""Objects of a group: attach and detach, pick and place."""
 
 from __future__ import annotations
 

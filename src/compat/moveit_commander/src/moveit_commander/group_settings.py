@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a group plans: planner, times, tolerances, scaling factors, workspace, start state and constraints."""
+"""Planning settings of a group: planner, times, tolerances, scaling factors, workspace, start state, constraints."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot as its URDF, SRDF and joint limits describe it: joints, links, groups, bounds and named states."""
+"""The robot model from URDF, SRDF and joint limits: joints, links, groups, bounds and named states."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class EndEffector:
 
 
 class RobotModel:
-    """Answers what the descriptions say; it knows nothing of the robot's present state."""
+    """The robot model; it has no state."""
 
     def __init__(self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None) -> None:
         """Reads the documents.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot as it is now: its description from the parameter server, its joint positions from joint_states."""
+"""The current robot: its description from the parameter server, its joint positions from joint_states."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _forget_all() -> None:
 
 
 class CurrentState:
-    """Listens to a topic of joint states.
+    """Stores the latest joint states of a topic.
 
     Subscribes: joint_states (sensor_msgs/JointState).
     """

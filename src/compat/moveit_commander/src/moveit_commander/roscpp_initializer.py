@@ -11,7 +11,7 @@ NODE_NAME = "move_group_commander_wrappers"
 
 
 class _Node:
-    """What this library added to the process: perhaps the node itself, and connections to close."""
+    """The parts of the process that this library created: possibly the node, and connections to close."""
 
     def __init__(self) -> None:
         self._name = NODE_NAME

@@ -68,7 +68,7 @@ class Servers:
 
 
 class ActionCaller:
-    """Sends goals to one action server; its waits end by the wall clock, also while simulated time stands still."""
+    """Sends goals to one action server; its timeouts are wall time, which passes also while a simulation is paused."""
 
     def __init__(self, name: str, kind: Any) -> None:
         self.name = name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times a given path anew: its waypoints stay, their times, velocities and accelerations keep the joints' limits."""
+"""Retimes a path: its waypoints stay, and its velocities and accelerations are within the joint limits."""
 
 from __future__ import annotations
 

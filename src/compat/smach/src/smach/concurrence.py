@@ -107,7 +107,7 @@ class Concurrence(Container):
         if faults:
             raise InvalidStateError(f"{'; '.join(faults)}; outcomes: {list(self._outcomes)}")
 
-    # ---- looking in ----------------------------------------------------------------------------------------
+    # ---- inspection ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
         """Returns the states by label, in the order they were added."""
         return dict(self._states)

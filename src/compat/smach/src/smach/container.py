@@ -41,7 +41,7 @@ class Container(State):
         self._transition_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
         self._termination_cbs: list[tuple[Callback, tuple[Any, ...]]] = []
 
-    # ---- what each kind of container defines ---------------------------------------------------------------
+    # ---- abstract methods ----------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
         """Returns the states in this container, by label."""
         return {}
@@ -191,5 +191,5 @@ class Container(State):
         for callback, extra in callbacks:
             try:
                 callback(self.userdata, *args, *extra)
-            except Exception:  # a callback observes: it must not change what it observes
+            except Exception:  # a failing callback must not change the run of the container
                 log.error(f"{kind} callback {callback!r} raised:\n{traceback.format_exc()}")

@@ -111,7 +111,7 @@ class Iterator(Container):
     def _final(self, outcome: str) -> str:
         return self._final_outcome_map.get(outcome, outcome)
 
-    # ---- looking in ----------------------------------------------------------------------------------------
+    # ---- inspection ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
         """Returns the contained state by its label."""
         return {} if self._state is None else {self._state_label: self._state}

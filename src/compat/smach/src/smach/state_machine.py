@@ -136,7 +136,7 @@ class StateMachine(Container):
                 f"({list(self._outcomes)}) of the machine"
             )
 
-    # ---- looking in ----------------------------------------------------------------------------------------
+    # ---- inspection ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
         """Returns the states by label, in the order they were added."""
         return dict(self._states)

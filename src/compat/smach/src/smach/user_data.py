@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Userdata: the variables states hand to each other, and the view of them that one state is allowed to have."""
+"""Userdata: the variables that states pass to each other, and the restricted view of them that one state has."""
 
 from __future__ import annotations
 

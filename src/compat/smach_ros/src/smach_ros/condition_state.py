@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that asks a function again and again until it says yes."""
+"""A state that polls a condition until it is true."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class ConditionState(smach.State):
         self._wake = threading.Event()
 
     def execute(self, userdata: Any) -> str:
-        """Asks until the function says yes, or no further check is allowed.
+        """Polls the condition until it is true, or no further check is allowed.
 
         Raises:
             smach.InvalidUserCodeError: the function raised.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows a running state machine on topics, for viewers, and lets them choose the state it starts in."""
+"""Publishes a running state machine for viewers, and lets them choose the state it starts in."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _values(userdata: smach.UserData) -> dict[str, Any]:
 
 
 class ContainerProxy:
-    """What the server publishes of one container."""
+    """The messages of one container."""
 
     def __init__(self, container: smach.Container, path: str) -> None:
         """Keeps a container and its path from the root."""
@@ -66,7 +66,7 @@ class ContainerProxy:
         )
 
     def set_initial_state(self, command: SmachContainerInitialStatusCmd) -> None:
-        """Does what a viewer commands.
+        """Carries out a viewer's command.
 
         Raises:
             smach.SmachError: the container has no such states.
@@ -83,7 +83,7 @@ class ContainerProxy:
 
 
 class _NewSubscriber(rospy.SubscribeListener):
-    """Calls a function when somebody has subscribed."""
+    """Calls a function when a node has subscribed."""
 
     def __init__(self, event: threading.Event) -> None:
         super().__init__()
@@ -97,7 +97,7 @@ class _NewSubscriber(rospy.SubscribeListener):
 class IntrospectionServer:
     """Publishes structure and status of a container and of all containers in it.
 
-    Nothing is made up or sent while nobody listens; a new listener gets everything at once, then whenever a
+    Nothing is computed or sent without subscribers; a new one gets everything at once, then whenever a
     container starts, ends or makes a transition, and every two seconds.
     Publishers: ``<server_name>/smach/container_structure``, ``<server_name>/smach/container_status``.
     Subscriber: ``<server_name>/smach/container_init``.
@@ -167,7 +167,7 @@ class IntrospectionServer:
             topic.unregister()
 
     def construct(self, server_name: str, state: smach.Container, path: str) -> None:
-        """Takes up a container and all containers in it; server_name is that of this server."""
+        """Registers a container and all containers in it; server_name is that of this server."""
         proxy = ContainerProxy(state, path)
         self._proxies.append(proxy)
 
@@ -203,7 +203,7 @@ class IntrospectionServer:
             self._send(self._status_pub, lambda: proxy.status(info))
 
     def _send(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
-        """Makes a message and publishes it when somebody listens: watching a machine must not disturb it."""
+        """Makes and publishes a message if there are subscribers: introspection must not slow the machine down."""
         try:
             if publisher.get_num_connections() > 0:
                 publisher.publish(make())

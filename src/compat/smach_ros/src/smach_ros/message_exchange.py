@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a state that asks another node makes its message from the userdata, and puts the answer back there.
+"""Conversion between userdata and messages for states that call another node.
 
 Goal and result of an action, request and response of a service follow the same rules, which are kept here.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Remembers where the objects were for which grasps were generated, so that a moved object is noticed."""
+"""Stores the objects for which grasps were generated with their poses, so that moved objects are detected."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class GeneratedObjects:
         self._objects: dict[str, SceneObject] = {}
 
     def mark(self, objects: Iterable[SceneObject]) -> None:
-        """Notes that grasps were generated for objects where they are, or that none can be."""
+        """Marks objects as done at their present poses: grasps were generated, or none can be."""
         self._objects.update({found.name: found for found in objects})
 
     def keep(self, names: Collection[str]) -> None:
-        """Forgets all objects but these: one that comes back under its name is a new one."""
+        """Drops all objects but these: one that comes back under its name is a new one."""
         self._objects = {name: found for name, found in self._objects.items() if name in names}
 
     def stale(self, objects: Iterable[SceneObject]) -> list[SceneObject]:

@@ -45,7 +45,7 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True)
 class CropBox:
-    """Where objects are looked for: a box along the axes of the planning frame.
+    """The search volume for objects: a box along the axes of the planning frame.
 
     Attributes:
         low: Smallest x, y, z [m].

@@ -60,7 +60,7 @@ class CartesianMove(FrameworkState):
         self._min_fraction = float(min_fraction)
 
     def execute(self, userdata: Any) -> str:
-        """Asks for the path, and moves when enough of it is there."""
+        """Requests the path, and moves if enough of it was found."""
         commander = userdata.arm_commander
         try:
             target = self._target(commander)

@@ -24,7 +24,7 @@ class ReinitialiseManagers(FrameworkState):
         self._kinds = tuple(kinds) or all_kinds()
 
     def execute(self, userdata: Any) -> str:
-        """Asks one manager after the other; goes on after one that fails."""
+        """Calls one manager after the other; continues after one that fails."""
         faults = []
         for kind in self._kinds:
             try:

@@ -63,7 +63,7 @@ class WaitForMessage(FrameworkState):
         return self.succeed()
 
     def _receive(self, name: str, end: float | None) -> bool:
-        """Listens with the topic's own type: a node has one type a topic, and other subscribers in it need theirs."""
+        """Subscribes with the topic's own type, because all subscribers of one node to a topic share one type."""
         kind = published_type(name)
         message_type = roslib.message.get_message_class(kind)
         if message_type is None:
