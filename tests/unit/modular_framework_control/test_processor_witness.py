@@ -21,9 +21,9 @@ def test_cycles_are_lost_only_while_a_processor_is_away_for_a_period() -> None:
     assert cycles_without_processor([(1.0, 1.006), (1.007, 1.013)], PERIOD_S) == 0
 
 
-def test_a_processor_that_is_taken_away_is_noticed(real_time_permitted: bool) -> None:
+def test_a_processor_that_is_taken_away_is_noticed(preemption_permitted: bool) -> None:
     witnesses = Witnesses()
-    if not real_time_permitted:
+    if not preemption_permitted:
         assert witnesses.taken() is None
         return
     last = max(os.sched_getaffinity(0))

@@ -68,7 +68,7 @@ class WheelGeometry:
         return float(np.linalg.norm(self.between(first, second)))
 
     def radius(self, joint: str, shapes: tuple[str, ...] = ("cylinder", "sphere")) -> float:
-        """Radius of the wheel that a joint turns: that of its link's collision geometry [m].
+        """Radius of the wheel that a joint turns [m]: of its link's first collision geometry, as in ros_controllers.
 
         Args:
             joint: name of the joint.
