@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes what a benchmark found out about faults as a table into a page of docs/reference, and renews it there."""
+"""Writes the faults of a benchmark as a table into a page of docs/reference, or updates the table there."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ class FaultRow:
     Attributes:
         name: of the fault.
         text: what the user reads.
-        told_s: median time until it was told [s].
-        told_max_s: longest [s].
-        back_s: median time from its end until all was well [s].
-        moved: how far a joint went since [rad].
+        reported_s: median time until it was reported [s].
+        reported_max_s: longest [s].
+        back_s: median time from its end until the device was usable again [s].
+        moved: how far a joint moved after the fault [rad].
     """
 
     name: str
     text: str
-    told_s: float | None
-    told_max_s: float | None
+    reported_s: float | None
+    reported_max_s: float | None
     back_s: float | None
     moved: float | None
 
@@ -42,18 +42,18 @@ def fault_table(rows: Iterable[FaultRow], moved_title: str) -> str:
         return "" if value is None else f"{value:.{digits}f}"
 
     lines = [
-        f"| fault | what the user reads | told after [s]: median, worst | back after [s] | {moved_title} [rad] |",
+        f"| fault | what the user reads | reported after [s]: median, worst | back after [s] | {moved_title} [rad] |",
         "|---|---|---|---|---|",
     ]
     for row in rows:
-        told = ", ".join(filter(None, (number(row.told_s, 3), number(row.told_max_s, 3))))
+        reported = ", ".join(filter(None, (number(row.reported_s, 3), number(row.reported_max_s, 3))))
         text = re.sub(r"127\.\d+\.\d+\.\d+", "ADDRESS", row.text).removeprefix("hardware fault: ")
-        lines.append(f"| {row.name} | {text} | {told} | {number(row.back_s, 2)} | {number(row.moved, 3)} |")
+        lines.append(f"| {row.name} | {text} | {reported} | {number(row.back_s, 2)} | {number(row.moved, 3)} |")
     return "\n".join(lines) + "\n"
 
 
 def put_table(file: Path, name: str, text: str) -> None:
-    """Write a table between the two marks of that name in a file, or as a file of its own where there are none."""
+    """Writes a table between the two marks of that name in a file, or as a file of its own if there are none."""
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
     before, mark, rest = (file.read_text() if file.exists() else "").partition(begin)
     after = rest.partition(end)[2] if mark else ""

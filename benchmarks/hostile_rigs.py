@@ -110,7 +110,7 @@ class Rig:
 
     @property
     def rolls(self) -> bool:
-        """Whether joints without a controller roll on, for want of friction."""
+        """Whether joints without a controller keep moving, because they have no friction."""
         return self.hw.find(COMMAND_INTERFACES[2]) is not None
 
     def step(self) -> None:
@@ -149,7 +149,7 @@ class Rig:
         def ask() -> None:
             try:
                 self.manager.switch_controller(start, stop)
-            except Exception as error:  # told to the caller
+            except Exception as error:  # passed to the caller
                 failures.append(error)
 
         thread = threading.Thread(target=ask, daemon=True)
@@ -221,7 +221,7 @@ class PyBulletRig(Rig):
 
 
 def mock_rig(family: str) -> Rig:
-    """Joints that do what they are told, commanded by one family of interfaces."""
+    """Mock hardware, commanded by one family of interfaces."""
     own = {
         "joints": list(JOINT_NAMES),
         "command_interface": FAMILIES[family],

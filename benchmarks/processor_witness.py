@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Notes when processors are taken away.
+"""Measures when processors are taken away.
 
 The host of a virtual machine takes them, or work of the kernel that nothing may interrupt.
 
@@ -37,18 +37,18 @@ class Witnesses:
             process.stdout.readline()  # it watches
 
     def taken(self) -> list[Spans] | None:
-        """When each processor was away [s of the monotonic clock]; None where the system lets nobody be that urgent."""
-        told = []
+        """When each processor was away [s of the monotonic clock]; None if the system refuses the priority."""
+        reports = []
         for process in self._processes:
             process.terminate()
-            told.append(json.loads(process.communicate()[0]))
-        return None if None in told else [[(begin_s, end_s) for begin_s, end_s in spans] for spans in told]
+            reports.append(json.loads(process.communicate()[0]))
+        return None if None in reports else [[(begin_s, end_s) for begin_s, end_s in spans] for spans in reports]
 
 
 def cycles_without_processor(spans: Spans, period_s: float) -> int:
     """Returns how many cycles of a loop a processor was away for, at most.
 
-    That is how many a loop loses when one is due as it goes; due later, it may lose one less.
+    This many a loop loses if one is due when the processor goes away; otherwise it may lose one less.
 
     Args:
         spans: when the processor was away [s].

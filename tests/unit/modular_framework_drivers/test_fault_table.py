@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of faults in docs/reference are renewed by their benchmarks, each between its own marks."""
+"""The tables of faults in docs/reference are updated by their benchmarks, each between its own marks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROWS = (
     FaultRow("late answers", "endured", None, None, None, None),
 )
 HEAD = (
-    "| fault | what the user reads | told after [s]: median, worst | back after [s] | moves [rad] |\n"
+    "| fault | what the user reads | reported after [s]: median, worst | back after [s] | moves [rad] |\n"
     "|---|---|---|---|---|\n"
 )
 
