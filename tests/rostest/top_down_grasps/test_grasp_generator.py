@@ -100,7 +100,8 @@ def test_new_grasps_replace_the_ones_that_are_left(scene) -> None:
     assert generate()[0]
     assert stored() == ([], 3)
     assert get_grasp().success
-    assert rospy.ServiceProxy("top_down_grasp_generator/refresh", Trigger)().message.startswith("nothing has moved")
+    for name in ("top_down_grasp_generator/refresh", "refresh_grasps"):
+        assert rospy.ServiceProxy(name, Trigger)().message.startswith("nothing has moved")
     assert stored() == ([], 2)
     scene.objects[-1].pose.position.x += 0.03
     answer = rospy.ServiceProxy("top_down_grasp_generator/refresh", Trigger)()

@@ -32,6 +32,8 @@ from top_down_grasps.top_down import TopDownGrasp, top_down_grasps
 from top_down_grasps.wait_limit import WaitLimit
 
 SIGNAL_TOPIC = "grasp_generated"
+GENERATE_SERVICES = ("generate_grasps", "~generate")
+REFRESH_SERVICES = ("refresh_grasps", "~refresh")
 SERVICE_TIMEOUT_S = 10.0
 SCENE_PERIOD_S = 0.25
 WAITING_PERIOD_S = 10.0
@@ -53,10 +55,10 @@ class TopDownGraspGenerator:
 
     Parameters: see :mod:`ros_generator_settings`; they are read again for every generation.
     Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched).
-    Services (std_srvs/Trigger):
-        ``~generate``: generates grasps.
-        ``~refresh``: waits until the objects rest, and generates grasps if one was moved since; those that are left of
-            the last generation stay otherwise.
+    Services (std_srvs/Trigger), the names of every method first, this node's own second:
+        ``generate_grasps``, ``~generate``: generates grasps.
+        ``refresh_grasps``, ``~refresh``: waits until the objects rest, and generates grasps if one was moved since;
+            those that are left of the last generation stay otherwise.
     Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``,
         ``clear_anonymous_grasps``.
     """
@@ -93,8 +95,9 @@ class TopDownGraspGenerator:
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
         self._services = [
-            rospy.Service("~generate", Trigger, lambda _: self._on_demand(refresh=False)),
-            rospy.Service("~refresh", Trigger, lambda _: self._on_demand(refresh=True)),
+            rospy.Service(name, Trigger, lambda _, refresh=refresh: self._on_demand(refresh))
+            for refresh, names in ((False, GENERATE_SERVICES), (True, REFRESH_SERVICES))
+            for name in names
         ]
 
     def watch(self) -> None:
