@@ -26,6 +26,7 @@ from modular_framework_core.grasping.stall_evidence import Attempt, StallEvidenc
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.calls import CallError
+from modular_framework_ros.running_goals import RunningGoals
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 
 FEEDBACK_PERIOD_S = 0.1
@@ -57,32 +58,20 @@ class GraspServer:
         self._full_scale = float(rospy.get_param("~max_torque_full_scale", 800.0))
         self._tolerance = float(rospy.get_param("~position_tolerance", 0.05))
         self._timeout_s = float(rospy.get_param("~motion_timeout", 25.0))
-        self._lock = threading.Lock()
         self._motion_lock = threading.Lock()
-        self._stops: dict[str, threading.Event] = {}
+        self._goals = RunningGoals()
         self._evidence = StallEvidence(self._tolerance)
 
     def connect(self, action_name: str) -> None:
         """Connects the manipulator and offers the action."""
         self._manipulator.connect()
-        self._server = SteadyActionServer(action_name, GraspAction, self._on_goal, self._on_cancel, auto_start=False)
+        self._server = SteadyActionServer(action_name, GraspAction, self._on_goal, self._goals.cancel, auto_start=False)
         self._server.start()
 
     def _on_goal(self, handle: Any) -> None:
-        stop = threading.Event()
-        with self._lock:
-            for other in self._stops.values():
-                other.set()
-            self._stops[handle.get_goal_id().id] = stop
+        stop = self._goals.add(handle)
         handle.set_accepted()
         threading.Thread(target=self._run, args=(handle, stop), daemon=True).start()
-
-    def _on_cancel(self, handle: Any) -> None:
-        name = handle.get_goal_id().id
-        with self._lock:
-            stop = self._stops.get(name)
-        if stop is not None:
-            stop.set()
 
     def _run(self, handle: Any, stop: threading.Event) -> None:
         result = GraspResult()
@@ -107,9 +96,7 @@ class GraspServer:
             rospy.logerr("Grasp command: unexpected %r", error)
             handle.set_aborted(GraspResult(), f"internal error: {error!r}")
         finally:
-            name = handle.get_goal_id().id  # takes the server's lock, which _on_goal holds when it takes ours
-            with self._lock:
-                self._stops.pop(name, None)
+            self._goals.remove(handle)
 
     def _carry_out(self, handle: Any, stop: threading.Event) -> tuple[Stage, Verdict]:
         command: GraspCommand = handle.get_goal().grasp_command

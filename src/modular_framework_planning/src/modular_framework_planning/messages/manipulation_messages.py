@@ -12,8 +12,13 @@ import numpy as np
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.messages.poses import stamped_in_scene
-from modular_framework_planning.pick_place.manipulation import Manoeuvre, SceneChange, Translation, allowing
-from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, PlanningScene
+from modular_framework_planning.pick_place.manipulation import Manoeuvre, Translation, allowing
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    SceneChange,
+)
 from modular_framework_urdf.mimics import Mimic, with_leaders
 
 
@@ -101,9 +106,11 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
     return with_leaders(dict(zip(message.joint_names, map(float, values), strict=True)), hand.mimics)
 
 
-def _allowance(hand: Hand, target: str, surface: str, hand_on_surface: bool, touched: Sequence[str]) -> SceneChange:
+def _allowance(hand: Hand, target: str, goal: Any, touched: Sequence[str]) -> SceneChange:
     """Allowed collisions: hand and object, hand and named links, object and support; on request hand and support."""
-    others = [target, *touched, *([surface] if surface and hand_on_surface else [])]
+    surface, others = goal.support_surface_name, [target, *goal.allowed_touch_objects, *touched]
+    if surface and goal.allow_gripper_support_collision:
+        others.append(surface)
 
     def allow(scene: PlanningScene) -> PlanningScene:
         scene = allowing(scene, hand.links, others)
@@ -141,13 +148,7 @@ def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, whe
         stamped_in_scene(scene, grasp.grasp_pose, f"{where}.grasp_pose"),
         translation(scene, grasp.pre_grasp_approach, hand.link, f"{where}.pre_grasp_approach"),
         translation(scene, grasp.post_grasp_retreat, hand.link, f"{where}.post_grasp_retreat"),
-        _allowance(
-            hand,
-            goal.target_name,
-            goal.support_surface_name,
-            goal.allow_gripper_support_collision,
-            [*goal.allowed_touch_objects, *grasp.allowed_touch_objects],
-        ),
+        _allowance(hand, goal.target_name, goal, grasp.allowed_touch_objects),
         attaching(goal.target_name, hand.link, touch),
         posture(grasp.pre_grasp_posture, hand, f"{where}.pre_grasp_posture"),
         posture(grasp.grasp_posture, hand, f"{where}.grasp_posture"),
@@ -166,13 +167,7 @@ def place_manoeuvre(
         pose if goal.place_eef else _link_pose(scene, pose, held, hand.link),
         translation(scene, location.pre_place_approach, hand.link, f"{where}.pre_place_approach"),
         translation(scene, location.post_place_retreat, hand.link, f"{where}.post_place_retreat"),
-        _allowance(
-            hand,
-            held.name,
-            goal.support_surface_name,
-            goal.allow_gripper_support_collision,
-            [*goal.allowed_touch_objects, *location.allowed_touch_objects],
-        ),
+        _allowance(hand, held.name, goal, location.allowed_touch_objects),
         lambda now: now.with_detached(held.name),
         {},
         posture(location.post_place_posture, hand, f"{where}.post_place_posture"),

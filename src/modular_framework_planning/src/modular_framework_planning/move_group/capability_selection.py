@@ -3,22 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import rospy
 
-from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 
 PIPELINES = "~planning_pipelines"
-
-
-class Endpoint(Protocol):
-    """Services, actions or topics that start with `connect`."""
-
-    def connect(self) -> None:
-        """Advertises."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,16 +19,16 @@ class Capability:
 
     Attributes:
         name: as MoveIt's plugin of the same purpose.
-        build: makes the endpoint.
+        build: its class.
         default: offered unless `disable_capabilities` names it; otherwise only where `capabilities` does.
     """
 
     name: str
-    build: Callable[[MoveGroupContext], Endpoint]
+    build: type[MoveGroupCapability]
     default: bool = True
 
 
-def chosen_capabilities(table: Sequence[Capability]) -> list[Callable[[MoveGroupContext], Endpoint]]:
+def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapability]]:
     """Reads ~capabilities, ~planning_pipelines/*/capabilities and ~disable_capabilities, each separated by spaces.
 
     An unknown name is a warning with the list of those that are known, as in MoveIt.

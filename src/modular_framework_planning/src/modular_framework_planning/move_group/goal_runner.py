@@ -12,8 +12,14 @@ import rospy
 from modular_framework_planning.errors import ErrorCode
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.publishing import going_down
+from modular_framework_ros.running_goals import RunningGoals
 
 PREVIOUS_GOAL_TIMEOUT_S = 10.0
+
+
+def error_code_of(result: Any) -> Any:
+    """Returns the moveit_msgs/MoveItErrorCodes of an action's result; a sequence has it one level down."""
+    return getattr(result, "response", result).error_code
 
 
 class GoalRunner:
@@ -27,33 +33,21 @@ class GoalRunner:
     ) -> None:
         self._work = work
         self._result_type = type(kind().action_result.result)
-        self._lock = threading.Lock()
         self._turn = threading.Lock()
-        self._cancels: dict[str, threading.Event] = {}
-        self._server = SteadyActionServer(name, kind, self._on_goal, self._on_cancel, auto_start=False)
+        self._goals = RunningGoals()
+        self._server = SteadyActionServer(name, kind, self._on_goal, self._goals.cancel, auto_start=False)
 
     def connect(self) -> None:
         """Starts the server."""
         self._server.start()
 
     def _on_goal(self, handle: Any) -> None:
-        cancelled = threading.Event()
-        with self._lock:
-            for event in self._cancels.values():
-                event.set()
-            self._cancels[handle.get_goal_id().id] = cancelled
+        cancelled = self._goals.add(handle)
         threading.Thread(target=self._run, args=(handle, cancelled), daemon=True).start()
-
-    def _on_cancel(self, handle: Any) -> None:
-        name = handle.get_goal_id().id
-        with self._lock:
-            event = self._cancels.get(name)
-        if event is not None:
-            event.set()
 
     def _run(self, handle: Any, cancelled: threading.Event) -> None:
         if not self._turn.acquire(timeout=PREVIOUS_GOAL_TIMEOUT_S):
-            self._forget(handle)
+            self._goals.remove(handle)
             handle.set_rejected(
                 self._result(ErrorCode.PREEMPTED), f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s"
             )
@@ -74,7 +68,7 @@ class GoalRunner:
             self._on_fault(handle, error)
         finally:
             self._turn.release()
-            self._forget(handle)
+            self._goals.remove(handle)
 
     def _on_fault(self, handle: Any, error: Exception) -> None:
         """Answers a goal that ended with an exception; at shutdown the topics are closed, and nothing is published."""
@@ -87,10 +81,5 @@ class GoalRunner:
     def _result(self, code: ErrorCode) -> Any:
         """Returns an empty result with a code, for a goal that was not worked on to its end."""
         result = self._result_type()
-        getattr(result, "response", result).error_code.val = code  # a sequence has its code one level down
+        error_code_of(result).val = code
         return result
-
-    def _forget(self, handle: Any) -> None:
-        name = handle.get_goal_id().id  # takes the server's lock, which _on_goal holds when it takes ours
-        with self._lock:
-            self._cancels.pop(name, None)

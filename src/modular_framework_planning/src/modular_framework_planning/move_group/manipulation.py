@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,12 +18,12 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message
 from modular_framework_planning.messages.conversions import state_message, trajectory_message
 from modular_framework_planning.messages.manipulation_messages import Hand
-from modular_framework_planning.move_group.capabilities.move_action import check_options, scene_change
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.move_group.motion_watch import WatchedMotion
-from modular_framework_planning.pick_place.manipulation import Arm, Manoeuvre, ManoeuvrePlanner, SceneChange, Stage
+from modular_framework_planning.move_group.planning_options import check_options, scene_change
+from modular_framework_planning.pick_place.manipulation import Arm, Manoeuvre, ManoeuvrePlanner, Stage
 from modular_framework_planning.planning_interface.planning_request import PlanningRequest
-from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
 from modular_framework_planning.robot_model.robot_model import JointGroup
 
@@ -52,6 +52,12 @@ class Task:
     candidates: Sequence[int]
     read: Callable[[PlanningScene, int, Hand], Manoeuvre]
     accept: Callable[[int], None]
+
+
+def best_first(qualities: Iterable[float]) -> list[int]:
+    """Returns the indices of the qualities from the highest to the lowest; equal ones stay in their order."""
+    values = list(qualities)
+    return sorted(range(len(values)), key=lambda index: -values[index])
 
 
 @dataclass(slots=True)

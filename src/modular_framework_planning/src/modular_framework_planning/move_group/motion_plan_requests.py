@@ -23,13 +23,13 @@ from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planners.pilz.auxiliary_point import auxiliary_point
 from modular_framework_planning.planning_interface.planning_request import AuxiliaryPoint, PlanningRequest, Workspace
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 
 DEFAULT_PLANNING_TIME_S = 5.0
 
 
 def read_request(
-    context: MoveGroupContext, scene: PlanningScene, message: Any, cancelled: Callable[[], bool] = lambda: False
+    context: MoveGroupContext, scene: PlanningScene, message: Any, cancelled: Callable[[], bool]
 ) -> PlanningRequest:
     """Reads a moveit_msgs/MotionPlanRequest.
 
@@ -110,10 +110,7 @@ def _workspace(scene: PlanningScene, message: Any) -> Workspace | None:
 
 
 def answer(
-    context: MoveGroupContext,
-    message: Any,
-    change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
-    cancelled: Callable[[], bool] = lambda: False,
+    context: MoveGroupContext, message: Any, change: SceneChange, cancelled: Callable[[], bool]
 ) -> MotionPlanResponse:
     """Plans, reports and shows the motion.
 
@@ -163,18 +160,3 @@ def answer(
     context.markers.show_contacts(())
     context.markers.show_path(scene, response, found)
     return response
-
-
-def plan(
-    context: MoveGroupContext,
-    message: Any,
-    change: Callable[[PlanningScene], PlanningScene] = lambda s: s,
-    cancelled: Callable[[], bool] = lambda: False,
-) -> MotionPlanResponse:
-    """As `answer`, but a failure comes back as the response's code, never as an exception."""
-    try:
-        return answer(context, message, change, cancelled)
-    except PlanningError as error:
-        response = MotionPlanResponse(group_name=message.group_name)
-        response.error_code.val = error.code
-        return response

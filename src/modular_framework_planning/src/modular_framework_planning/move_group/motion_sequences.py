@@ -24,7 +24,7 @@ from modular_framework_planning.planners.pilz.sequence import (
     SequencePart,
     checked_radii,
 )
-from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,18 +37,11 @@ class SolvedSequence:
 
 
 def solve_sequence(
-    context: MoveGroupContext,
-    message: Any,
-    change: Callable[[PlanningScene], PlanningScene],
-    cancelled: Callable[[], bool] = lambda: False,
+    context: MoveGroupContext, message: Any, change: SceneChange, cancelled: Callable[[], bool]
 ) -> SolvedSequence:
     """Plans all motions or none; failures come back as a code and a reason, never as an exception.
 
-    Args:
-        context: parts of the node.
-        message: moveit_msgs/MotionSequenceRequest.
-        change: changes the scene for this plan only.
-        cancelled: true when the caller gave up.
+    Args: as those of `motion_plan_requests.answer`, with a moveit_msgs/MotionSequenceRequest.
     """
     begun = time.monotonic()
     response = MotionSequenceResponse()
@@ -71,10 +64,7 @@ def solve_sequence(
 
 
 def _plan(
-    context: MoveGroupContext,
-    items: Sequence[Any],
-    change: Callable[[PlanningScene], PlanningScene],
-    cancelled: Callable[[], bool],
+    context: MoveGroupContext, items: Sequence[Any], change: SceneChange, cancelled: Callable[[], bool]
 ) -> tuple[SequencePart, ...]:
     """Plans each motion from the end of the one before, then joins them; raises PlanningError with the item."""
     radii, warnings = checked_radii(

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group.context import MoveGroupContext
-from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
 
 PERIOD_S = 0.05  # between two checks of the scene
@@ -31,7 +30,7 @@ class WatchedMotion:
         context: MoveGroupContext,
         trajectory: Any,
         planned_in: PlanningScene,
-        change: Callable[[PlanningScene], PlanningScene] = lambda scene: scene,
+        change: SceneChange,
     ) -> None:
         """Takes a motion.
 

@@ -31,7 +31,7 @@ from modular_framework_planning.planning_interface.collision_checker import Coll
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningAnswer, PlanningRequest
-from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.line_timing import time_line
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -39,7 +39,6 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 CHECK_STEP = 0.004  # [rad or m] between checked states
 DISTANCE_SLACK_M = 1.0e-6
 
-SceneChange = Callable[[PlanningScene], PlanningScene]
 Posture = Mapping[str, float]
 
 

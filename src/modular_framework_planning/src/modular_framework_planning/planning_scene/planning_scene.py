@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -288,6 +288,9 @@ class PlanningScene:
             at = self.positions if positions is None else positions
             return self.model.link_transforms(at)[item.link] * item.body.pose
         return None
+
+
+SceneChange = Callable[[PlanningScene], PlanningScene]
 
 
 def _place_in_message(shape: Shape) -> int:

@@ -25,7 +25,7 @@ from modular_framework_planning.messages.constraint_conversions import constrain
 from modular_framework_planning.messages.conversions import scene_with_state, state_message, trajectory_message
 from modular_framework_planning.messages.poses import transform_from_pose
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
@@ -49,7 +49,7 @@ class _Lines:
     checker: CollisionChecker | None
 
 
-class CartesianPathService:
+class CartesianPathService(ServiceCapability):
     """Offers compute_cartesian_path (moveit_msgs/GetCartesianPath).
 
     As in MoveIt the answer is a success with the fraction that was found, also where that is less than 1; the log and
@@ -57,12 +57,7 @@ class CartesianPathService:
     are relative to the waypoint before.
     """
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
-
-    def connect(self) -> None:
-        """Advertises the service."""
-        rospy.Service(names.CARTESIAN_PATH_SERVICE, GetCartesianPath, self._serve)
+    name, kind = names.CARTESIAN_PATH_SERVICE, GetCartesianPath
 
     def _serve(self, request: Any) -> GetCartesianPathResponse:
         response = GetCartesianPathResponse()

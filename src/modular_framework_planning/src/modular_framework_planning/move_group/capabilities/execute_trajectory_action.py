@@ -3,41 +3,31 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
+from threading import Event
 from typing import Any
 
-from moveit_msgs.msg import ExecuteTrajectoryAction, ExecuteTrajectoryFeedback, ExecuteTrajectoryResult
+from moveit_msgs.msg import ExecuteTrajectoryAction, ExecuteTrajectoryResult
 
 from modular_framework_planning.errors import ErrorCode
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
-from modular_framework_planning.move_group.goal_runner import GoalRunner
+from modular_framework_planning.move_group.capabilities.capability import ActionCapability, PublishState
 
 
-class ExecuteTrajectory:
+class ExecuteTrajectory(ActionCapability):
     """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory)."""
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
-        self._runner = GoalRunner(names.EXECUTE_ACTION, ExecuteTrajectoryAction, self._work)
+    name, kind = names.EXECUTE_ACTION, ExecuteTrajectoryAction
 
-    def connect(self) -> None:
-        """Starts the action server."""
-        self._runner.connect()
-
-    def _work(
-        self, goal: Any, cancelled: threading.Event, feedback: Callable[[Any], None]
-    ) -> tuple[ExecuteTrajectoryResult, bool, str]:
+    def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[ExecuteTrajectoryResult, str]:
         result = ExecuteTrajectoryResult()
-        feedback(ExecuteTrajectoryFeedback("MONITOR"))
+        publish_state("MONITOR")
         joints = list(goal.trajectory.joint_trajectory.joint_names)
         try:
             self._context.execution.execute(goal.trajectory, cancelled)
         except Exception as error:  # noqa: BLE001 - the client must get a code; the reporter logs the error
             result.error_code.val = self._context.reporter.failure("execute", error, joints=joints)
-            return result, False, str(error)
+            return result, str(error)
         result.error_code.val = ErrorCode.SUCCESS
         self._context.reporter.report("execute", ErrorCode.SUCCESS, "", joints=joints)
-        feedback(ExecuteTrajectoryFeedback("IDLE"))
-        return result, True, "motion executed"
+        publish_state("IDLE")
+        return result, "motion executed"

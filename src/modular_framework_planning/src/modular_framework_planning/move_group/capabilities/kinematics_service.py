@@ -25,7 +25,7 @@ from modular_framework_planning.messages.constraint_conversions import constrain
 from modular_framework_planning.messages.conversions import scene_with_state, state_message
 from modular_framework_planning.messages.poses import pose_message, stamped_in_scene
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup
 
@@ -69,11 +69,8 @@ class _Wanted:
         return solver.explain_unreachable(self.link, self.target * self.placed.inverse(), seed)
 
 
-class KinematicsService:
+class KinematicsService(MoveGroupCapability):
     """Offers compute_ik (GetPositionIK) and compute_fk (GetPositionFK)."""
-
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
 
     def connect(self) -> None:
         """Advertises both services."""

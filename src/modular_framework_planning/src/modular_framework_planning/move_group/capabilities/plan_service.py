@@ -3,23 +3,27 @@
 
 from __future__ import annotations
 
-import rospy
+from typing import Any
+
 from moveit_msgs.srv import GetMotionPlan, GetMotionPlanResponse
 
+from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
-from modular_framework_planning.move_group.motion_plan_requests import plan
+from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
+from modular_framework_planning.move_group.motion_plan_requests import answer
 
 
-class PlanService:
+class PlanService(ServiceCapability):
     """Offers plan_kinematic_path (moveit_msgs/GetMotionPlan)."""
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
+    name, kind = names.PLAN_SERVICE, GetMotionPlan
 
-    def connect(self) -> None:
-        """Advertises the service."""
-        rospy.Service(names.PLAN_SERVICE, GetMotionPlan, self._serve)
-
-    def _serve(self, request: object) -> GetMotionPlanResponse:
-        return GetMotionPlanResponse(plan(self._context, request.motion_plan_request))  # type: ignore[attr-defined]
+    def _serve(self, request: Any) -> GetMotionPlanResponse:
+        message = request.motion_plan_request
+        try:
+            return GetMotionPlanResponse(answer(self._context, message, lambda scene: scene, lambda: False))
+        except PlanningError as error:
+            response = GetMotionPlanResponse()
+            response.motion_plan_response.group_name = message.group_name
+            response.motion_plan_response.error_code.val = error.code
+            return response

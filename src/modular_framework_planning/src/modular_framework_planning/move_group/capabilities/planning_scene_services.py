@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import rospy
 from moveit_msgs.srv import (
     ApplyPlanningScene,
     ApplyPlanningSceneResponse,
@@ -16,32 +15,22 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from modular_framework_planning.messages.scene_messages import apply_scene, scene_message
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 
 
-class GetPlanningSceneService:
+class GetPlanningSceneService(ServiceCapability):
     """Offers get_planning_scene (GetPlanningScene): the asked parts of the current scene."""
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
-
-    def connect(self) -> None:
-        """Advertises the service."""
-        rospy.Service(names.GET_SCENE_SERVICE, GetPlanningScene, self._serve)
+    name, kind = names.GET_SCENE_SERVICE, GetPlanningScene
 
     def _serve(self, request: Any) -> GetPlanningSceneResponse:
         return GetPlanningSceneResponse(scene_message(self._context.monitor.snapshot(), request.components.components))
 
 
-class ApplyPlanningSceneService:
+class ApplyPlanningSceneService(ServiceCapability):
     """Offers apply_planning_scene (ApplyPlanningScene); a change is in force when it answers."""
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
-
-    def connect(self) -> None:
-        """Advertises the service."""
-        rospy.Service(names.APPLY_SCENE_SERVICE, ApplyPlanningScene, self._serve)
+    name, kind = names.APPLY_SCENE_SERVICE, ApplyPlanningScene
 
     def _serve(self, request: Any) -> ApplyPlanningSceneResponse:
         try:
@@ -52,15 +41,10 @@ class ApplyPlanningSceneService:
         return ApplyPlanningSceneResponse(success=True)
 
 
-class ClearOctomapService:
+class ClearOctomapService(ServiceCapability):
     """Offers clear_octomap (std_srvs/Empty): the octomap is empty until a sensor's next message."""
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
-
-    def connect(self) -> None:
-        """Advertises the service."""
-        rospy.Service(names.CLEAR_OCTOMAP_SERVICE, Empty, self._serve)
+    name, kind = names.CLEAR_OCTOMAP_SERVICE, Empty
 
     def _serve(self, _: Any) -> EmptyResponse:
         self._context.monitor.apply(lambda scene: scene.with_octomap(None))

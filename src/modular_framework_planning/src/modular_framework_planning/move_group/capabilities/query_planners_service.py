@@ -18,15 +18,12 @@ from moveit_msgs.srv import (
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 
 
-class QueryPlannersService:
+class QueryPlannersService(MoveGroupCapability):
     """Offers query_planner_interface, get_planner_params and set_planner_params."""
-
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
 
     def connect(self) -> None:
         """Advertises the services."""

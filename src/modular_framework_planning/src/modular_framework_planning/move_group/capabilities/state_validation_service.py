@@ -15,18 +15,13 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.constraint_conversions import evaluated_one_by_one, result_messages
 from modular_framework_planning.messages.conversions import BODY_TYPES, scene_with_state
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.move_group.context import MoveGroupContext
+from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 
 
-class StateValidationService:
+class StateValidationService(ServiceCapability):
     """Offers check_state_validity (moveit_msgs/GetStateValidity)."""
 
-    def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
-
-    def connect(self) -> None:
-        """Advertises the service."""
-        rospy.Service(names.STATE_VALIDITY_SERVICE, GetStateValidity, self._serve)
+    name, kind = names.STATE_VALIDITY_SERVICE, GetStateValidity
 
     def _serve(self, request: Any) -> GetStateValidityResponse:
         try:

@@ -11,19 +11,20 @@ from geometry_msgs.msg import TransformStamped
 
 from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.messages.poses import pose_message
+from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 from modular_framework_planning.move_group.context import MoveGroupContext
 
 DEFAULT_RATE_HZ = 10.0
 
 
-class TfPublisher:
+class TfPublisher(MoveGroupCapability):
     """Broadcasts a frame for every world and attached object, and for each of their subframes ("object/subframe").
 
     Parameters: ~planning_scene_frame_publishing_rate (10) [Hz], ~planning_scene_tf_prefix ("").
     """
 
     def __init__(self, context: MoveGroupContext) -> None:
-        self._context = context
+        super().__init__(context)
         self._rate_hz = float(rospy.get_param("~planning_scene_frame_publishing_rate", DEFAULT_RATE_HZ))
         self._prefix = str(rospy.get_param("~planning_scene_tf_prefix", "")).rstrip("/")
 

@@ -26,7 +26,7 @@ from modular_framework_planning.move_group.monitors.joint_history import JointHi
 from modular_framework_planning.move_group.monitors.tf_frames import TfFrames
 from modular_framework_planning.move_group.node_settings import SceneMonitorSettings
 from modular_framework_planning.planning_scene.padding import Padding
-from modular_framework_planning.planning_scene.planning_scene import PlanningScene, empty_scene
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 
@@ -133,7 +133,7 @@ class SceneMonitor:
         except (ValueError, TypeError, IndexError) as error:
             rospy.logerr("%s: message ignored, it is malformed: %s", rospy.resolve_name(topic), error)
 
-    def apply(self, change: Callable[[PlanningScene], PlanningScene]) -> PlanningScene:
+    def apply(self, change: SceneChange) -> PlanningScene:
         """Changes the scene, all or nothing; the next snapshot has the change. Raises PlanningError."""
         frames = self._frames.now()
         with self._lock:

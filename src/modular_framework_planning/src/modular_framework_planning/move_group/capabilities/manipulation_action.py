@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the actions pickup and place have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from threading import Event
+from typing import Any
+
+from modular_framework_planning.move_group.capabilities.capability import ActionCapability, PublishState
+from modular_framework_planning.move_group.manipulation import Manipulation, Task
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+
+
+class ManipulationAction(ActionCapability):
+    """Carries out a task with the best feasible one of several candidates."""
+
+    def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
+        result = self.kind().action_result.result
+        text = Manipulation(self._context, self._task(goal, result), cancelled, publish_state).run(result)
+        publish_state("IDLE")
+        return result, text
+
+    @abstractmethod
+    def _task(self, goal: Any, result: Any) -> Task:
+        """Returns what is to be done; it notes in the result which candidate was taken."""
+
+
+def check_objects(scene: PlanningScene, goal: Any) -> None:
+    """Refuses a goal whose support surface or touch objects the scene does not have; raises PlanningError."""
+    for name in (goal.support_surface_name, *goal.allowed_touch_objects):
+        if name:
+            scene.find_object(name)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An action that plans and, unless plan_only is set, executes, and does both again as often as its goal allows."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from threading import Event
+from typing import Any
+
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.move_group.capabilities.capability import ActionCapability, PublishState
+from modular_framework_planning.move_group.goal_runner import error_code_of
+from modular_framework_planning.move_group.planning_options import check_options, scene_change
+from modular_framework_planning.planning_scene.planning_scene import SceneChange
+
+SHORTEST_DELAY_S = 0.05  # between two attempts: a plan that fails at once must not fill the log
+WORTH_ANOTHER_TRY = (
+    ErrorCode.PLANNING_FAILED,
+    ErrorCode.INVALID_MOTION_PLAN,
+    ErrorCode.TIMED_OUT,
+    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedMotion:
+    """What one attempt to plan came to.
+
+    Attributes:
+        result: of the action; its code says whether there is a plan.
+        text: a sentence about it.
+        execute: executes the plan; raises PlanningError. None where there is no plan.
+        details: what the report of the execution says besides its code.
+    """
+
+    result: Any
+    text: str
+    execute: Callable[[], None] | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+class PlannedMotionAction(ActionCapability):
+    """Honours planning_options but for look_around, which is refused; `report` is the kind of its failures' reports."""
+
+    report: str
+
+    def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
+        options = goal.planning_options
+        attempts = self._context.settings.plan_execution.attempts(options)
+        result, text = self.kind().action_result.result, ""
+        try:
+            check_options(options)
+            for number in range(attempts):
+                result, text = self._plan_and_execute(goal, cancelled, publish_state)
+                if error_code_of(result).val not in WORTH_ANOTHER_TRY or number + 1 == attempts:
+                    break
+                if cancelled.wait(max(options.replan_delay, SHORTEST_DELAY_S)):
+                    raise PlanningError(ErrorCode.PREEMPTED, "cancelled before the next attempt")
+        except PlanningError as error:
+            error_code_of(result).val = self._context.reporter.failure(self.report, error, **self._details(goal))
+            text = error.reason
+        publish_state("IDLE")
+        return result, text
+
+    def _plan_and_execute(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
+        """Plans once and executes once; failures come back as a code with their reason."""
+        moves = not goal.planning_options.plan_only
+        change = scene_change(goal.planning_options, moves)
+        publish_state("PLANNING")
+        planned = self._plan(goal, change, cancelled)
+        if not moves or planned.execute is None:
+            return planned.result, planned.text
+        publish_state("MONITOR")
+        try:
+            planned.execute()
+        except Exception as error:  # noqa: BLE001 - the client must get a code; the reporter logs the error
+            code = self._context.reporter.failure("execute", error, **self._details(goal))
+            error_code_of(planned.result).val = code
+            return planned.result, str(error)
+        self._context.reporter.report("execute", ErrorCode.SUCCESS, "", **planned.details)
+        return planned.result, "planned and executed"
+
+    @abstractmethod
+    def _plan(self, goal: Any, change: SceneChange, cancelled: Event) -> PlannedMotion:
+        """Plans once, in the monitored scene with a change; a failure comes back as a code with its reason."""
+
+    def _details(self, _: Any) -> dict[str, Any]:
+        """Returns what the report of a goal's failure says besides code and reason."""
+        return {}
