@@ -11,6 +11,7 @@ from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
 from modular_framework_core.managers.acm import AcmAnswer, AcmManager
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix
+from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.managers.ros_simulated_objects import new_movable_objects
 from modular_framework_core.srv import (
     GetModifiedACM,
@@ -72,7 +73,7 @@ def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
         )
 
 
-class AcmServices:
+class AcmServices(ManagerServices):
     """The collision matrix manager behind its services.
 
     Parameters:
@@ -92,7 +93,7 @@ class AcmServices:
     def __init__(self) -> None:
         """Makes a manager without a matrix; nothing is advertised before :meth:`connect`."""
         self.manager = AcmManager()
-        self._services: list[rospy.Service] = []
+        super().__init__()
 
     def connect(self) -> None:
         """Advertises the services."""
@@ -103,11 +104,6 @@ class AcmServices:
             rospy.Service("get_modified_acm", GetModifiedACM, self._get_modified),
             rospy.Service("modify_acm", ModifyACM, self._modify_links),
         ]
-
-    def close(self) -> None:
-        """Withdraws the services; may be called twice."""
-        while self._services:
-            self._services.pop().shutdown("the manager is closed")
 
     def _set_init(self, request: Any) -> SetInitACMResponse:
         try:

@@ -17,6 +17,7 @@ from modular_framework_core.files.yaml_entries import EntryError
 from modular_framework_core.managers import message_files
 from modular_framework_core.managers.message_numbers import unusable_position
 from modular_framework_core.managers.message_store import Change, MessageNotFoundError, MessageStore
+from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.msg import ManagerChange
 
 OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes reports every one
@@ -100,7 +101,7 @@ class NamedFile:
     read: Callable[[Path], tuple[dict[str, Any], list[EntryError]]]
 
 
-class MessageServices:
+class MessageServices(ManagerServices):
     """One store behind its services.
 
     A request that cannot be served answers ``success=False`` and logs the reason; it never raises.
@@ -127,7 +128,7 @@ class MessageServices:
         self.store: MessageStore[Any] = MessageStore(
             kind.noun, complete_grasp_id if kind is GRASP else None, self._publish_change
         )
-        self._services: list[rospy.Service] = []
+        super().__init__()
         self._changes: rospy.Publisher | None = None
         if named_file is not None:
             for fault in self._read(named_file)[1]:
@@ -150,11 +151,6 @@ class MessageServices:
 
     def _serve(self, name: str, service_type: Any, work: Callable[[Any], Any]) -> None:
         self._services.append(rospy.Service(name, service_type, work))
-
-    def close(self) -> None:
-        """Withdraws the services; may be called twice."""
-        while self._services:
-            self._services.pop().shutdown("the manager is closed")
 
     def _publish_change(self, change: Change) -> None:
         if self._changes is not None:

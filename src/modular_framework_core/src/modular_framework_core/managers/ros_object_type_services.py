@@ -8,6 +8,7 @@ from typing import Any
 import rospy
 
 from modular_framework_core.managers.object_types import ObjectTypeError, ObjectTypes
+from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.srv import (
     AddGazeboMapping,
     AddGazeboMappingResponse,
@@ -18,7 +19,7 @@ from modular_framework_core.srv import (
 )
 
 
-class ObjectTypeServices:
+class ObjectTypeServices(ManagerServices):
     """The object types behind their services.
 
     Services:
@@ -29,7 +30,7 @@ class ObjectTypeServices:
     def __init__(self) -> None:
         """Makes an empty map; nothing is advertised before :meth:`connect`."""
         self.types = ObjectTypes()
-        self._services: list[rospy.Service] = []
+        super().__init__()
 
     def connect(self) -> None:
         """Advertises the services."""
@@ -38,11 +39,6 @@ class ObjectTypeServices:
             rospy.Service("get_object_type", GetGazeboType, self._get),
             rospy.Service("delete_gazebo_mapping", DeleteGazeboMapping, self._delete),
         ]
-
-    def close(self) -> None:
-        """Withdraws the services; may be called twice."""
-        while self._services:
-            self._services.pop().shutdown("the manager is closed")
 
     def _add(self, request: Any) -> AddGazeboMappingResponse:
         try:

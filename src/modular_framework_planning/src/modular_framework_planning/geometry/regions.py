@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.optimize import nnls
@@ -93,19 +93,26 @@ def _in_slice(point: Array, radius: float, z: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class CylinderSolid:
-    """A cylinder along z, centred; height and radius [m]."""
+class _RoundSolid:
+    """A solid around the z axis, the middle of its height at the origin; height and radius [m]."""
 
+    kind: ClassVar[str]
     height: float
     radius: float
 
     def __post_init__(self) -> None:
-        _require_lengths("cylinder", height=self.height, radius=self.radius)
+        _require_lengths(self.kind, height=self.height, radius=self.radius)
 
     @property
     def extent(self) -> float:
         """Greatest distance of a point from the origin [m]."""
         return float(np.hypot(0.5 * self.height, self.radius))
+
+
+class CylinderSolid(_RoundSolid):
+    """A cylinder."""
+
+    kind = "cylinder"
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the cylinder."""
@@ -119,20 +126,10 @@ class CylinderSolid:
         return np.array([radius * np.cos(angle), radius * np.sin(angle), self.height * rng.uniform(-0.5, 0.5)])
 
 
-@dataclass(frozen=True, slots=True)
-class ConeSolid:
-    """A cone along z, tip up, the middle of its axis at the origin; height and radius of the base [m]."""
+class ConeSolid(_RoundSolid):
+    """A cone, tip up; the radius is that of its base."""
 
-    height: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        _require_lengths("cone", height=self.height, radius=self.radius)
-
-    @property
-    def extent(self) -> float:
-        """Greatest distance of a point from the origin [m]."""
-        return float(np.hypot(0.5 * self.height, self.radius))
+    kind = "cone"
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the cone: that of the triangle whose rotation makes the cone."""

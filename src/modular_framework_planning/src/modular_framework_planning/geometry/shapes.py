@@ -73,42 +73,32 @@ class Sphere(Shape):
 
 
 @dataclass(frozen=True, eq=False)
-class Cylinder(Shape):
-    """A cylinder along z centred at the origin; height and radius [m]."""
+class RoundShape(Shape):
+    """A shape around the z axis, the middle of its height at the origin; height and radius [m]."""
 
     height: float
     radius: float
 
     def __post_init__(self) -> None:
-        _require_positive("cylinder", height=self.height, radius=self.radius)
+        _require_positive(type(self).__name__.lower(), height=self.height, radius=self.radius)
+
+
+class Cylinder(RoundShape):
+    """A cylinder."""
 
     def _build(self) -> Any:
         return coal.Cylinder(self.radius, self.height)
 
 
-@dataclass(frozen=True, eq=False)
-class Capsule(Shape):
-    """A cylinder along z centred at the origin with half spheres on both ends; the cylinder's height, radius [m]."""
-
-    height: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        _require_positive("capsule", height=self.height, radius=self.radius)
+class Capsule(RoundShape):
+    """A cylinder with half spheres on both ends, which its height leaves out."""
 
     def _build(self) -> Any:
         return coal.Capsule(self.radius, self.height)
 
 
-@dataclass(frozen=True, eq=False)
-class Cone(Shape):
-    """A cone along z, its axis' middle at the origin, tip up; height and radius [m]."""
-
-    height: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        _require_positive("cone", height=self.height, radius=self.radius)
+class Cone(RoundShape):
+    """A cone, tip up."""
 
     def _build(self) -> Any:
         return coal.Cone(self.radius, self.height)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
@@ -121,7 +122,7 @@ class InverseKinematics:
         target: Transform,
         seed: Array,
         timeout_s: float | None = None,
-        rng: np.random.Generator | None = None,
+        rng: Generator | None = None,
     ) -> list[Array]:
         """Returns all solutions found, as positions of the whole robot, nearest to the seed first.
 
@@ -146,7 +147,7 @@ class InverseKinematics:
         position: Array,
         seed: Array,
         timeout_s: float | None = None,
-        rng: np.random.Generator | None = None,
+        rng: Generator | None = None,
     ) -> list[Array]:
         """As `solutions`, for the position of a point alone; the orientation is left open, and kept where it can be.
 
@@ -236,7 +237,7 @@ class InverseKinematics:
         rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
         return whole_turns(rows, self._turning, problem.lower, problem.upper, MAX_TURNS)
 
-    def _from_search(self, problem: _Problem, rng: np.random.Generator) -> Array:
+    def _from_search(self, problem: _Problem, rng: Generator) -> Array:
         """Searches from the seed, then from random positions, until there are enough, no new ones, or no time left."""
         lower = np.maximum(problem.lower, problem.seed - 2.0 * np.pi)
         upper = np.minimum(problem.upper, problem.seed + 2.0 * np.pi)

@@ -14,18 +14,31 @@ IGNORED_KEYS = ("sensor_plugin", "sensor_type", "name")  # known to MoveIt's own
 COUNTS = ("point_subsample", "queue_size")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpdaterSettings:
+    """What all updaters of the octomap have; keys and defaults are MoveIt's.
+
+    Attributes:
+        max_update_rate: messages processed a second at most [Hz]; 0 for all.
+        filtered_cloud_topic: where what is left without the robot and the objects is published, a cloud or a depth
+            image (16UC1, mm); empty for nowhere.
+        ns: namespace of that topic within the node's.
+    """
+
+    max_update_rate: float = 0.0
+    filtered_cloud_topic: str = ""
+    ns: str = ""
+
+
 @dataclass(frozen=True, slots=True)
-class PointCloudSettings:
-    """A PointCloudOctomapUpdater; keys and defaults are MoveIt's.
+class PointCloudSettings(UpdaterSettings):
+    """A PointCloudOctomapUpdater.
 
     Attributes:
         point_cloud_topic: sensor_msgs/PointCloud2.
         max_range: points further away only clear [m].
         point_subsample: every n-th point of every n-th row is used.
         padding_offset, padding_scale: how much larger the robot and the objects are taken [m and 1].
-        max_update_rate: messages processed a second at most [Hz]; 0 for all.
-        filtered_cloud_topic: where the points that are left are published; empty for nowhere.
-        ns: namespace of that topic within the node's.
     """
 
     point_cloud_topic: str
@@ -33,14 +46,11 @@ class PointCloudSettings:
     point_subsample: int = 1
     padding_offset: float = 0.0
     padding_scale: float = 1.0
-    max_update_rate: float = 0.0
-    filtered_cloud_topic: str = ""
-    ns: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class DepthImageSettings:
-    """A DepthImageOctomapUpdater; keys and defaults are MoveIt's.
+class DepthImageSettings(UpdaterSettings):
+    """A DepthImageOctomapUpdater.
 
     Attributes:
         image_topic: sensor_msgs/Image; camera_info is expected beside it.
@@ -49,10 +59,7 @@ class DepthImageSettings:
         shadow_threshold: a reading this little behind the robot or an object belongs to it [m].
         padding_scale: how many times the camera's depth noise is added to the padding [1].
         padding_offset: padding of the robot and of objects [m].
-        max_update_rate: messages processed a second at most [Hz]; 0 for all.
         skip_vertical_pixels, skip_horizontal_pixels: border that is left out on each side [pixel].
-        filtered_cloud_topic: where the depth image that is left is published (16UC1, mm); empty for nowhere.
-        ns: namespace of that topic within the node's.
     """
 
     image_topic: str = "depth"
@@ -62,11 +69,8 @@ class DepthImageSettings:
     shadow_threshold: float = 0.04
     padding_scale: float = 0.0
     padding_offset: float = 0.02
-    max_update_rate: float = 0.0
     skip_vertical_pixels: int = 4
     skip_horizontal_pixels: int = 6
-    filtered_cloud_topic: str = ""
-    ns: str = ""
 
 
 SensorSettings = PointCloudSettings | DepthImageSettings
