@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import actionlib
@@ -38,6 +38,7 @@ class HinderedRobotHW(MockRobotHW):
         reason: the fault; "" for none.
         scaling: its speed slider.
         switching: how far it is with getting ready for its controllers.
+        switches: how many switches of its controllers have begun.
     """
 
     def __init__(self) -> None:
@@ -45,6 +46,7 @@ class HinderedRobotHW(MockRobotHW):
         self.blocked: dict[str, float] = {}
         self.reason = ""
         self.switching = SwitchState.DONE
+        self.switches = 0
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         joints = robot_hw_nh.get_param("joints")
@@ -55,6 +57,10 @@ class HinderedRobotHW(MockRobotHW):
 
     def fault(self) -> str:
         return self.reason
+
+    def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
+        super().do_switch(start, stop)
+        self.switches += 1
 
     def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
         return self.switching
@@ -113,11 +119,11 @@ class SteppedRobot:
 
     def flush(self) -> None:
         """Let everything be published that the controllers have told so far."""
-        self._manager._outbox.flush(WAIT_S)
+        self._manager.flush(WAIT_S)
 
     def count_submissions(self, name: str) -> list[float]:
         """A list that grows with everything handed to a controller from now on: when, in simulated time."""
-        controller = next(entry.controller for entry in self._manager.manager._loaded if entry.name == name)
+        controller: Any = self._manager.manager.get_controller_by_name(name)
         submit, times_s = controller.submit, []
 
         def counted(*arguments: Any) -> None:

@@ -54,7 +54,7 @@ class Gripper:
     @property
     def commanded(self) -> Any:
         """The handle of the joint as the hardware sees it."""
-        return self.hardware._handles[0]
+        return self.hardware.interfaces[-1].handles[0]
 
     def send(self, position: float, max_effort: float = 0.0, feedback: Any = None) -> Any:
         """Send a goal and wait until it runs or is refused."""

@@ -35,8 +35,9 @@ class Switch:
         self._robot = robot
         self._answers: list[SwitchControllerResponse] = []
         self._thread = threading.Thread(target=self._call, args=(start_asap, timeout_s), daemon=True)
+        before = robot.hardware["slow"].switches
         self._thread.start()
-        robot.wait_until(lambda: robot._manager.manager._pending)
+        robot.wait_until(lambda: robot.hardware["slow"].switches > before)
 
     def _call(self, *arguments: Any) -> None:
         service = rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)

@@ -13,6 +13,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 
+from modular_framework_core.commander import arm_commander
 from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message
 
@@ -171,6 +172,8 @@ def test_settings_out_of_range_are_refused(commander, method: str, value: float)
 
 
 def test_a_motion_that_does_not_end_because_time_stands_still_says_so(commander, monkeypatch) -> None:
-    assert "stands still" not in commander._execution_result(GoalStatus.LOST, 1.0).reason
+    plan = commander.plan_to_joint_value_target({"jx": 0.4}).trajectory
+    monkeypatch.setattr(arm_commander, "wait_for_result", lambda *_: GoalStatus.LOST)
+    assert "stands still" not in commander.execute_plan(plan).reason
     monkeypatch.setattr(rospy, "get_time", lambda: 5.0)
-    assert "stands still at 5.000 s" in commander._execution_result(GoalStatus.LOST, 1.0).reason
+    assert "stands still at 5.000 s" in commander.execute_plan(plan).reason

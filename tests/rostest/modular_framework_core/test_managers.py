@@ -8,7 +8,7 @@ import math
 import os
 import threading
 from pathlib import Path
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import Transport
 
 import pytest
 import rospy
@@ -417,15 +417,17 @@ def test_poses_of_the_file_are_poses_of_things_and_of_robots(managers):
 def test_a_line_of_the_log_asks_the_master_nothing(managers, monkeypatch):
     rospy.loginfo("the first line may ask for the parameter, which is remembered")
     calls = []
-    ask = ServerProxy._ServerProxy__request
+    ask = Transport.request
     this = threading.current_thread()
 
-    def request(*call):
+    def request(*call, **options):
         if threading.current_thread() is this:
-            calls.append(call[1])
-        return ask(*call)
+            calls.append(call[1:])
+        return ask(*call, **options)
 
-    monkeypatch.setattr(ServerProxy, "_ServerProxy__request", request)
+    monkeypatch.setattr(Transport, "request", request)
+    assert rospy.get_param("/rosout_disable_topics_generation") is False and calls
+    calls.clear()
     rospy.loginfo("another line")
     assert calls == []
     assert rospy.get_param("/rosout_disable_topics_generation") is False  # topics are still named in every line

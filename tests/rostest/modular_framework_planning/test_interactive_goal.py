@@ -262,9 +262,10 @@ class WatchedLock:
 
 
 class GoalWithoutRobot(InteractiveGoal):
-    """Its jobs only."""
+    """Its jobs only, which the test gives."""
 
-    def __init__(self) -> None:
+    def __init__(self, plan: Callable[[], object], execute: Callable[[], object]) -> None:
+        self._plan, self._execute = plan, execute
         self._job = WatchedLock()
         self.awaited = self._job.awaited
         self.said: list[str] = []
@@ -272,10 +273,11 @@ class GoalWithoutRobot(InteractiveGoal):
 
 
 def test_a_job_begins_when_the_one_before_has_said_its_last_word_and_not_while_it_works() -> None:
-    goal, done, finish = GoalWithoutRobot(), threading.Event(), threading.Event()
-    goal._begin("planning", lambda: goal.awaited.wait(30.0))
-    goal._begin("executing", lambda: done.set() or finish.wait(30.0))
+    done, finish = threading.Event(), threading.Event()
+    goal = GoalWithoutRobot(lambda: goal.awaited.wait(30.0), lambda: done.set() or finish.wait(30.0))
+    goal.plan()
+    goal.execute()
     assert done.wait(30.0), goal.said
-    goal._begin("planning again", lambda: None)
+    goal.plan()
     finish.set()
-    assert goal.said[-1] == "not planning again: busy; stop first"
+    assert goal.said[-1] == "not planning: busy; stop first"

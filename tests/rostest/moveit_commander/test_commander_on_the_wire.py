@@ -8,19 +8,23 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import actionlib
 import moveit_commander
 import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_commander import MoveGroupCommander, MoveItCommanderException, RobotCommander
-from moveit_commander.servers import Servers
 from moveit_msgs.msg import (
     Constraints,
+    ExecuteTrajectoryAction,
+    MoveGroupAction,
     MoveItErrorCodes,
+    RobotState,
     RobotTrajectory,
     TrajectoryConstraints,
 )
+from moveit_msgs.srv import GetPositionFK
 from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -48,6 +52,13 @@ def session(ros_session: Any) -> Iterator[Any]:
     yield ros_session
     assert ros_session.answers("/move_group"), ros_session.log()
     moveit_commander.roscpp_shutdown()
+
+
+def pose_of(link: str, state: RobotState) -> PoseStamped:
+    """Where a link is in a state of the robot."""
+    answer = rospy.ServiceProxy("compute_fk", GetPositionFK)(Header(), [link], state)
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS
+    return answer.pose_stamped[0]
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +223,7 @@ def test_the_jacobian_is_the_slope_of_forward_kinematics(arm: MoveGroupCommander
                 value + shift * (key == name)
                 for key, value in zip(state.joint_state.name, state.joint_state.position, strict=True)
             ]
-            ends.append(place_of(arm._pose_of("", state))[:3])
+            ends.append(place_of(pose_of(arm.get_end_effector_link(), state))[:3])
         slope = (np.array(ends[1]) - ends[0]) / (2.0 * step)
         assert np.allclose(slope, jacobian[:3, column], atol=1e-4), name
 
@@ -335,7 +346,7 @@ def test_a_pose_becomes_joint_values(arm: MoveGroupCommander) -> None:
         found = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
         found.update(zip(arm.get_active_joints(), values, strict=True))
         state.joint_state.name, state.joint_state.position = list(found), list(found.values())
-        assert place_of(arm._pose_of("", state))[:3] == pytest.approx([0.1, 0.5, 0.95], abs=1e-4)
+        assert place_of(pose_of(arm.get_end_effector_link(), state))[:3] == pytest.approx([0.1, 0.5, 0.95], abs=1e-4)
 
 
 def test_named_and_remembered_targets(arm: MoveGroupCommander) -> None:
@@ -466,12 +477,15 @@ def test_a_straight_line_is_followed_or_the_missing_service_named(arm: MoveGroup
     for options in ((), (0.0,), (0.0, True), (True,), (True, Constraints())):
         path, fraction = arm.compute_cartesian_path([pose], 0.01, *options)
         assert fraction == pytest.approx(1.0) and path.joint_trajectory.points
-    servers, arm._servers = arm._servers, Servers("nowhere")
-    try:
-        with pytest.raises(MoveItCommanderException, match="service /nowhere/compute_cartesian_path.*nobody offers it"):
-            arm.compute_cartesian_path([pose], 0.01, avoid_collisions=True)
-    finally:
-        arm._servers = servers
+    actions = [
+        actionlib.SimpleActionServer(f"nowhere/{name}", kind, lambda _: None, auto_start=False)
+        for name, kind in (("move_group", MoveGroupAction), ("execute_trajectory", ExecuteTrajectoryAction))
+    ]
+    for action in actions:
+        action.start()
+    lonely = MoveGroupCommander(arm.get_name(), ns="nowhere")
+    with pytest.raises(MoveItCommanderException, match="service /nowhere/compute_cartesian_path.*nobody offers it"):
+        lonely.compute_cartesian_path([pose], 0.01, avoid_collisions=True)
     with pytest.raises(TypeError, match="allowed"):
         arm.compute_cartesian_path([pose], 0.01, 0.0, True, None, 1)
     with pytest.raises(MoveItCommanderException, match="constraint type"):

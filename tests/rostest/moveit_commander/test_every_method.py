@@ -43,7 +43,7 @@ from moveit_msgs.msg import (
     RobotState,
     TrajectoryConstraints,
 )
-from moveit_msgs.srv import GetPlannerParams, SetPlannerParams
+from moveit_msgs.srv import GetPlannerParams, GetPositionFK, SetPlannerParams
 from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -60,6 +60,13 @@ READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 FINGERS = ["panda_leftfinger", "panda_rightfinger", "panda_hand"]
 DOWN = Quaternion(0.9238795, -0.3826834, 0.0, 0.0)  # the hand looks down, its fingers open along y
 driven: set[tuple[str, str]] = set()
+
+
+def pose_of(link: str, state: RobotState) -> Pose:
+    """Where a link is in a state of the robot."""
+    answer = rospy.ServiceProxy("compute_fk", GetPositionFK)(Header(), [link], state)
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS
+    return answer.pose_stamped[0].pose
 
 
 def public_methods(kind: type) -> dict[str, Any]:
@@ -223,9 +230,11 @@ def test_an_approximate_target_is_as_near_as_the_arm_gets(arm: MoveGroupCommande
     with pytest.raises(MoveItCommanderException, match="NO_IK_SOLUTION"):
         arm.set_joint_value_target(far)
     arm.set_joint_value_target(far, True)
-    tip = arm._pose_of(
-        "", arm._state.message_of(dict(zip(arm._group_names(), arm.get_joint_value_target(), strict=True)))
-    ).pose.position
+    state = arm.get_current_state()
+    values = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
+    values.update(zip(arm.get_active_joints(), arm.get_joint_value_target(), strict=True))
+    state.joint_state.name, state.joint_state.position = list(values), list(values.values())
+    tip = pose_of(arm.get_end_effector_link(), state).position
     assert tip.x > 0.75 and abs(tip.y) < 0.1 and abs(tip.z - 0.333) < 0.2, "the arm is stretched toward the pose"
     within = arm.get_current_pose()
     arm.set_joint_value_target(within, True, arm.get_end_effector_link())
@@ -357,7 +366,7 @@ def test_path_constraints_hold_on_the_way(arm: MoveGroupCommander) -> None:
         place = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
         place.update(zip(trajectory.joint_trajectory.joint_names, point.positions, strict=True))
         state.joint_state.name, state.joint_state.position = list(place), list(place.values())
-        turn = conversions.pose_to_list(arm._pose_of("panda_link8", state).pose)[3:]
+        turn = conversions.pose_to_list(pose_of("panda_link8", state))[3:]
         down = 2.0 * (turn[0] ** 2 + turn[1] ** 2) - 1.0  # cosine between the link's z and the world's -z
         assert down > math.cos(0.3)
     arm.clear_path_constraints()

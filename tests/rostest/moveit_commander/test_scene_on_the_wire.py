@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import actionlib
 import pytest
@@ -21,11 +22,15 @@ from moveit_commander import (
     roscpp_initialize,
     roscpp_shutdown,
 )
-from moveit_commander.servers import SERVER_LOST_S, Servers
+from moveit_commander.servers import SERVER_LOST_S
 from moveit_msgs.msg import (
     AllowedCollisionMatrix,
     AttachedCollisionObject,
+    ExecuteTrajectoryAction,
+    ExecuteTrajectoryResult,
     Grasp,
+    MoveGroupAction,
+    MoveGroupResult,
     MoveItErrorCodes,
     PickupAction,
     PickupResult,
@@ -160,12 +165,16 @@ def test_scenes_are_read_and_applied_whole(scene: PlanningSceneInterface) -> Non
     assert scene.apply_planning_scene(change) is False
 
 
+def heard_topics() -> set[str]:
+    """Topics of this process that somebody listens to, as its node's interface says."""
+    connections = ServerProxy(rospy.get_node_uri()).getBusInfo("/test")[2]
+    return {topic for _, _, direction, _, topic, is_connected, *_ in connections if direction == "o" and is_connected}
+
+
 def test_an_asynchronous_scene_publishes(scene: PlanningSceneInterface) -> None:
     quick = PlanningSceneInterface(synchronous=False)
-    until(
-        lambda: quick._pub_co.get_num_connections() > 0 and quick._pub_aco.get_num_connections() > 0,
-        "listeners to what it publishes",
-    )
+    topics = {"/collision_object", "/attached_collision_object"}
+    until(lambda: topics <= heard_topics(), "listeners to what it publishes")
     quick.add_box("block", at(0.3, 0.5, 0.9), (0.1, 0.1, 0.1))
     until(lambda: scene.get_known_object_names() == ["block"], "the block in the scene")
     quick.attach_object("block", PALM)
@@ -207,15 +216,18 @@ class FakeTask:
 
 
 @pytest.fixture
-def elsewhere(arm: MoveGroupCommander) -> Iterator[Callable[[str], None]]:
-    """Makes the arm ask servers in another namespace, until the test ends."""
-    servers = arm._servers
+def elsewhere(arm: MoveGroupCommander) -> Callable[[str], MoveGroupCommander]:
+    """Makes commanders of the same group that ask servers in another namespace."""
 
-    def move(namespace: str) -> None:
-        arm._servers = Servers(namespace)
+    def make(namespace: str) -> MoveGroupCommander:
+        for name, kind, result in (
+            ("move_group", MoveGroupAction, MoveGroupResult()),
+            ("execute_trajectory", ExecuteTrajectoryAction, ExecuteTrajectoryResult()),
+        ):
+            FakeTask(f"{namespace}/{name}", kind, result)
+        return MoveGroupCommander(arm.get_name(), ns=namespace)
 
-    yield move
-    arm._servers = servers
+    return make
 
 
 def test_a_location_of_another_type_is_refused(arm: MoveGroupCommander) -> None:
@@ -225,12 +237,12 @@ def test_a_location_of_another_type_is_refused(arm: MoveGroupCommander) -> None:
 
 
 def test_pick_and_place_name_what_is_missing_and_use_what_is_there(
-    arm: MoveGroupCommander, elsewhere: Callable[[str], None]
+    arm: MoveGroupCommander, elsewhere: Callable[[str], MoveGroupCommander]
 ) -> None:
     pose = at(0.3, 0.5, 0.9)
     locations = [None, pose, pose.pose, PlaceLocation(place_pose=pose), [pose, pose], [PlaceLocation(place_pose=pose)]]
     assert arm.pick("block", Grasp(), plan_only=True) == MoveItErrorCodes.ROBOT_STATE_STALE, "this robot has no joints"
-    elsewhere("fake")
+    arm = elsewhere("fake")
     for act in (lambda: arm.pick("block", Grasp()), lambda: arm.place("block", pose)):
         with pytest.raises(MoveItCommanderException, match="Unable to connect"):
             act()
@@ -255,10 +267,10 @@ def test_pick_and_place_name_what_is_missing_and_use_what_is_there(
 
 
 def test_no_answer_of_a_server_that_is_done_at_once_is_lost(
-    arm: MoveGroupCommander, elsewhere: Callable[[str], None]
+    arm: MoveGroupCommander, elsewhere: Callable[[str], MoveGroupCommander]
 ) -> None:
     place = FakeTask("instant/place", PlaceAction, PlaceResult(error_code=MoveItErrorCodes(MoveItErrorCodes.SUCCESS)))
-    elsewhere("instant")
+    arm = elsewhere("instant")
     longest_s = 0.0
     for _ in range(60):
         begun = time.monotonic()
@@ -269,7 +281,7 @@ def test_no_answer_of_a_server_that_is_done_at_once_is_lost(
 
 
 def test_a_cartesian_path_asks_for_the_lines_and_answers_path_and_share(
-    arm: MoveGroupCommander, elsewhere: Callable[[str], None]
+    arm: MoveGroupCommander, elsewhere: Callable[[str], MoveGroupCommander]
 ) -> None:
     asked: list[Any] = []
     codes = [MoveItErrorCodes.SUCCESS, MoveItErrorCodes.INVALID_GROUP_NAME]
@@ -283,7 +295,7 @@ def test_a_cartesian_path_asks_for_the_lines_and_answers_path_and_share(
         )
 
     rospy.Service("fake/compute_cartesian_path", GetCartesianPath, serve)
-    elsewhere("fake")
+    arm = elsewhere("fake")
     path, fraction = arm.compute_cartesian_path([Pose(), [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]], 0.01, 2.5, False)
     assert fraction == 0.75 and path.joint_trajectory.joint_names == ["elbow_joint"]
     assert arm.compute_cartesian_path([Pose()], 0.02) == (RobotTrajectory(), -1.0)

@@ -18,20 +18,32 @@ from modular_framework_ros.node_handle import MappingNodeHandle
 
 
 class Loop:
-    """Hardware and controller manager, advanced by `step`; requests of the service side run beside it."""
+    """Hardware and controller manager, advanced by `step`; requests of the service side run beside it.
+
+    Attributes:
+        fault_of_topics: raised where a controller's topics are to be opened, unless None.
+    """
 
     def __init__(
-        self, parameters: Mapping[str, Any], robot_hw: RobotHW | None = None, types: ControllerTypes | None = None
+        self,
+        parameters: Mapping[str, Any],
+        robot_hw: RobotHW | None = None,
+        types: ControllerTypes | None = None,
+        update_wait_s: float = 0.5,
     ) -> None:
         root = MappingNodeHandle(parameters)
         self.robot_hw = robot_hw if robot_hw is not None else MockRobotHW()
         assert self.robot_hw.init(root, root.child("hw"))
         self.controllers: dict[str, Controller] = {}
-        self.manager = ControllerManager(self.robot_hw, root, types, self._attach, update_wait_s=0.5)
+        self.fault_of_topics: Exception | None = None
+        self.update_wait_s = update_wait_s
+        self.manager = ControllerManager(self.robot_hw, root, types, self._attach, update_wait_s)
         self.time_s = 100.0
         self.period_s = 0.01
 
     def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
+        if self.fault_of_topics is not None:
+            raise self.fault_of_topics
         self.controllers[name] = controller
         return lambda: None
 

@@ -28,6 +28,7 @@ class WatchedHardware(MockRobotHW):
     def __init__(self) -> None:
         super().__init__()
         self.written: list[float] = []
+        self.left_by_controllers = False
 
     def read(self, time_s: float, period_s: float) -> None:
         if self.raises == "read":
@@ -47,7 +48,6 @@ class Manager:
     def __init__(self, robot_hw: WatchedHardware) -> None:
         self._robot_hw = robot_hw
         self.manager = self
-        self.closed = False
 
     def connect(self) -> None:
         pass
@@ -56,7 +56,7 @@ class Manager:
         self._robot_hw.interfaces[1].handles[0].command = 0.0
 
     def close(self) -> None:
-        self.closed = True
+        self._robot_hw.left_by_controllers = True
 
 
 class Nothing:
@@ -117,7 +117,7 @@ def test_a_moving_joint_is_braked_by_its_limits_until_it_is_at_rest(make_node: C
 
 def moves_after(node: RobotHwNode, robot_hw: WatchedHardware) -> bool:
     assert node.run()
-    assert node._manager.closed  # type: ignore[union-attr]
+    assert robot_hw.left_by_controllers
     return moves(robot_hw, 0.0)
 
 

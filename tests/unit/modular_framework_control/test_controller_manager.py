@@ -90,8 +90,9 @@ def types() -> ControllerTypes:
 
 
 @pytest.fixture
-def loop(make_loop: Callable[..., Any]) -> Any:
-    made = make_loop(PARAMETERS, types=types())
+def loop(make_loop: Callable[..., Any], request: pytest.FixtureRequest) -> Any:
+    """Three controllers, one running; a test may say how long a switch waits for a cycle [s]."""
+    made = make_loop(PARAMETERS, types=types(), update_wait_s=getattr(request, "param", 0.5))
     for name in JOINTS:
         made.manager.load_controller(name)
     assert made.switch(["left"], []) is None
@@ -226,7 +227,7 @@ def test_without_a_control_loop_a_switch_says_so_and_does_not_happen_later(loop:
 
 
 def test_hardware_may_take_longer_to_get_ready_than_a_loop_for_its_next_cycle(loop: Any) -> None:
-    ready_s = time.monotonic() + 3.0 * loop.manager._update_wait_s
+    ready_s = time.monotonic() + 3.0 * loop.update_wait_s
     loop.robot_hw.switch_result = lambda controller=None: (
         SwitchState.DONE if time.monotonic() > ready_s else SwitchState.ONGOING
     )
@@ -351,8 +352,9 @@ class SlowHardware(MockRobotHW):
 
 
 @pytest.fixture
-def slow(make_loop: Callable[..., Any]) -> Any:
-    made = make_loop(PARAMETERS, robot_hw=SlowHardware(), types=types())
+def slow(make_loop: Callable[..., Any], request: pytest.FixtureRequest) -> Any:
+    """Hardware that switches slowly; a test may say how long a switch waits for a cycle [s]."""
+    made = make_loop(PARAMETERS, SlowHardware(), types(), getattr(request, "param", 0.5))
     for name in ("left", "right"):
         made.manager.load_controller(name)
     return made
@@ -437,23 +439,20 @@ def test_a_controller_whose_topics_cannot_be_opened_is_closed_and_not_loaded(mak
         def close(self) -> None:
             closed.append(True)
 
-    def attach(name: str, controller: Controller) -> Callable[[], None]:
-        raise OSError("no such topic")
-
     closed: list[bool] = []
     known = types()
     known.register("test/Recorder", Opened)
     loop = make_loop(PARAMETERS, types=known)
-    attached, loop.manager._attach = loop.manager._attach, attach
+    loop.fault_of_topics = OSError("no such topic")
     with pytest.raises(ControllerError, match="cannot load controller 'left': .* raised OSError: no such topic"):
         loop.manager.load_controller("left")
     assert closed == [True] and loop.states() == {}
-    loop.manager._attach = attached
+    loop.fault_of_topics = None
     loop.spawn("left")
 
 
+@pytest.mark.parametrize("slow", [30.0], indirect=True)
 def test_a_switch_under_way_when_the_loop_ends_fails_at_once_and_no_other_is_begun(slow: Any) -> None:
-    slow.manager._update_wait_s = 30.0
     slow.robot_hw.asks.update(left=10**6)
     raised: list[str] = []
 
@@ -476,8 +475,8 @@ def test_a_switch_under_way_when_the_loop_ends_fails_at_once_and_no_other_is_beg
     assert slow.states() == {}
 
 
+@pytest.mark.parametrize("loop", [30.0], indirect=True)
 def test_after_the_end_of_the_loop_a_switch_is_refused_at_once(loop: Any) -> None:
-    loop.manager._update_wait_s = 30.0
     loop.manager.stop_all()
     begun_s = time.monotonic()
     with pytest.raises(ControllerError, match="the control loop has ended"):

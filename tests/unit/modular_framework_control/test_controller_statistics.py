@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import statistics
+import threading
+import time
 
 import pytest
 
 from modular_framework_control.controller_interface.controller import Controller
 from modular_framework_control.controller_manager.controller_manager import ControllerManager, ControllerReport
 from modular_framework_control.controller_manager.controller_statistics import UpdateStatistics
+from modular_framework_control.controller_manager.controller_switch import ControllerState
 from modular_framework_control.controller_manager.controller_types import ControllerTypes
 from modular_framework_control.hardware_interface.interfaces import JointStateInterface
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
@@ -56,16 +59,21 @@ class Bench:
         self.manager = ControllerManager(hardware, root, types, clock=self.clock)
         for name in ("one", "other"):
             self.manager.load_controller(name)
-            self.start(name)
+        self.start("one", "other")
         self.time_s = 0.0
 
     def _make(self) -> Slow:
         self.made.append(Slow(self.clock))
         return self.made[-1]
 
-    def start(self, name: str) -> None:
-        entry = next(entry for entry in self.manager._loaded if entry.name == name)
-        assert entry.start(0.0) == ""
+    def start(self, *names: str) -> None:
+        """Starts controllers at the end of a cycle that none of them is updated in."""
+        switch = threading.Thread(target=self.manager.switch_controller, args=(list(names), []))
+        switch.start()
+        while any(self.report(name).state is not ControllerState.RUNNING for name in names):
+            self.manager.update(0.0, 0.0)
+            time.sleep(0.001)
+        switch.join()
 
     def cycle(self, one_s: float, other_s: float, period_s: float = 0.01) -> None:
         self.made[0].takes_s, self.made[1].takes_s = one_s, other_s

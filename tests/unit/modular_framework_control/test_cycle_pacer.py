@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import threading
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -114,13 +116,12 @@ def test_a_late_start_after_sleep_counts_as_no_processor_and_one_after_long_work
 
 
 def test_a_request_that_processors_stay_awake_is_held_and_a_refusal_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
 ) -> None:
     device = tmp_path / "latency"
-    monkeypatch.setattr(scheduling, "_LATENCY_DEVICE", str(device))
-    assert "No such file" in scheduling.keep_processors_awake()[0]
+    assert "No such file" in scheduling.keep_processors_awake(str(device))[0]
     device.touch()
-    assert scheduling.keep_processors_awake() == []
+    assert scheduling.keep_processors_awake(str(device)) == []
     held = [link for link in Path("/proc/self/fd").iterdir() if os.path.realpath(link) == str(device)]
     assert device.read_bytes() == bytes(4) and len(held) == 1
     os.close(int(held[0].name))
@@ -161,6 +162,12 @@ def test_what_the_system_does_not_permit_is_said_with_the_remedy(monkeypatch: py
     assert "rtprio" in refused[0] and "64 kB" in refused[1] and "memlock" in refused[1]
 
 
+def permit_locking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets the C library say that the memory is locked, whatever the system permits."""
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace(mlockall=lambda flags: 0))
+
+
 def test_a_thread_that_ends_meanwhile_does_not_keep_the_loop_from_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[int, int] = {}
 
@@ -171,7 +178,7 @@ def test_a_thread_that_ends_meanwhile_does_not_keep_the_loop_from_real_time(monk
 
     monkeypatch.setattr(os, "listdir", lambda folder: ["11", "12", "13", str(threading.get_native_id())])
     monkeypatch.setattr(os, "sched_setscheduler", schedule)
-    monkeypatch.setattr(scheduling, "_lock_memory", lambda: "")
+    permit_locking(monkeypatch)
     assert scheduling.run_in_real_time(60) == []
     assert given == {11: 50, 13: 50, threading.get_native_id(): 60}
 
@@ -185,7 +192,7 @@ def test_where_the_loop_itself_may_not_be_urgent_nothing_else_is(monkeypatch: py
         given[thread] = parameters.sched_priority
 
     monkeypatch.setattr(os, "sched_setscheduler", schedule)
-    monkeypatch.setattr(scheduling, "_lock_memory", lambda: "")
+    permit_locking(monkeypatch)
     assert len(scheduling.run_in_real_time()) == 1 and given == {}
 
 

@@ -86,9 +86,9 @@ def test_a_log_that_cannot_be_written_at_all_is_tried_once_and_the_others_get_th
     try:
         log.begin()
         LOGGER.error("one single line")
-        log._outbox.flush()
+        log.flush()
         LOGGER.error("another line")
-        log._outbox.flush()
+        log.flush()
         log.end()
     finally:
         rosout.removeHandler(broken)

@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
 
 from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
+from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
 from modular_framework_control.hardware_interface.joint_limits import JointLimits
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
@@ -198,13 +201,15 @@ class TestCombination(TestEzGripper):
 class TestSlidingGripper(TestMock):
     """Fingers that slide: their whole range is shorter than the jump and the step."""
 
+    initial_position = 0.0
     tolerance = 0.001
 
     def make_robot_hw(self) -> MockRobotHW:
-        robot_hw = MockRobotHW()
-        root = MappingNodeHandle({"robot_description": SLIDE, "hw": {"joints": ["finger"]}})
-        assert robot_hw.init(root, root.child("hw"))
-        return robot_hw
+        self.made = MockRobotHW()
+        part = {"joints": ["finger"], "initial_positions": {"finger": self.initial_position}}
+        root = MappingNodeHandle({"robot_description": SLIDE, "hw": part})
+        assert self.made.init(root, root.child("hw"))
+        return self.made
 
     def limits(self) -> Mapping[str, JointLimits]:
         return {"finger": JointLimits(0.0, 0.04, 0.2)}
@@ -217,6 +222,12 @@ class SuiteThatStalls(TestMock):
     period_s = 0.01
     real_time = True
     stall_s = 0.0
+
+    def limits(self) -> Mapping[str, JointLimits]:
+        return {
+            name: replace(limit, max_velocity=2.0 if name == "shoulder" else math.inf)
+            for name, limit in super().limits().items()
+        }
 
     def advance(self, period_s: float) -> None:
         time.sleep(self.stall_s)
@@ -286,19 +297,18 @@ def test_hardware_whose_connection_belongs_to_one_thread_passes() -> None:
 def test_a_stall_of_the_machine_does_not_make_a_joint_seem_faster() -> None:
     suite = SuiteThatStalls()
     suite.setup_method()
-    robot_hw, handles = suite._ready()
-    goals = {handle.name: handle.position for handle in handles}
-    goals["shoulder"] -= suite.jump
     suite.stall_s = 0.2
-    assert suite._duration_of_jump(robot_hw, handles[0], goals) >= 0.2
+    suite.test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows()
+    assert suite.stall_s == 0.0
     suite.teardown_method()
 
 
 def test_targets_stay_within_a_range_that_is_shorter_than_the_jump() -> None:
-    suite = TestSlidingGripper()
-    suite.setup_method()
-    _, (finger,) = suite._ready()
     for position, target in ((0.0, 0.04), (0.01, 0.04), (0.03, 0.0), (0.04, 0.0)):
-        finger.state.position = position
-        assert suite._target(finger, suite.jump) == pytest.approx(target, abs=1e-9)
-    suite.teardown_method()
+        suite = TestSlidingGripper()
+        suite.initial_position = position
+        suite.setup_method()
+        suite.test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows()
+        (finger,) = suite.made.get(PositionJointInterface).handles
+        assert finger.command == pytest.approx(target, abs=1e-9)
+        suite.teardown_method()

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import trimesh
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
@@ -24,7 +25,7 @@ from modular_framework_core.task_constructor import generator
 from modular_framework_core.task_runner.record import StateRecord, write_record
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_urdf.mesh_reader import TriangleMesh
+from modular_framework_simulation.models.sdf_specs import Mesh
 
 
 @contextmanager
@@ -67,12 +68,13 @@ def test_a_record_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: P
 
 
 def test_a_cache_of_meshes_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
-    solid = TriangleMesh([[0.123456789] * 3] * 8, [[0, 2, 1], [0, 1, 3]])
-    parts = ConvexParts(tmp_path)
+    mesh, cache = tmp_path / "block.obj", tmp_path / "cache"
+    trimesh.creation.box((0.123456789, 0.123456789, 0.123456789)).export(mesh)
+    parts = ConvexParts(cache)
     refused = pytest.raises(DescriptionError, match="block-hull.*cannot be written.*free space, or set ROS_HOME")
     with refused, full_disk():
-        parts._write_atomically(tmp_path / "block-hull", [solid])
-    assert list(tmp_path.iterdir()) == []
+        parts.hull(Mesh(mesh))
+    assert list(cache.iterdir()) == []
 
 
 def test_what_is_there_and_no_file_is_not_replaced(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import roslaunch.core
 
 from modular_framework_core.launching.launch_arguments import check_arguments
 from modular_framework_core.launching.launch_causes import cause_of_death
-from modular_framework_core.launching.launch_runner import EndWatcher, _verdict
+from modular_framework_core.launching.launch_runner import EndWatcher, verdict
 
 LAUNCH = """<launch><arg name="simulation" default="true"/><arg name="gui" default="$(eval 1 == 2)"/>
 <arg name="world_file" default="a.world"/></launch>"""
@@ -118,6 +118,6 @@ def test_the_cause_is_the_last_line(
     watcher.process_died(*died)
     watcher.process_died("late-3", 1)
     assert watcher.last_process == died[0]
-    assert _verdict(watcher, "because") == code
+    assert verdict(watcher, "because") == code
     printed = capsys.readouterr()
     assert (printed.out + printed.err).splitlines() == [last]

@@ -321,7 +321,8 @@ def test_whatever_effort_is_allowed_becomes_a_torque_the_servo_knows(
 ) -> None:
     robot_hw = EzGripperRobotHW()
     root = MappingNodeHandle({"hand": {"port_name": str(line.link)}})
-    monkeypatch.setattr(EzGripperRobotHW, "_wait_until_ready", lambda *_: True)
+    state = EzGripper.state
+    monkeypatch.setattr(EzGripper, "state", lambda gripper: replace(state(gripper), ready=True))
     monkeypatch.setattr(EzGripper, "start", lambda _: None)
     asked: list[int] = []
     monkeypatch.setattr(EzGripper, "command", lambda _, position, torque: asked.append(torque))

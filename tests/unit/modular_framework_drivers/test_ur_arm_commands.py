@@ -126,7 +126,7 @@ class FakeProcess:
         if FakeProcess.refused is not None:
             raise FakeProcess.refused
         FakeProcess.started.append(self)
-        self.role = arguments[0]
+        self.role, self.arguments = arguments[0], arguments
         self.ended = False
         self._said = self._taken = False
 
@@ -157,8 +157,7 @@ class FakeProcess:
 def link(monkeypatch: pytest.MonkeyPatch) -> Iterator[RtdeLink]:
     FakeProcess.started, FakeProcess.refused, FakeProcess.mute = [], None, ""
     monkeypatch.setattr(rtde_link, "ChildProcess", FakeProcess)
-    monkeypatch.setattr(rtde_link, "_RETRY_S", 0.05)
-    made = RtdeLink(LinkSettings("nowhere", timeout_s=5.0))
+    made = RtdeLink(LinkSettings("nowhere", timeout_s=5.0, retry_s=0.05))
     yield made
     made.close()
 
@@ -203,9 +202,21 @@ def test_a_program_asked_for_while_one_is_ready_is_a_new_one(link: RtdeLink) -> 
     assert [process.ended for process in controls] == [True, False] and link.program_failure == ""
 
 
-def test_small_and_negative_numbers_reach_the_process_that_commands_the_arm() -> None:
-    settings = LinkSettings("nowhere", speed_scale=0.00005, payload_kg=0.00002, payload_centre_m=(-0.00005, 0.0, -0.01))
-    options = command_line().parse_args(["control", "7", "nowhere", *RtdeLink(settings)._control_arguments()])
+def test_small_and_negative_numbers_reach_the_process_that_commands_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    FakeProcess.started, FakeProcess.refused, FakeProcess.mute = [], None, ""
+    monkeypatch.setattr(rtde_link, "ChildProcess", FakeProcess)
+    settings = LinkSettings(
+        "nowhere", timeout_s=5.0, speed_scale=0.00005, payload_kg=0.00002, payload_centre_m=(-0.00005, 0.0, -0.01)
+    )
+    link = RtdeLink(settings)
+    link.request_program()
+    link.connect()
+    try:
+        until(link, lambda: link.commanding)
+    finally:
+        link.close()
+    control = next(process for process in FakeProcess.started if process.role == "control")
+    options = command_line().parse_args([control.role, "7", *control.arguments[1:]])
     assert (options.speed_scale, options.payload) == (0.00005, 0.00002)
     assert options.payload_centre == [-0.00005, 0.0, -0.01]
     assert (options.lookahead, options.gain) == (0.03, 2000.0)

@@ -82,8 +82,8 @@ def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Gen
     things = [number for number, part in enumerate(second.parts) if not part.link]
     second.parts.append(Part("held", TIP, pose.homogeneous, solid))
     number = len(second.parts) - 1
-    second._pairs += [(other, number) for other in things]
-    second._pairs += [(other, number) for other in robot_parts if second.parts[other].link not in touch | {TIP}]
+    second.pairs += [(other, number) for other in things]
+    second.pairs += [(other, number) for other in robot_parts if second.parts[other].link not in touch | {TIP}]
     return scene
 
 

@@ -147,7 +147,7 @@ class IndependentChecker:
                 self.parts.append(Part(name, name, _origin(collision), self._read(collision.find("geometry"), resolve)))
         self._allowed = {frozenset((e.get("link1"), e.get("link2"))) for e in semantics.iter("disable_collisions")}
         self._robot_parts = len(self.parts)
-        self._pairs = self._robot_pairs()
+        self.pairs = self._robot_pairs()
 
     @staticmethod
     def _read(geometry: ET.Element, resolve: Callable[[str], str]) -> Solid:
@@ -178,11 +178,11 @@ class IndependentChecker:
     def set_world(self, objects: World) -> None:
         """Replaces the world: name, solid, pose in the root frame."""
         self.parts = self.parts[: self._robot_parts]
-        self._pairs = self._robot_pairs()
+        self.pairs = self._robot_pairs()
         base = self._moving_root(self._links[0])
         for name, solid, pose in objects:
             self.parts.append(Part(name, "", pose, solid))
-            self._pairs += [
+            self.pairs += [
                 (i, len(self.parts) - 1)
                 for i in range(self._robot_parts)
                 if self._moving_root(self.parts[i].link) != base
@@ -219,7 +219,7 @@ class IndependentChecker:
 
     def _near(self, poses: np.ndarray) -> np.ndarray:
         """Which pairs may touch, shape (states, pairs): the sphere around each reaches the box around the other."""
-        pairs = np.array(self._pairs)
+        pairs = np.array(self.pairs)
         half, middle = (np.array([getattr(part.solid, key) for part in self.parts]) for key in ("half", "middle"))
         radii = np.linalg.norm(half, axis=1)
         centres = np.einsum("spij,pj->spi", poses[..., :3, :3], middle) + poses[..., :3, 3]
@@ -242,7 +242,7 @@ class IndependentChecker:
         poses = self._part_poses(positions, 1)
         found = []
         for number in np.flatnonzero(self._near(poses)[0]):
-            i, j = self._pairs[number]
+            i, j = self.pairs[number]
             if self._touch((i, j), poses[0]):
                 found.append((self.parts[i].body, self.parts[j].body))
                 if first_only:
@@ -252,7 +252,7 @@ class IndependentChecker:
     def distance(self, positions: Mapping[str, float]) -> float:
         """The smallest distance of bodies that may not touch [m]; 0 or less where some do."""
         poses, best = self._part_poses(positions, 1)[0], np.inf
-        for pair in self._pairs:
+        for pair in self.pairs:
             first, second = (
                 fcl.CollisionObject(self.parts[k].solid.geometry, fcl.Transform(poses[k, :3, :3], poses[k, :3, 3]))
                 for k in pair
@@ -264,7 +264,7 @@ class IndependentChecker:
         """How deep FCL says the parts of two bodies are in each other in one state, one entry a contact [m]."""
         poses = self._part_poses(positions, 1)[0]
         result = fcl.CollisionResult()
-        for pair in self._pairs:
+        for pair in self.pairs:
             if {self.parts[k].body for k in pair} == set(bodies):
                 first, second = (
                     fcl.CollisionObject(self.parts[k].solid.geometry, fcl.Transform(poses[k, :3, :3], poses[k, :3, 3]))
@@ -282,8 +282,8 @@ class IndependentChecker:
             some = samples[begin : begin + STATES_AT_ONCE]
             poses = self._part_poses({**rest, **dict(zip(joint_names, some.T, strict=True))}, len(some))
             for state, number in np.argwhere(self._near(poses)):
-                if begin + state not in found and self._touch(self._pairs[number], poses[state]):
-                    found[begin + int(state)] = tuple(self.parts[k].body for k in self._pairs[number])
+                if begin + state not in found and self._touch(self.pairs[number], poses[state]):
+                    found[begin + int(state)] = tuple(self.parts[k].body for k in self.pairs[number])
         return found
 
     def colliding_states(

@@ -9,8 +9,10 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from moveit_msgs.msg import ExecuteTrajectoryAction
 
+from modular_framework_planning.move_group import goal_runner
 from modular_framework_planning.move_group.goal_runner import GoalRunner
 
 
@@ -53,12 +55,27 @@ class Handle:
     set_rejected = set_aborted
 
 
+class Server:
+    """Stands for actionlib: hands over the goals that the test sends."""
+
+    made: Server
+
+    def __init__(self, _name: str, _kind: Any, on_goal: Callable[[Any], None], *_: Any, **__: Any) -> None:
+        self.on_goal = on_goal
+        Server.made = self
+
+
+@pytest.fixture(autouse=True)
+def server(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(goal_runner, "SteadyActionServer", Server)
+
+
 def run(work: Callable[..., Any], *names: str, all_sent: threading.Event | None = None) -> list[Handle]:
     """Sends goals one right after the other, tells that they are sent, and waits for their ends."""
-    runner = GoalRunner("some_action", ExecuteTrajectoryAction, work)
+    GoalRunner("some_action", ExecuteTrajectoryAction, work)
     handles = [Handle(name) for name in names]
     for handle in handles:
-        runner._on_goal(handle)
+        Server.made.on_goal(handle)
     if all_sent is not None:
         all_sent.set()
     for handle in handles:
@@ -96,14 +113,14 @@ def test_a_goal_that_comes_while_the_one_before_is_cleared_away_does_not_lock_th
                 time.sleep(0.2)
             return super().get_goal_id()
 
-    runner = GoalRunner("some_action", ExecuteTrajectoryAction, lambda *_: (None, True, "done"))
+    GoalRunner("some_action", ExecuteTrajectoryAction, lambda *_: (None, True, "done"))
     first, second = SlowToName("first", server_lock), Handle("second", server_lock)
-    runner._on_goal(first)
+    Server.made.on_goal(first)
     assert clearing.wait(20.0)
 
     def hand_over() -> None:
         with server_lock:
-            runner._on_goal(second)
+            Server.made.on_goal(second)
 
     thread = threading.Thread(target=hand_over, daemon=True)
     thread.start()

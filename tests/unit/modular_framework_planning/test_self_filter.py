@@ -269,4 +269,4 @@ def test_a_look_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) ->
         octomap.insert_point_cloud("", rospy.Time(1), looked, mask)
     seen = scene
     octomap.insert_point_cloud("", rospy.Time(1), looked, mask)
-    assert len(caches[-1]._regions) == len(model.link_geometries)
+    assert len(caches[-1]) == len(model.link_geometries)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +20,6 @@ from modular_framework_planning.constraints.kinematic_constraints import Kinemat
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box, Mesh
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planners.ompl.constrained_search import ConstrainedSearch
 from modular_framework_planning.planners.ompl.planner import OmplPlanner, connection
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
 from modular_framework_planning.planning_interface.goals import GoalResolver
@@ -199,16 +199,16 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
 def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock(
     model: RobotModel, pool: KinematicsPool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    step_to = ConstrainedSearch._step_to
+    satisfied = KinematicConstraints.satisfied
     delay_s, looked = 0.0, 0
 
-    def watched(self: ConstrainedSearch, *states: np.ndarray) -> np.ndarray | None:
+    def watched(self: KinematicConstraints, *arguments: Any) -> Any:
         nonlocal looked
         looked += 1
         time.sleep(delay_s)  # as on a busy computer
-        return step_to(self, *states)
+        return satisfied(self, *arguments)
 
-    monkeypatch.setattr(ConstrainedSearch, "_step_to", watched)
+    monkeypatch.setattr(KinematicConstraints, "satisfied", watched)
     planner = Coarse()
     PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
     problem = planner.asked[0]

@@ -77,8 +77,8 @@ def test_what_is_no_file_of_constraints_is_refused_with_a_reason(tmp_path: Path)
 
 
 def test_the_command_database_tells_which_file_is_used(tmp_path: Path) -> None:
-    group = SimpleNamespace(_storage=None)
-    group.set_constraints_database = lambda host, _: setattr(group, "_storage", ConstraintsStorage(host))
+    group = SimpleNamespace(constraints_storage=None)
+    group.set_constraints_database = lambda host, _: setattr(group, "constraints_storage", ConstraintsStorage(host))
     commands = GroupCommands(group, None, "base")
     assert commands.database([]) == (MoveGroupInfoLevel.INFO, "Not connected to a database")
     place = str(tmp_path / "some.sqlite")

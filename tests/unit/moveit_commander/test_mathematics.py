@@ -14,8 +14,8 @@ from moveit_commander import conversions
 from moveit_commander.allowed_collisions import set_allowed, set_default
 from moveit_commander.chain_jacobian import jacobian
 from moveit_commander.exception import MoveItCommanderException
-from moveit_commander.group_joint_targets import _link_and_approximate
-from moveit_commander.group_motion import _cartesian_options
+from moveit_commander.group_joint_targets import link_and_approximate
+from moveit_commander.group_motion import cartesian_options
 from moveit_commander.object_region import Region, inside
 from moveit_commander.robot_model import Joint
 from moveit_commander.trajectory_timing import distinct, retime
@@ -117,18 +117,18 @@ def test_a_collision_matrix_stays_symmetric() -> None:
 
 def test_both_signatures_of_a_cartesian_path_are_understood() -> None:
     constraints = Constraints(name="upright")
-    assert _cartesian_options((), {}) == (0.0, True, Constraints())
-    assert _cartesian_options((5.0, False, constraints), {}) == (5.0, False, constraints)
-    assert _cartesian_options((False, constraints), {}) == (0.0, False, constraints)
-    assert _cartesian_options((0.0,), {"avoid_collisions": False}) == (0.0, False, Constraints())
-    assert _cartesian_options((), {"jump_threshold": 2.0}) == (2.0, True, Constraints())
+    assert cartesian_options((), {}) == (0.0, True, Constraints())
+    assert cartesian_options((5.0, False, constraints), {}) == (5.0, False, constraints)
+    assert cartesian_options((False, constraints), {}) == (0.0, False, constraints)
+    assert cartesian_options((0.0,), {"avoid_collisions": False}) == (0.0, False, Constraints())
+    assert cartesian_options((), {"jump_threshold": 2.0}) == (2.0, True, Constraints())
     for options, named in (((True, None, 1), {}), ((True,), {"avoid_collisions": True}), ((), {"speed": 1})):
         with pytest.raises(TypeError, match="allowed"):
-            _cartesian_options(options, named)
+            cartesian_options(options, named)
 
 
 def test_the_arguments_after_a_pose_are_told_apart_by_type() -> None:
-    assert _link_and_approximate("tool0", True) == _link_and_approximate(True, "tool0") == ("tool0", True)
-    assert _link_and_approximate(None, None) == ("", False)
+    assert link_and_approximate("tool0", True) == link_and_approximate(True, "tool0") == ("tool0", True)
+    assert link_and_approximate(None, None) == ("", False)
     with pytest.raises(MoveItCommanderException, match="Unexpected type"):
-        _link_and_approximate(3.5, None)
+        link_and_approximate(3.5, None)

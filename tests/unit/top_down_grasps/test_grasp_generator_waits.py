@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,8 +35,9 @@ def test_patience_begins_when_the_clock_of_a_simulation_does_and_again_when_it_i
 class Scripted(node.TopDownGraspGenerator):
     """Sees what a script says, one look after the other, and remembers what it signalled."""
 
-    def __init__(self, looks: list[object], makes: Callable[[], list[object]]) -> None:
+    def __init__(self, looks: list[object], makes: Callable[[], list[object]], attached: Iterable[str]) -> None:
         super().__init__()
+        self._attached = set(attached)
         self.looks, self.makes, self.signals = list(looks), makes, []
         self._stored = SimpleNamespace(replace=lambda grasps, prefix: None)
 
@@ -58,8 +59,7 @@ def watched(monkeypatch):
     """Lets a generator look at scripted scenes, some seconds of the ROS clock apart; returns what it signalled."""
 
     def watch(looks, period_s=1.0, makes=lambda: [SimpleNamespace(object_id="box__link")], attached=frozenset()):
-        generator = Scripted(looks, makes)
-        generator._attached = set(attached)
+        generator = Scripted(looks, makes, attached)
         clock = SimpleNamespace(now=50.0)
 
         def sleep(_wall_s: float) -> None:

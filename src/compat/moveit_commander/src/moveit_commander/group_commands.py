@@ -182,7 +182,7 @@ class GroupCommands:
 
     def database_path(self) -> str | None:
         """Returns the file of constraints; None where none is chosen."""
-        storage = self.group._storage
+        storage = self.group.constraints_storage
         return None if storage is None else str(storage.path)
 
     def delete(self, words: Words) -> Answer:

@@ -62,7 +62,7 @@ class GroupJointTargets(GroupSettings):
             MoveItCommanderException: a joint or a link is unknown, a value is out of bounds, the pose has no solution.
         """
         if isinstance(arg1, Pose | PoseStamped):
-            self._set_from_pose(arg1, *_link_and_approximate(arg2, arg3))
+            self._set_from_pose(arg1, *link_and_approximate(arg2, arg3))
             return
         if arg3 is not None or (arg2 is not None and not isinstance(arg1, str)):
             raise MoveItCommanderException(
@@ -208,7 +208,7 @@ def _single_value(name: str, value: Any) -> float:
     return float(values[0])
 
 
-def _link_and_approximate(*arguments: Any) -> tuple[str, bool]:
+def link_and_approximate(*arguments: Any) -> tuple[str, bool]:
     """Sorts the optional arguments of a pose target by their types."""
     link, approximate = "", False
     for argument in arguments:

@@ -129,7 +129,7 @@ class GroupMotion(GroupPoseTargets):
         Raises:
             ServerError: move_group does not offer the service compute_cartesian_path.
         """
-        jump_threshold, avoid_collisions, constraints = _cartesian_options(options, named_options)
+        jump_threshold, avoid_collisions, constraints = cartesian_options(options, named_options)
         request = GetCartesianPathRequest(
             start_state=self._start_state,
             group_name=self._group.name,
@@ -177,7 +177,7 @@ class GroupMotion(GroupPoseTargets):
         return False
 
 
-def _cartesian_options(options: Sequence[Any], named: dict[str, Any]) -> tuple[float, bool, Constraints]:
+def cartesian_options(options: Sequence[Any], named: dict[str, Any]) -> tuple[float, bool, Constraints]:
     """Sorts the options of both public signatures: with a jump threshold before the others, and without."""
     names = ["avoid_collisions", "path_constraints"]
     if options and isinstance(options[0], int | float) and not isinstance(options[0], bool):

@@ -40,7 +40,7 @@ class GroupSettings(GroupConnection):
         self._path_constraints = Constraints()
         self._trajectory_constraints = TrajectoryConstraints()
         self._support_surface = ""
-        self._storage: ConstraintsStorage | None = None
+        self.constraints_storage: ConstraintsStorage | None = None
 
     def set_start_state_to_current_state(self) -> None:
         """Starts plans at the current state."""
@@ -92,7 +92,8 @@ class GroupSettings(GroupConnection):
 
     def get_known_constraints(self) -> list[str]:
         """Returns the names of the group's constraints in the database; none where no database is chosen."""
-        return [] if self._storage is None else self._storage.get_known_constraints(self._model.name, self._group.name)
+        storage = self.constraints_storage
+        return [] if storage is None else storage.get_known_constraints(self._model.name, self._group.name)
 
     def set_constraints_database(self, host: str, port: int) -> None:
         """Chooses the database set_path_constraints takes names from.
@@ -104,7 +105,7 @@ class GroupSettings(GroupConnection):
         Raises:
             MoveItCommanderException: it is no such file.
         """
-        self._storage = ConstraintsStorage(host)
+        self.constraints_storage = ConstraintsStorage(host)
 
     def get_path_constraints(self) -> Constraints:
         """Returns the path constraints."""
@@ -120,8 +121,8 @@ class GroupSettings(GroupConnection):
             self.clear_path_constraints()
         elif isinstance(value, Constraints):
             self._path_constraints = value
-        elif isinstance(value, str) and self._storage is not None:
-            self._path_constraints = self._storage.get_constraints(value, self._model.name, self._group.name)
+        elif isinstance(value, str) and self.constraints_storage is not None:
+            self._path_constraints = self.constraints_storage.get_constraints(value, self._model.name, self._group.name)
         else:
             raise MoveItCommanderException(f"Unable to set path constraints {value!r}: {NO_DATABASE}")
 

@@ -290,6 +290,10 @@ class ControllerManager:
             for entry in self._loaded
         ]
 
+    def get_controller_by_name(self, name: str) -> Controller | None:
+        """Returns the loaded controller of that name, if there is one."""
+        return next((entry.controller for entry in self._loaded if entry.name == name), None)
+
     def list_controller_types(self) -> list[tuple[str, str]]:
         """Known type names, each with the base class it is reported under."""
         return [(name, BASE_CLASS) for name in self.types.names]

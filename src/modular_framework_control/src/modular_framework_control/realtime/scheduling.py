@@ -19,7 +19,7 @@ PRIORITY = 80
 OTHERS_BELOW = 10
 """By how much the priority of the other threads of a process is lower than that of the loop."""
 _SWITCH_INTERVAL_S = 2e-4
-_LATENCY_DEVICE = "/dev/cpu_dma_latency"
+LATENCY_DEVICE = "/dev/cpu_dma_latency"
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
 
@@ -64,19 +64,22 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     return refused
 
 
-def keep_processors_awake() -> list[str]:
+def keep_processors_awake(latency_device: str = LATENCY_DEVICE) -> list[str]:
     """Keeps idle processors from sleep states that take long to leave, while this process lives (it costs power).
+
+    Args:
+        latency_device: the kernel's device for such requests.
 
     Returns:
         What was not permitted and why; nothing when all was.
     """
     try:
-        device = os.open(_LATENCY_DEVICE, os.O_WRONLY | os.O_CLOEXEC)  # the request holds as long as it is open
+        device = os.open(latency_device, os.O_WRONLY | os.O_CLOEXEC)  # the request holds as long as it is open
         os.write(device, (0).to_bytes(4, sys.byteorder))
     except OSError as error:
         return [
-            f"idle processors kept awake ({_LATENCY_DEVICE}: {error.strerror}; allow to write it with a rule of "
-            f"udev, or docker run --device {_LATENCY_DEVICE})"
+            f"idle processors kept awake ({latency_device}: {error.strerror}; allow to write it with a rule of "
+            f"udev, or docker run --device {latency_device})"
         ]
     return []
 

@@ -71,6 +71,10 @@ class LoopLog(logging.Handler):
             handler.handleError(record)
         self._complaining = None
 
+    def flush(self) -> None:
+        """Waits until the records taken so far are written."""
+        self._outbox.flush()
+
     def end(self) -> None:
         """Writes all records that wait, then restores the former handlers; may be called twice."""
         if self._served is None:

@@ -76,7 +76,7 @@ class RosControllerManager:
         close = attach_ros(controller, self._namespace, name, self._outbox, self._loop_time)
 
         def detach() -> None:
-            self._outbox.flush()
+            self.flush()
             close()
 
         return detach
@@ -115,6 +115,10 @@ class RosControllerManager:
             for report in self.manager.list_controllers()
         ]
         return message
+
+    def flush(self, timeout_s: float = 2.0) -> None:
+        """Waits until everything is published that controllers have handed over so far, at most `timeout_s` [s]."""
+        self._outbox.flush(timeout_s)
 
     def close(self) -> None:
         """Ends all goals, closes all topics and services; the control loop must have ended. May be called twice."""

@@ -105,14 +105,14 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         print(f"run_framework: {error}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
     log_file = Path(rospkg.get_log_dir()) / uuid / f"{watcher.last_process}.log"
-    return _verdict(watcher, cause_of_death(log_file))
+    return verdict(watcher, cause_of_death(log_file))
 
 
 def _master_port() -> int | None:
     return rosgraph.network.parse_http_host_and_port(rosgraph.get_master_uri())[1]
 
 
-def _verdict(watcher: EndWatcher, cause: str) -> int:
+def verdict(watcher: EndWatcher, cause: str) -> int:
     """Prints how the launch ended, after roslaunch's messages about the nodes it stops; returns the exit code."""
     because = f": {cause.removeprefix('The task could not be run: ')}" if cause else ""
     if watcher.dead_node is not None:

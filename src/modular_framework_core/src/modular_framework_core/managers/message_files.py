@@ -110,7 +110,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
             every message that does not is named.
     """
     try:
-        content = _parsed(read_text(path))
+        content = parsed(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:
@@ -141,7 +141,8 @@ _YamlLoader.add_implicit_resolver(
 )
 
 
-def _parsed(text: str) -> Any:
+def parsed(text: str) -> Any:
+    """Returns the data of a text in JSON or YAML."""
     for parse in (orjson.loads, json.loads):  # only the slower one reads NaN and Infinity
         try:
             return parse(text)

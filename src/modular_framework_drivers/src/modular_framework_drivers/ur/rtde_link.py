@@ -30,7 +30,6 @@ from modular_framework_drivers.ur.state_watch import SilenceWatch
 LOGGER = logging.getLogger("rosout.ur_arm")
 _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
-_RETRY_S = 0.5  # between two attempts to connect
 _START_TIMEOUT_S = 30.0  # for a process to start; a busy computer takes its time
 _CONNECT_TIMEOUT_S = 5.0  # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0  # from then until the program is uploaded and runs
@@ -53,6 +52,7 @@ class LinkSettings:
         lookahead_s: of servoj, 0.03 to 0.2 [s].
         gain: of servoj, 100 to 2000.
         real_time: whether the processes that hold ur-rtde ask for real-time scheduling.
+        retry_s: between two attempts to connect [s].
     """
 
     address: str
@@ -63,6 +63,7 @@ class LinkSettings:
     lookahead_s: float = 0.03
     gain: float = 2000.0
     real_time: bool = True
+    retry_s: float = 0.5
 
 
 class _RtdeProcess:
@@ -225,12 +226,12 @@ class RtdeLink:
             now_s = time.monotonic()
             try:
                 if self._states is None and now_s >= next_attempt_s:
-                    next_attempt_s = now_s + _RETRY_S
+                    next_attempt_s = now_s + self._settings.retry_s
                     self._states = self._start("state", ["--timeout", str(self._settings.timeout_s)], now_s)
                 elif self._states is not None and self._is_over(self._states, now_s):
                     states, self._states = self._states, None
                     states.process.end()
-                    next_attempt_s = now_s + _RETRY_S
+                    next_attempt_s = now_s + self._settings.retry_s
                 self._keep_program(now_s)
             except OSError as error:
                 self._log_start_failure(error)

@@ -84,6 +84,10 @@ class RegionCache:
     def __init__(self) -> None:
         self._regions: dict[int, tuple[Any, Region]] = {}
 
+    def __len__(self) -> int:
+        """Returns how many regions are kept."""
+        return len(self._regions)
+
     def region(self, geometry: Any) -> Region:
         """Returns the region that covers a geometry."""
         known = self._regions.get(id(geometry))
