@@ -426,7 +426,7 @@ def test_a_line_of_the_log_asks_the_master_nothing(managers, monkeypatch):
         return ask(*call, **options)
 
     monkeypatch.setattr(Transport, "request", request)
-    assert rospy.get_param("/rosout_disable_topics_generation") is False and calls
+    assert rospy.get_param_names() and calls, "a question to the master is seen"
     calls.clear()
     rospy.loginfo("another line")
     assert calls == []
