@@ -26,6 +26,7 @@ from moveit_commander.servers import Servers
 
 acm_set_default = allowed_collisions.set_default
 acm_set_allowed = allowed_collisions.set_allowed
+Names = Sequence[str]
 Vector = Sequence[float]
 
 
@@ -86,7 +87,7 @@ class PlanningSceneInterface:
         self,
         object: AttachedCollisionObject | CollisionObject | str,  # noqa: A002 - public name
         link: str | None = None,
-        touch_links: Sequence[str] | None = None,
+        touch_links: Names | None = None,
     ) -> None:
         """Attaches a new object, or (by its name) one of the scene, to a link.
 
@@ -110,7 +111,7 @@ class PlanningSceneInterface:
         pose: PoseStamped | None = None,
         filename: str = "",
         size: Vector = (1, 1, 1),
-        touch_links: Sequence[str] | None = None,
+        touch_links: Names | None = None,
     ) -> None:
         """Attaches a mesh of a file; without pose and file: the object of that name."""
         new = self.make_mesh(name, pose, filename, size) if pose is not None and filename else name
@@ -122,18 +123,13 @@ class PlanningSceneInterface:
         name: str,
         pose: PoseStamped | None = None,
         size: Vector = (1, 1, 1),
-        touch_links: Sequence[str] | None = None,
+        touch_links: Names | None = None,
     ) -> None:
         """Attaches a box [m]; without pose: the object of that name."""
         self.attach_object(name if pose is None else self.make_box(name, pose, size), link, touch_links)
 
     def attach_sphere(
-        self,
-        link: str,
-        name: str,
-        pose: PoseStamped | None = None,
-        radius: float = 1,
-        touch_links: Sequence[str] | None = None,
+        self, link: str, name: str, pose: PoseStamped | None = None, radius: float = 1, touch_links: Names | None = None
     ) -> None:
         """Attaches a sphere [m]; without pose: the object of that name."""
         self.attach_object(name if pose is None else self.make_sphere(name, pose, radius), link, touch_links)
@@ -145,7 +141,7 @@ class PlanningSceneInterface:
         pose: PoseStamped | None = None,
         height: float = 1,
         radius: float = 1,
-        touch_links: Sequence[str] | None = None,
+        touch_links: Names | None = None,
     ) -> None:
         """Attaches a cylinder [m]; without pose: the object of that name."""
         self.attach_object(name if pose is None else self.make_cylinder(name, pose, height, radius), link, touch_links)
@@ -184,11 +180,11 @@ class PlanningSceneInterface:
             if (item.type.key or not with_type) and inside(item, region)
         ]
 
-    def get_object_poses(self, object_ids: Sequence[str]) -> dict[str, Pose]:
+    def get_object_poses(self, object_ids: Names) -> dict[str, Pose]:
         """Returns the poses of objects in the planning frame, by name; unknown names are left out."""
         return {name: item.pose for name, item in self.get_objects(list(object_ids)).items() if name in object_ids}
 
-    def get_objects(self, object_ids: Sequence[str] = ()) -> dict[str, CollisionObject]:
+    def get_objects(self, object_ids: Names = ()) -> dict[str, CollisionObject]:
         """Returns the objects of the world by name; none named: all of them."""
         return {
             item.id: item
@@ -196,7 +192,7 @@ class PlanningSceneInterface:
             if item.id in object_ids or not object_ids
         }
 
-    def get_attached_objects(self, object_ids: Sequence[str] = ()) -> dict[str, AttachedCollisionObject]:
+    def get_attached_objects(self, object_ids: Names = ()) -> dict[str, AttachedCollisionObject]:
         """Returns the attached objects by name; none named: all of them."""
         scene = self.get_planning_scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         return {

@@ -15,8 +15,6 @@ from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 STEP_S = 0.002
-SHUT_TICKS = 40
-ROOM_TICKS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +24,8 @@ class FingerModel:
     Attributes:
         closed_ticks: shaft angle at which the pads meet [ticks], any turn.
         travel_ticks: from there to the stop of the open fingers [ticks].
+        shut_ticks: fingers that are open less than this count as shut [ticks].
+        object_room_ticks: fingers take up an offered object once they are open this much wider than it [ticks].
         top_speed: without load at full duty [ticks/s]; an MX-64 at 12 V turns 63 times a minute.
         time_constant_s: of the speed [s].
         torque_mode_gain: how much faster the same word makes it without load in torque control mode, where the motor's
@@ -41,6 +41,8 @@ class FingerModel:
 
     closed_ticks: float = -150.0
     travel_ticks: float = 2560.0
+    shut_ticks: float = 40.0
+    object_room_ticks: float = 100.0
     top_speed: float = 63.0 / 60.0 * 4096.0
     time_constant_s: float = 0.04
     torque_mode_gain: float = 3.0
@@ -91,8 +93,12 @@ class Finger:
 
     def _take_offered(self) -> None:
         """Places an offered object between the fingers once they have been closed, as for calibration, and are open."""
-        self._was_shut |= self.opening < SHUT_TICKS
-        if self.offered_opening is not None and self._was_shut and self.opening > self.offered_opening + ROOM_TICKS:
+        self._was_shut |= self.opening < self.model.shut_ticks
+        if (
+            self.offered_opening is not None
+            and self._was_shut
+            and self.opening > self.offered_opening + self.model.object_room_ticks
+        ):
             self.object_opening, self.offered_opening = self.offered_opening, None
 
     def power_cycle(self) -> None:

@@ -14,14 +14,6 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 
-class Motion(Enum):
-    """State of the fingers: on their way, at the goal, or stalled against an object that they hold."""
-
-    MOVING = "moving"
-    REACHED = "reached"
-    HOLDING = "holding"
-
-
 @dataclass(frozen=True, slots=True)
 class Goal:
     """Goal of a motion.
@@ -69,6 +61,14 @@ class GripRules:
     stall_s: float = 0.25
     still: float = 0.01
     hold_torque: int = 400
+
+
+class Motion(Enum):
+    """State of the fingers: on their way, at the goal, or stalled against an object that they hold."""
+
+    MOVING = "moving"
+    REACHED = "reached"
+    HOLDING = "holding"
 
 
 class Grip:
