@@ -107,6 +107,26 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
     raise CallError(f"service '{proxy.resolved_name}' did not answer within {timeout_s:.1f} s")
 
 
+def request_service(name: str, kind: Any, request: Any, timeout_s: float) -> Any:
+    """Waits for a service and calls it once.
+
+    Args:
+        name: Name of the service.
+        kind: Its type.
+        request: Its request.
+        timeout_s: Longest wait for the service, and again for its answer [s].
+
+    Returns:
+        The answer.
+
+    Raises:
+        CallError: As of ``wait_for_service`` and ``call_service``.
+    """
+    proxy = rospy.ServiceProxy(name, kind)
+    wait_for_service(proxy, timeout_s)
+    return call_service(proxy, request, timeout_s)
+
+
 def _given_up(what: str) -> CallError:
     return CallError(f"{what} was not waited for any longer: the task was asked to stop")
 

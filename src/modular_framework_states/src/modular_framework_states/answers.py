@@ -30,20 +30,30 @@ class AnswerRules:
     outcome_values: Mapping[str, Any] = field(default_factory=dict)
     keep: Mapping[str, str] = field(default_factory=dict)
 
-    def check(self, state: str, outcomes: Sequence[str], output_keys: Sequence[str]) -> None:
-        """Checks the rules against what the state declares.
+    @classmethod
+    def of(
+        cls,
+        state: FrameworkState,
+        outcome_field: str,
+        outcome_values: Mapping[str, Any] | None,
+        keep: Mapping[str, str] | None,
+    ) -> AnswerRules:
+        """Returns the rules that the options of a state give.
 
         Raises:
-            ValueError: An outcome or a key is not declared, or values are given without a field.
+            ValueError: The state does not declare an outcome or a key, or values are given without a field.
         """
-        if self.outcome_values and not self.outcome_field:
-            raise ValueError(f"{state}: outcome_values without outcome_field; name the field that has the values")
-        unknown = [name for name in self.outcome_values if name not in outcomes]
+        rules = cls(outcome_field, dict(outcome_values or {}), dict(keep or {}))
+        name, output_keys = type(state).__name__, state.get_registered_output_keys()
+        if rules.outcome_values and not outcome_field:
+            raise ValueError(f"{name}: outcome_values without outcome_field; name the field that has the values")
+        unknown = [outcome for outcome in rules.outcome_values if outcome not in state.outcomes]
         if unknown:
-            raise ValueError(f"{state}: outcome_values names {unknown}; its outcomes are {list(outcomes)}")
-        missing = [key for key in self.keep if key not in output_keys]
+            raise ValueError(f"{name}: outcome_values names {unknown}; its outcomes are {state.outcomes}")
+        missing = [key for key in rules.keep if key not in output_keys]
         if missing:
-            raise ValueError(f"{state}: keep writes {missing}; its output keys are {sorted(output_keys)}; add them")
+            raise ValueError(f"{name}: keep writes {missing}; its output keys are {sorted(output_keys)}; add them")
+        return rules
 
     def outcome(self, answer: Any, outcomes: Sequence[str]) -> str:
         """Returns the outcome that the answer's field stands for.

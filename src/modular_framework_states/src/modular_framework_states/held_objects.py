@@ -17,7 +17,7 @@ from moveit_msgs.srv import (
     GetPlanningSceneRequest,
 )
 
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, request_service
 
 PREFIX_PARAMETER = "manipulator_prefix"
 SERVICE_TIMEOUT_S = 10.0
@@ -32,10 +32,9 @@ def held_objects() -> dict[str, str]:
         CallError: move_group does not answer.
     """
     prefix = str(rospy.get_param(PREFIX_PARAMETER, ""))
-    proxy = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
-    wait_for_service(proxy, SERVICE_TIMEOUT_S)
     components = PlanningSceneComponents(components=PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
-    scene = call_service(proxy, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S).scene
+    request = GetPlanningSceneRequest(components=components)
+    scene = request_service("get_planning_scene", GetPlanningScene, request, SERVICE_TIMEOUT_S).scene
     return {
         item.object.id: item.link_name
         for item in scene.robot_state.attached_collision_objects
@@ -52,15 +51,13 @@ def detach(objects: dict[str, str]) -> None:
     Raises:
         CallError: move_group does not answer, or refuses.
     """
-    proxy = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
-    wait_for_service(proxy, SERVICE_TIMEOUT_S)
     scene = PlanningScene(is_diff=True)
     scene.robot_state.is_diff = True
     scene.robot_state.attached_collision_objects = [
         AttachedCollisionObject(link_name=link, object=CollisionObject(id=name, operation=CollisionObject.REMOVE))
         for name, link in objects.items()
     ]
-    if not call_service(proxy, ApplyPlanningSceneRequest(scene=scene), SERVICE_TIMEOUT_S).success:
-        raise CallError(
-            f"service '{proxy.resolved_name}' did not detach {', '.join(objects)}; its node logged the reason"
-        )
+    request = ApplyPlanningSceneRequest(scene=scene)
+    if not request_service("apply_planning_scene", ApplyPlanningScene, request, SERVICE_TIMEOUT_S).success:
+        service = rospy.resolve_name("apply_planning_scene")
+        raise CallError(f"service '{service}' did not detach {', '.join(objects)}; its node logged the reason")

@@ -9,7 +9,8 @@ import rospy
 from moveit_msgs.msg import RobotTrajectory
 
 from modular_framework_core import srv
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_ros.calls import CallError, request_service
 
 SERVICE_TIMEOUT_S = 10.0
 
@@ -55,6 +56,26 @@ def fetch(kind: str, name: str) -> Any:
     return getattr(answer, message_field)
 
 
+def selected_or_named(state: FrameworkState, userdata: Any, kind: str, name: str) -> Any:
+    """Returns the message a state works with: userdata ``selected_<kind>`` if that is an input key, or a stored one.
+
+    Args:
+        state: The state.
+        userdata: Of its execution.
+        kind: trajectory, plan or grasp.
+        name: Name of the stored message; empty takes the oldest anonymous one.
+
+    Raises:
+        ManagerError: Nothing was selected, or the manager does not answer, or has no such message.
+    """
+    key = f"selected_{kind}"
+    if key not in state.get_registered_input_keys():
+        return fetch(kind, name)
+    if userdata[key] is None:
+        raise ManagerError(f"userdata '{key}' is empty; let a state before select or make a {kind}")
+    return userdata[key]
+
+
 def store_plan(plan: RobotTrajectory, name: str) -> None:
     """Stores a plan.
 
@@ -84,9 +105,7 @@ def file_request(verb: Literal["save", "load", "reload"], kind: Kind, path: str)
 
 
 def _call(service: str, service_type: Any, request: Any) -> Any:
-    proxy = rospy.ServiceProxy(service, service_type)
     try:
-        wait_for_service(proxy, SERVICE_TIMEOUT_S)
-        return call_service(proxy, request, SERVICE_TIMEOUT_S)
+        return request_service(service, service_type, request, SERVICE_TIMEOUT_S)
     except CallError as error:
         raise ManagerError(str(error)) from error

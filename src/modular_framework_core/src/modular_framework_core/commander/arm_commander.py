@@ -49,6 +49,7 @@ from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import (
     CallError,
     call_service,
+    request_service,
     wait_for_action,
     wait_for_result,
     wait_for_service,
@@ -192,10 +193,9 @@ class ArmCommander:
         Raises:
             CommanderError: move_group does not answer.
         """
-        proxy = rospy.ServiceProxy(PLANNERS_SERVICE, QueryPlannerInterfaces)
+        request = QueryPlannerInterfacesRequest()
         try:
-            wait_for_service(proxy, SERVICE_TIMEOUT_S)
-            answer = call_service(proxy, QueryPlannerInterfacesRequest(), SERVICE_TIMEOUT_S)
+            answer = request_service(PLANNERS_SERVICE, QueryPlannerInterfaces, request, SERVICE_TIMEOUT_S)
         except CallError as error:
             raise CommanderError(str(error)) from error
         names = {

@@ -17,13 +17,7 @@ class ExternalControllerError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ControllerNode:
-    """A node to run.
-
-    Attributes:
-        package: ROS package of the executable.
-        node_type: Executable.
-        name: Name of the node.
-    """
+    """A node to run: the executable ``node_type`` of a ROS package, under a name."""
 
     package: str
     node_type: str

@@ -40,9 +40,7 @@ class ObjectTypes:
             ObjectTypeError: No such object.
         """
         with self._lock:
-            if object_name not in self._types:
-                raise ObjectTypeError(self._unknown(object_name))
-            return self._types[object_name]
+            return self._types[self._known(object_name)]
 
     def delete(self, object_name: str) -> None:
         """Removes an object.
@@ -51,10 +49,10 @@ class ObjectTypes:
             ObjectTypeError: No such object.
         """
         with self._lock:
-            if object_name not in self._types:
-                raise ObjectTypeError(self._unknown(object_name))
-            del self._types[object_name]
+            del self._types[self._known(object_name)]
 
-    def _unknown(self, object_name: str) -> str:
-        known = ", ".join(sorted(self._types)) or "none"
-        return f"No object named '{object_name}' is registered. Registered: {known}."
+    def _known(self, object_name: str) -> str:
+        if object_name not in self._types:
+            known = ", ".join(sorted(self._types)) or "none"
+            raise ObjectTypeError(f"No object named '{object_name}' is registered. Registered: {known}.")
+        return object_name

@@ -28,7 +28,7 @@ from modular_framework_core.srv import (
     UpdateAndPublishACMEntry,
     UpdateAndPublishACMEntryResponse,
 )
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, request_service
 
 INDICES_PARAMETER = "manipulator_links_indices"
 PREFIX_PARAMETER = "manipulator_prefix"
@@ -62,13 +62,12 @@ def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
     Raises:
         CallError: move_group is not there within this time [s], or does not take the matrix.
     """
-    proxy = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
-    wait_for_service(proxy, timeout_s)
     scene = PlanningScene(is_diff=True, allowed_collision_matrix=message)
     scene.robot_state.is_diff = True
-    if not call_service(proxy, ApplyPlanningSceneRequest(scene=scene), timeout_s).success:
+    request = ApplyPlanningSceneRequest(scene=scene)
+    if not request_service("apply_planning_scene", ApplyPlanningScene, request, timeout_s).success:
         raise CallError(
-            f"service '{proxy.resolved_name}' did not take the collision matrix of "
+            f"service '{rospy.resolve_name('apply_planning_scene')}' did not take the collision matrix of "
             f"{len(message.entry_names)} entries; its node logged the reason"
         )
 

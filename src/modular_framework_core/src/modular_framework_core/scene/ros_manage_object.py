@@ -16,7 +16,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 
 from modular_framework_core import srv
 from modular_framework_core.scene.manage_object import ObjectRequest, ObjectRequestError, parse_request
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, request_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SERVICE_TIMEOUT_S = 15.0
@@ -54,10 +54,8 @@ def ask(name: str, service_type: Any, request: Any) -> Any:
     Raises:
         RefusedError: It is absent or fails.
     """
-    proxy = rospy.ServiceProxy(name, service_type)
     try:
-        wait_for_service(proxy, SERVICE_TIMEOUT_S)
-        return call_service(proxy, request, SERVICE_TIMEOUT_S)
+        return request_service(name, service_type, request, SERVICE_TIMEOUT_S)
     except CallError as error:
         raise RefusedError(str(error)) from error
 

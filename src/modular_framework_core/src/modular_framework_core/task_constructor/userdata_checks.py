@@ -54,8 +54,9 @@ def check_userdata(root: MachineSpec, provided_by: dict[str, str], faults: Fault
 def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str], faults: FaultList) -> None:
     if machine.template.userdata is None:
         return
-    members = list(_members(machine))
-    nested = [inner for inner in _nested(machine) if not inner.shares_userdata]
+    children = list(_children(machine))
+    members = [child for child in children if isinstance(child, StateSpec)]
+    nested = [child for child in children if isinstance(child, MachineSpec)]
     available = {*machine.template.userdata, *machine.input_keys}
     exchanged: Counter[str] = Counter()
     for state in members:
@@ -64,7 +65,7 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
             if known is None:
                 return
             (available if key == "output_keys" else exchanged).update(known)
-    for inner in _nested(machine):
+    for inner in nested:
         available.update(inner.remapping.get(key, key) for key in inner.output_keys)
     for key, users in exchanged.items():
         misspelt = users == 1 and difflib.get_close_matches(key, list(provided_by), n=1, cutoff=MISSPELT)
@@ -74,7 +75,11 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
         (state, [*(_keys_around(state, "input_keys") or ()), *(_keys_around(state, "io_keys") or ())])
         for state in members
     ]
-    needed += [(inner, [inner.remapping.get(key, key) for key in inner.input_keys]) for inner in nested]
+    needed += [
+        (inner, [inner.remapping.get(key, key) for key in inner.input_keys])
+        for inner in nested
+        if not inner.shares_userdata
+    ]
     for child, keys in needed:
         for key in dict.fromkeys(keys):
             if key not in available:
@@ -100,21 +105,12 @@ def _missing_key(
     return f"{text}; name it in the output_keys of the state that writes it"
 
 
-def _members(machine: MachineSpec) -> Iterable[StateSpec]:
-    """Yields the states that work on the userdata of this machine."""
+def _children(machine: MachineSpec) -> Iterable[ChildSpec]:
+    """Yields the states and machines that work on the userdata of a machine."""
     for child in machine.states:
-        if isinstance(child, StateSpec):
-            yield child
-        elif child.shares_userdata:
-            yield from _members(child)
-
-
-def _nested(machine: MachineSpec) -> Iterable[MachineSpec]:
-    for child in machine.states:
-        if isinstance(child, MachineSpec):
-            yield child
-            if child.shares_userdata:
-                yield from _nested(child)
+        yield child
+        if isinstance(child, MachineSpec) and child.shares_userdata:
+            yield from _children(child)
 
 
 def _keys_around(state: StateSpec, key: str) -> tuple[str, ...] | None:

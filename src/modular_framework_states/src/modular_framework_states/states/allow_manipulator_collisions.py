@@ -13,7 +13,7 @@ from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest, Mo
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, request_service
 from modular_framework_states.manager_clients import ManagerError
 
 MODIFICATIONS = {
@@ -95,9 +95,7 @@ class AllowManipulatorCollisions(FrameworkState):
 
 def _ask(name: str, service_type: Any, request: Any) -> Any:
     """Calls a service of the collision matrix manager; raises CallError when it does not answer or refuses."""
-    proxy = rospy.ServiceProxy(name, service_type)
-    wait_for_service(proxy, SERVICE_TIMEOUT_S)
-    answer = call_service(proxy, request, SERVICE_TIMEOUT_S)
+    answer = request_service(name, service_type, request, SERVICE_TIMEOUT_S)
     if not answer.success:
-        raise CallError(f"service '{proxy.resolved_name}' refused the change; its node logged the reason")
+        raise CallError(f"service '{rospy.resolve_name(name)}' refused the change; its node logged the reason")
     return answer

@@ -58,8 +58,7 @@ class CallAction(FrameworkState):
         super().__init__(**keys)
         self._name, self._goal, self._expected = str(action_name), dict(goal or {}), dict(expect or {})
         self._timeout_s, self._server_timeout_s = float(timeout), float(server_timeout)
-        self._rules = AnswerRules(outcome_field, dict(outcome_values or {}), dict(keep or {}))
-        self._rules.check("CallAction", self.outcomes, self.get_registered_output_keys())
+        self._rules = AnswerRules.of(self, outcome_field, outcome_values, keep)
 
     def execute(self, userdata: Any) -> str:
         """Sends the goal and waits."""

@@ -53,8 +53,7 @@ class CallService(FrameworkState):
         super().__init__(**keys)
         self._name, self._request, self._expected = str(service_name), dict(request or {}), dict(expect or {})
         self._timeout_s = float(timeout)
-        self._rules = AnswerRules(outcome_field, dict(outcome_values or {}), dict(keep or {}))
-        self._rules.check("CallService", self.outcomes, self.get_registered_output_keys())
+        self._rules = AnswerRules.of(self, outcome_field, outcome_values, keep)
 
     def execute(self, userdata: Any) -> str:
         """Calls the service and checks the answer."""

@@ -17,7 +17,7 @@ from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Limits, Share, Vector
 from modular_framework_core.state_api.option_uses import Named
-from modular_framework_ros.calls import CallError, call_service, wait_for_service
+from modular_framework_ros.calls import CallError, request_service
 from modular_framework_states.manager_clients import ManagerError, fetch
 
 TIMEOUT_S = 20.0
@@ -85,7 +85,7 @@ class CartesianMove(FrameworkState):
             return fetch("pose", self._pose_name)
         link = commander.group.tip_link
         request = GetPositionFKRequest(fk_link_names=[link], robot_state=robot_state(commander.current_joints()))
-        answer = _call("compute_fk", GetPositionFK, request)
+        answer = request_service("compute_fk", GetPositionFK, request, TIMEOUT_S)
         if not answer.pose_stamped:
             raise CallError(
                 f"'{rospy.resolve_name('compute_fk')}' does not know where link '{link}' is: "
@@ -99,7 +99,7 @@ class CartesianMove(FrameworkState):
         request.group_name, request.link_name = commander.group_name, commander.group.tip_link
         request.cartesian_speed_limited_link = request.link_name if request.max_cartesian_speed else ""
         request.start_state = robot_state(commander.current_joints())
-        return _call("compute_cartesian_path", GetCartesianPath, request)
+        return request_service("compute_cartesian_path", GetCartesianPath, request, TIMEOUT_S)
 
 
 def moved(pose: PoseStamped, offset: Sequence[float], in_own_frame: bool) -> PoseStamped:
@@ -112,9 +112,3 @@ def moved(pose: PoseStamped, offset: Sequence[float], in_own_frame: bool) -> Pos
     for axis, value in zip("xyz", step, strict=True):
         setattr(result.pose.position, axis, getattr(pose.pose.position, axis) + float(value))
     return result
-
-
-def _call(name: str, service_type: Any, request: Any) -> Any:
-    proxy = rospy.ServiceProxy(name, service_type)
-    wait_for_service(proxy, TIMEOUT_S)
-    return call_service(proxy, request, TIMEOUT_S)

@@ -20,7 +20,7 @@ from modular_framework_core.state_api.option_limits import NotNegative, Positive
 from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.arm_positions import run_to_end
-from modular_framework_states.manager_clients import ManagerError, fetch
+from modular_framework_states.manager_clients import ManagerError, selected_or_named
 
 TIMEOUT_S = 10.0
 
@@ -56,7 +56,8 @@ class ExecuteTrajectory(FrameworkState):
         commander = userdata.arm_commander
         what = f"trajectory '{self._name or 'selected'}'"
         try:
-            trajectory = from_current(self._trajectory(userdata), commander.current_joints())
+            trajectory = selected_or_named(self, userdata, "trajectory", self._name)
+            trajectory = from_current(trajectory, commander.current_joints())
             fault = too_fast(trajectory, {joint.name: joint.velocity for joint in commander.group.joints})
             if not fault and self._step:
                 fault = self._first_contact(commander, trajectory)
@@ -67,13 +68,6 @@ class ExecuteTrajectory(FrameworkState):
         if fault:
             return self.fail(f"{what} was not run: {fault}")
         return run_to_end(self, commander, RobotTrajectory(joint_trajectory=trajectory), self._goal_tolerance, what)
-
-    def _trajectory(self, userdata: Any) -> JointTrajectory:
-        if "selected_trajectory" not in self.get_registered_input_keys():
-            return fetch("trajectory", self._name)
-        if userdata.selected_trajectory is None:
-            raise ManagerError("userdata 'selected_trajectory' is empty; select a trajectory first")
-        return userdata.selected_trajectory
 
     def _first_contact(self, commander: Any, trajectory: JointTrajectory) -> str:
         """Describes the first collision on the path; empty when the path is free."""

@@ -9,7 +9,7 @@ from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
-from modular_framework_states.manager_clients import ManagerError, fetch
+from modular_framework_states.manager_clients import ManagerError, selected_or_named
 
 
 class Grasp(FrameworkState):
@@ -34,22 +34,9 @@ class Grasp(FrameworkState):
     def execute(self, userdata: Any) -> str:
         """Sends the goal and waits for its end."""
         try:
-            grasp = self._grasp(userdata)
-            send(
-                userdata.manipulator_controller_client,
-                self._type,
-                grasp,
-                userdata.max_torque,
-                self._timeout_s,
-                self.preempt_requested,
-            )
+            grasp = selected_or_named(self, userdata, "grasp", self._name)
+            client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            send(client, self._type, grasp, max_torque, self._timeout_s, self.preempt_requested)
         except (ManagerError, GraspGoalError) as error:
             return self.fail(f"{self._type} of grasp '{self._name or 'selected'}' was not reached: {error}")
         return self.succeed()
-
-    def _grasp(self, userdata: Any) -> Any:
-        if "selected_grasp" not in self.get_registered_input_keys():
-            return fetch("grasp", self._name)
-        if userdata.selected_grasp is None:
-            raise ManagerError("userdata 'selected_grasp' is empty; select a grasp first")
-        return userdata.selected_grasp

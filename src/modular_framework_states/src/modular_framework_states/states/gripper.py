@@ -51,14 +51,8 @@ class Gripper(FrameworkState):
         try:
             positions = self._positions or posture_positions(self._posture)
             grasp = posture_grasp(positions, self._torque)
-            send(
-                userdata.manipulator_controller_client,
-                self._stage,
-                grasp,
-                userdata.max_torque,
-                self._timeout_s,
-                self.preempt_requested,
-            )
+            client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            send(client, self._stage, grasp, max_torque, self._timeout_s, self.preempt_requested)
         except (RobotModelError, GraspGoalError) as error:
             return self.fail(f"gripper to {wanted}: {error}")
         return self.succeed()

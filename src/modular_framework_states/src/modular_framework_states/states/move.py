@@ -10,7 +10,7 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_core.state_api.option_uses import Named
 from modular_framework_states.arm_positions import run_to_end, worst_joint
-from modular_framework_states.manager_clients import ManagerError, fetch
+from modular_framework_states.manager_clients import ManagerError, selected_or_named
 
 
 class Move(FrameworkState):
@@ -41,7 +41,7 @@ class Move(FrameworkState):
         """Executes the plan."""
         commander = userdata.arm_commander
         try:
-            plan = self._plan(userdata)
+            plan = selected_or_named(self, userdata, "plan", self._plan_name)
         except ManagerError as error:
             return self.fail(str(error))
         trajectory = plan.joint_trajectory
@@ -55,10 +55,3 @@ class Move(FrameworkState):
                 f"its first point, allowed is {self._start_tolerance}; plan again from the current state"
             )
         return run_to_end(self, commander, plan, self._goal_tolerance, f"plan '{self._plan_name}'")
-
-    def _plan(self, userdata: Any) -> Any:
-        if "selected_plan" not in self.get_registered_input_keys():
-            return fetch("plan", self._plan_name)
-        if userdata.selected_plan is None:
-            raise ManagerError("userdata 'selected_plan' is empty; select or make a plan first")
-        return userdata.selected_plan

@@ -45,14 +45,8 @@ class Release(FrameworkState):
         """Opens the fingers and detaches what they held."""
         try:
             grasp = posture_grasp(posture_positions(self._posture), 1.0)
-            send(
-                userdata.manipulator_controller_client,
-                "pregrasp",
-                grasp,
-                userdata.max_torque,
-                self._timeout_s,
-                self.preempt_requested,
-            )
+            client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            send(client, "pregrasp", grasp, max_torque, self._timeout_s, self.preempt_requested)
             if rospy.get_param(SIMULATION_PARAMETER, False):
                 wait_until(lambda: self.preempt_requested() or not held_objects(), self._timeout_s, SCENE_PERIOD_S)
             elif held := held_objects():
