@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Mapping
-from enum import Enum
+from enum import Enum, auto
 from typing import Any
 
 from geometry_msgs.msg import Pose, PoseStamped
@@ -25,10 +25,10 @@ from moveit_commander.robot_model import group_values
 class Target(Enum):
     """Which kind of target a plan goes to: the one set last."""
 
-    JOINT = "joint"
-    POSE = "pose"
-    POSITION = "position"
-    ORIENTATION = "orientation"
+    JOINT = auto()
+    POSE = auto()
+    POSITION = auto()
+    ORIENTATION = auto()
 
 
 class GroupJointTargets(GroupSettings):

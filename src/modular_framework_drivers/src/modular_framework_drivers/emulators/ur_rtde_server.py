@@ -51,17 +51,8 @@ class Variable:
     set: Callable[[Value], None] | None = None
 
 
-_CONSTANT_OUTPUTS: dict[str, tuple[str, Value]] = {
-    "actual_execution_time": ("DOUBLE", 0.0002),
-    "joint_temperatures": ("VECTOR6D", (30.0,) * 6),
-    "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
-    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, -9.81)),
-    "joint_mode": ("VECTOR6INT32", (253,) * 6),
-    "actual_main_voltage": ("DOUBLE", 48.0),
-    "actual_robot_voltage": ("DOUBLE", 48.0),
-    "actual_digital_input_bits": ("UINT64", 0),
-    "elbow_position": ("VECTOR3D", (0.0,) * 3),
-    "elbow_velocity": ("VECTOR3D", (0.0,) * 3),
+_UNMODELLED_OUTPUTS: dict[str, tuple[str, Value]] = {
+    **dict.fromkeys(("elbow_position", "elbow_velocity"), ("VECTOR3D", (0.0,) * 3)),
     **dict.fromkeys(
         (
             "target_qdd",
@@ -96,6 +87,7 @@ def output_variables(controller: UrController) -> dict[str, Variable]:
     motion = controller.motion
     values: dict[str, tuple[str, Callable[[], Value]]] = {
         "timestamp": ("DOUBLE", lambda: controller.time_s),
+        "actual_execution_time": ("DOUBLE", lambda: 0.0002),
         "target_q": ("VECTOR6D", lambda: controller.target_positions),
         "target_qd": ("VECTOR6D", lambda: motion.velocities),
         "actual_q": ("VECTOR6D", lambda: motion.positions),
@@ -104,24 +96,30 @@ def output_variables(controller: UrController) -> dict[str, Variable]:
         "target_TCP_pose": ("VECTOR6D", lambda: flange_pose(controller.target_positions)),
         "actual_TCP_force": ("VECTOR6D", lambda: controller.wrench),
         "ft_raw_wrench": ("VECTOR6D", lambda: controller.wrench),
+        "joint_temperatures": ("VECTOR6D", lambda: (30.0,) * 6),
+        "actual_joint_voltage": ("VECTOR6D", lambda: (48.0,) * 6),
+        "actual_tool_accelerometer": ("VECTOR3D", lambda: (0.0, 0.0, -9.81)),
         "payload": ("DOUBLE", lambda: controller.payload_kg),
         "payload_cog": ("VECTOR3D", lambda: controller.payload_centre_m),
         "robot_mode": ("INT32", lambda: controller.robot_mode),
         "safety_mode": ("INT32", lambda: controller.safety_mode),
+        "joint_mode": ("VECTOR6INT32", lambda: (253,) * 6),
         "runtime_state": ("UINT32", lambda: controller.runtime_state),
         "robot_status_bits": ("UINT32", lambda: controller.robot_status_bits),
         "safety_status_bits": ("UINT32", lambda: controller.safety_status_bits),
         "speed_scaling": ("DOUBLE", lambda: controller.speed_scaling),
         "target_speed_fraction": ("DOUBLE", lambda: controller.speed_slider),
+        "actual_main_voltage": ("DOUBLE", lambda: 48.0),
+        "actual_robot_voltage": ("DOUBLE", lambda: 48.0),
+        "actual_digital_input_bits": ("UINT64", lambda: 0),
         "actual_digital_output_bits": ("UINT64", lambda: controller.digital_outputs),
     }
     for index in range(REGISTERS):
         values[f"output_int_register_{index}"] = ("INT32", _getter(controller.outputs.ints, index))
         values[f"output_double_register_{index}"] = ("DOUBLE", _getter(controller.outputs.doubles, index))
-    return {
-        **{name: Variable(kind, get=get) for name, (kind, get) in values.items()},
-        **{name: Variable(kind, get=_constant(value)) for name, (kind, value) in _CONSTANT_OUTPUTS.items()},
-    }
+    for name, (type_name, value) in _UNMODELLED_OUTPUTS.items():
+        values[name] = (type_name, _constant(value))
+    return {name: Variable(type_name, get=get) for name, (type_name, get) in values.items()}
 
 
 def input_variables(controller: UrController) -> dict[str, Variable]:
