@@ -41,7 +41,14 @@ class PlacedShape:
 
 @dataclass(frozen=True, slots=True)
 class PlacedLink:
-    """A link of a model in the world; its planning scene object is called ``<model>__<link>``."""
+    """A link of a model in the world.
+
+    Attributes:
+        model: instance name of the model.
+        link: name of the link in the model.
+        pose: 4x4 transform of the link in the world frame.
+        shapes: its collision shapes.
+    """
 
     model: str
     link: str
@@ -50,7 +57,7 @@ class PlacedLink:
 
     @property
     def object_id(self) -> str:
-        """Name of the link's object in a planning scene."""
+        """Name of the link's object in a planning scene, ``<model>__<link>``."""
         return f"{self.model}__{self.link}"
 
 

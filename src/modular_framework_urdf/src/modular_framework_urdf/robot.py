@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -101,7 +101,14 @@ class PlacedShapes:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link with its visual and collision shapes."""
+    """A link.
+
+    Attributes:
+        name: of the link.
+        visuals: its <visual> elements.
+        collisions: its <collision> elements.
+        line: of the description.
+    """
 
     name: str
     visuals: tuple[PlacedShapes, ...]
@@ -163,8 +170,7 @@ class Joint:
         return self.kind in MOVABLE_KINDS
 
 
-@dataclass(frozen=True, slots=True)
-class LocatedText:
+class LocatedText(NamedTuple):
     """What an element holds, without the white space around it, and its line."""
 
     text: str

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +34,6 @@ class PlacedGeometry:
     placement: Transform
     source: Shape
     margin: float
-
-    @property
-    def geometry(self) -> Any:
-        """Coal's geometry, built when it is first asked for."""
-        return self.source.geometry
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,6 +49,10 @@ class ExactCollision:
             self._poses[number] = _coal_transform(self._data.oMi[part.joint_id] * part.placement)
         return self._poses[number]
 
+    def _placed(self, number: int) -> tuple[Any, Any]:
+        """Returns a part's Coal geometry, built when it is first used, and its pose."""
+        return self._parts[number].source.geometry, self._pose(number)
+
     def _is_far(self, number: int) -> bool:
         """Whether the bounding spheres are apart: then Coal need not build its tree of a mesh."""
         pair = self._pairs[number]
@@ -66,14 +70,7 @@ class ExactCollision:
         pair = self._pairs[number]
         request.security_margin = pair.margin
         result = coal.CollisionResult()
-        coal.collide(
-            self._parts[pair.first].geometry,
-            self._pose(pair.first),
-            self._parts[pair.second].geometry,
-            self._pose(pair.second),
-            request,
-            result,
-        )
+        coal.collide(*self._placed(pair.first), *self._placed(pair.second), request, result)
         return result
 
     def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
@@ -125,10 +122,8 @@ class ExactCollision:
         return min(
             (
                 coal.distance(
-                    self._parts[pair.first].geometry,
-                    self._pose(pair.first),
-                    self._parts[pair.second].geometry,
-                    self._pose(pair.second),
+                    *self._placed(pair.first),
+                    *self._placed(pair.second),
                     coal.DistanceRequest(),
                     coal.DistanceResult(),
                 )

@@ -73,7 +73,16 @@ class FrameOnRobot:
 
 @dataclass(frozen=True, slots=True)
 class JointConstraint:
-    """A joint that stays within [target - below, target + above] [rad or m]."""
+    """A joint that stays within [target - below, target + above].
+
+    Attributes:
+        name: of the joint.
+        index: of the joint in a position vector of the whole robot.
+        target: position [rad or m].
+        below, above: tolerance on each side [rad or m].
+        is_continuous: whether a whole turn makes no difference.
+        weight: of the constraint among others [1].
+    """
 
     name: str
     index: int

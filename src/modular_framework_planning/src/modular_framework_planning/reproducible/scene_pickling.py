@@ -9,6 +9,7 @@ from dataclasses import fields
 from typing import Any
 
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -27,11 +28,13 @@ class _Pickler(pickle.Pickler):
         return ROBOT if isinstance(item, RobotModel) else None
 
     def reducer_override(self, item: Any) -> Any:
-        """Writes shapes without their built geometry, and constraints without their working memory."""
+        """Writes shapes without built geometry, constraints without working memory and errors as their base class."""
         if isinstance(item, Shape):
             return _shape, (type(item), {field.name: getattr(item, field.name) for field in fields(item)})  # type: ignore[arg-type]
         if isinstance(item, KinematicConstraints):
             return KinematicConstraints, (item.model, item.joints, item.positions, item.orientations, item.name)
+        if isinstance(item, PlanningError):
+            return PlanningError, (item.code, item.reason, item.contacts)
         return NotImplemented
 
 

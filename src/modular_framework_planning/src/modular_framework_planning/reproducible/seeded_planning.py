@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import pickle
 import select
-import socket
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,7 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from multiprocessing.connection import Client, Connection
 from pathlib import Path
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -21,7 +21,7 @@ from modular_framework_planning.planning_interface.planning_request import Plann
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
-from modular_framework_planning.reproducible.seeded_worker import LENGTH, Failure, WorkerSetup, receive, send
+from modular_framework_planning.reproducible.seeded_worker import WorkerSetup
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 WORKER = "modular_framework_planning.reproducible.seeded_worker"
@@ -66,20 +66,11 @@ class SeededPlanning:
             raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; allowed is 0 or more")
         connection = self._connect()
         try:
-            send(
-                connection,
-                to_bytes(
-                    (
-                        pipeline.name,
-                        pipeline.settings,
-                        pipeline.configurations.snapshot(),
-                        seed,
-                        replace(request, cancelled=_never),
-                    )
-                ),
-            )
+            configurations = pipeline.configurations.snapshot()
+            asked = (pipeline.name, pipeline.settings, configurations, seed, replace(request, cancelled=_never))
+            connection.send_bytes(to_bytes(asked))
             self._wait(connection, request)
-            found = from_bytes(receive(connection), self._model)
+            found = from_bytes(connection.recv_bytes(), self._model)
         except (EOFError, OSError) as error:
             raise PlanningError(
                 ErrorCode.CRASH,
@@ -88,8 +79,8 @@ class SeededPlanning:
             ) from error
         finally:
             connection.close()
-        if isinstance(found, Failure):
-            raise PlanningError(ErrorCode(found.code), found.reason, found.contacts)
+        if isinstance(found, PlanningError):
+            raise found
         return found
 
     def start(self) -> None:
@@ -101,7 +92,7 @@ class SeededPlanning:
             self._folder = tempfile.TemporaryDirectory(prefix="seeded_planning_")
             self._address = str(Path(self._folder.name) / "socket")
             setup = WorkerSetup(self._model.source, self._specs, tuple(sys.path), self._address)
-            data = pickle.dumps((tuple(sys.path), pickle.dumps(setup)))
+            data = pickle.dumps(tuple(sys.path)) + pickle.dumps(setup)  # the classes of the setup are found by the path
             self._process = subprocess.Popen(
                 [sys.executable, "-m", WORKER],
                 stdin=subprocess.PIPE,
@@ -109,7 +100,7 @@ class SeededPlanning:
                 env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(item for item in sys.path if item)},
             )
             assert self._process.stdin is not None and self._process.stdout is not None
-            self._process.stdin.write(LENGTH.pack(len(data)) + data)
+            self._process.stdin.write(data)
             self._process.stdin.flush()
             ready, _, _ = select.select([self._process.stdout], [], [], START_TIMEOUT_S)
             if not ready or self._process.stdout.readline() != b"ready\n":
@@ -140,21 +131,18 @@ class SeededPlanning:
             self._folder.cleanup()
             self._folder = None
 
-    def _connect(self) -> socket.socket:
+    def _connect(self) -> Connection:
         self.start()
-        connection = socket.socket(socket.AF_UNIX)
         try:
-            connection.connect(self._address)
+            return Client(self._address, "AF_UNIX")
         except OSError as error:
-            connection.close()
             raise PlanningError(ErrorCode.CRASH, f"the process for seeded plans cannot be reached: {error}") from error
-        return connection
 
-    def _wait(self, connection: socket.socket, request: PlanningRequest) -> None:
+    def _wait(self, connection: Connection, request: PlanningRequest) -> None:
         """Returns when an answer begins to arrive; raises PlanningError when the caller gives up before."""
         end = time.monotonic() + request.allowed_time_s + GRACE_S
         begun = time.monotonic()
-        while not select.select([connection], [], [], POLL_S)[0]:
+        while not connection.poll(POLL_S):
             if request.cancelled():
                 raise PlanningError(
                     ErrorCode.PREEMPTED, f"planning was cancelled after {time.monotonic() - begun:.2f} s"

@@ -13,21 +13,25 @@ import pickle
 import select
 import signal
 import socket
-import struct
 import sys
 import traceback
 from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 from pinocchio import SE3 as Transform
 
-from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
-from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_interface.planning_request import (
+    JointGoal,
+    PipelineSettings,
+    PlanningAnswer,
+    PlanningRequest,
+)
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_pipeline.plugins import make_adapters
@@ -35,8 +39,6 @@ from modular_framework_planning.planning_scene.planning_scene import CollisionOb
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
 from modular_framework_planning.robot_model.robot_model import RobotModel
-
-LENGTH = struct.Struct("<Q")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,36 +58,6 @@ class WorkerSetup:
     address: str
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """A plan that failed."""
-
-    code: int
-    reason: str
-    contacts: tuple[Contact, ...] = ()
-
-
-def send(connection: socket.socket, data: bytes) -> None:
-    """Writes one message."""
-    connection.sendall(LENGTH.pack(len(data)) + data)
-
-
-def receive(connection: socket.socket) -> bytes:
-    """Reads one message; raises EOFError when the other side is gone."""
-    (size,) = LENGTH.unpack(_exactly(connection, LENGTH.size))
-    return _exactly(connection, size)
-
-
-def _exactly(connection: socket.socket, size: int) -> bytes:
-    parts = bytearray()
-    while len(parts) < size:
-        part = connection.recv(min(1 << 20, size - len(parts)))
-        if not part:
-            raise EOFError("the other process closed the connection")
-        parts += part
-    return bytes(parts)
-
-
 def serve(setup: WorkerSetup, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
     """Forks a child for every connection until standard input ends."""
     listener = socket.socket(socket.AF_UNIX)
@@ -97,17 +69,17 @@ def serve(setup: WorkerSetup, model: RobotModel, pipelines: dict[str, PlanningPi
         ready, _, _ = select.select([listener, sys.stdin], [], [])
         if sys.stdin in ready:
             return
-        connection, _ = listener.accept()
+        accepted, _ = listener.accept()
         if os.fork() == 0:
             listener.close()
-            _child(connection, model, pipelines)
-        connection.close()
+            _child(Connection(accepted.detach()), model, pipelines)
+        accepted.close()
 
 
-def _child(connection: socket.socket, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
+def _child(connection: Connection, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
     """Plans one request and ends the process."""
     try:
-        name, settings, configurations, seed, request = from_bytes(receive(connection), model)
+        name, settings, configurations, seed, request = from_bytes(connection.recv_bytes(), model)
 
         def cancelled() -> bool:
             return bool(select.select([connection], [], [], 0.0)[0])  # readable means closed: the parent sends no more
@@ -115,23 +87,23 @@ def _child(connection: socket.socket, model: RobotModel, pipelines: dict[str, Pl
         pipeline = pipelines[name]
         pipeline.settings = settings
         pipeline.configurations.restore(configurations)
-        send(connection, to_bytes(_answer(pipeline, replace(request, cancelled=cancelled), seed)))
+        connection.send_bytes(to_bytes(_answer(pipeline, replace(request, cancelled=cancelled), seed)))
     except (EOFError, OSError):
         os._exit(1)  # the parent gave up
     os._exit(0)
 
 
-def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> Any:
+def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> PlanningAnswer | PlanningError:
     import ompl.util as ou
 
     try:
         ou.RNG.setSeed(1 + seed % (2**31 - 1))  # OMPL ignores the seed 0
         return pipeline.plan(replace(request, seed=seed), repeatable=True)
     except PlanningError as error:
-        return Failure(int(error.code), error.reason, error.contacts)
+        return error
     except Exception as error:  # noqa: BLE001 - the parent must learn whatever happened
         traceback.print_exc()
-        return Failure(int(ErrorCode.FAILURE), f"unexpected {type(error).__name__}: {error}")
+        return PlanningError(ErrorCode.FAILURE, f"unexpected {type(error).__name__}: {error}")
 
 
 def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
@@ -170,11 +142,8 @@ def main() -> None:
     """Reads the setup from standard input, builds the robot and serves."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    (size,) = LENGTH.unpack(sys.stdin.buffer.read(LENGTH.size))
-    data = sys.stdin.buffer.read(size)
-    search_path, rest = pickle.loads(data)  # noqa: S301 - from the parent process
-    sys.path[:] = search_path
-    setup: WorkerSetup = pickle.loads(rest)  # noqa: S301 - from the parent process
+    sys.path[:] = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent process
+    setup: WorkerSetup = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent process
     model = RobotModel(*setup.robot)
     kinematics = KinematicsPool(model)
     pipelines = {spec.name: spec.build(model, kinematics) for spec in setup.pipelines}
@@ -183,8 +152,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    from modular_framework_planning.reproducible.seeded_worker import (
-        main as run,  # what it sends must not be of module __main__
-    )
-
-    run()
+    main()

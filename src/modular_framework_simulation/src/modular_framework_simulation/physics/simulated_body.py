@@ -59,10 +59,8 @@ class SimulatedBody:
         static: bool,
         spec: Model | None,
     ) -> None:
-        self.number = number
-        self.name = name
-        self.static = static
-        self.spec = spec
+        self.number, self.name = number, name
+        self.static, self.spec = static, spec
         self._engine = engine
         self._root_in_model = root_in_model
         self._model_in_root = root_in_model.inverse()
