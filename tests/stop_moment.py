@@ -113,7 +113,7 @@ def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motio
             _until_it_moves(launch, speeds)
         time.sleep(moment_s)
         if LAST_WORD in launch.log() or not launch.alive():
-            _tell_failure(launch.log())
+            _print_failure(launch.log())
             return None
         pressed = time.monotonic()
         os.killpg(launch.process.pid, signal.SIGINT)
@@ -129,7 +129,7 @@ def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motio
         session.stop()
 
 
-def _tell_failure(log: str) -> None:
+def _print_failure(log: str) -> None:
     """Prints why a pick had ended before its moment, unless it had succeeded: that is worth a look, too."""
     if "SUCCEEDED" not in log:
         reasons = [line for line in log.splitlines() if line.startswith(("Task ", "  "))] or log.splitlines()[-20:]

@@ -26,7 +26,7 @@ AT_POSE_RAD = 0.03
 JOINTS = """
 import json, rospy
 from sensor_msgs.msg import JointState
-rospy.init_node("look", anonymous=True)
+rospy.init_node("joint_reader", anonymous=True)
 message = rospy.wait_for_message("joint_states", JointState, timeout=60)
 print(json.dumps(dict(zip(message.name, message.position))))
 """
@@ -70,10 +70,10 @@ def run_task(session: RosSession, script: Path) -> subprocess.CompletedProcess[s
 
 def assert_arm_at(session: RosSession, pose: str) -> None:
     """Looks where the simulated arm is."""
-    look = subprocess.run(
+    reader = subprocess.run(
         [sys.executable, "-c", JOINTS], env=session.env, capture_output=True, text=True, timeout=120, check=True
     )
-    joints = json.loads(look.stdout.splitlines()[-1])
+    joints = json.loads(reader.stdout.splitlines()[-1])
     away = {joint: abs(joints[joint] - value) for joint, value in NAMED[pose].items()}
     assert max(away.values()) < AT_POSE_RAD, away
 

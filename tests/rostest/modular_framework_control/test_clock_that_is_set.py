@@ -87,23 +87,23 @@ def move(client: actionlib.SimpleActionClient, position: float, duration_s: floa
 def test_a_goal_under_way_goes_on_without_a_jump_and_states_are_stamped_by_the_clock_that_was_set(
     clock: SetClock, arm: actionlib.SimpleActionClient, step_s: float
 ) -> None:
-    told: list[tuple[JointState, float]] = []
+    received: list[tuple[JointState, float]] = []
     here = rospy.wait_for_message("joint_states", JointState, 30.0).position[0]
-    subscriber = rospy.Subscriber("joint_states", JointState, lambda message: told.append((message, clock())))
+    subscriber = rospy.Subscriber("joint_states", JointState, lambda message: received.append((message, clock())))
     begun_s = time.monotonic()
     move(arm, here + 1.0, 2.0)
-    until(lambda: told and told[-1][0].position[0] > here + 0.1, "the motion under way")
+    until(lambda: received and received[-1][0].position[0] > here + 0.1, "the motion under way")
     clock.set_by_s += step_s
     assert arm.wait_for_result(rospy.Duration(30.0))
     assert time.monotonic() - begun_s >= 1.9, "it must not be carried to its end at once"
     assert arm.get_state() == GoalStatus.SUCCEEDED, arm.get_goal_status_text()
-    fastest = max(abs(message.velocity[0]) for message, _ in list(told))
+    fastest = max(abs(message.velocity[0]) for message, _ in list(received))
     assert fastest < 0.8, "the curve of this goal is never faster than 0.75 rad/s"
-    told.clear()
-    until(lambda: len(told) >= 5, "joint states at its end")
+    received.clear()
+    until(lambda: len(received) >= 5, "joint states at its end")
     subscriber.unregister()
-    assert told[-1][0].position[0] == pytest.approx(here + 1.0, abs=1e-6)
-    assert -0.01 < min(heard_s - message.header.stamp.to_sec() for message, heard_s in told) < 0.4
+    assert received[-1][0].position[0] == pytest.approx(here + 1.0, abs=1e-6)
+    assert -0.01 < min(heard_s - message.header.stamp.to_sec() for message, heard_s in received) < 0.4
 
 
 def test_a_header_stamp_counts_by_the_clock_as_it_is_now(clock: SetClock, arm: actionlib.SimpleActionClient) -> None:

@@ -124,7 +124,9 @@ def test_a_controller_sees_the_joints_of_all_hardware() -> None:
     assert [(entry.name, entry.state) for entry in listed] == [(name, "running")]
 
 
-def test_hardware_that_is_not_ready_unknown_or_late_is_told(ros_launch: Callable[..., Any], environment: str) -> None:
+def test_hardware_that_is_not_ready_unknown_or_late_is_reported(
+    ros_launch: Callable[..., Any], environment: str
+) -> None:
     session = ros_launch(FAILING.format(environment=environment))
     expected = (
         "waited 1 s in vain for True on topic /never_said of hardware '/slow_hw'",

@@ -121,17 +121,17 @@ def test_a_joint_turns_as_fast_as_its_topic_says() -> None:
     wait_until(lambda velocities: abs(velocities["wheel"] - 0.5) < 1e-6, "velocity")
 
 
-def test_a_controller_with_gains_tells_what_it_sees_and_does() -> None:
-    told: list[JointControllerState] = []
-    subscriber = rospy.Subscriber("push/state", JointControllerState, told.append)
+def test_a_controller_with_gains_reports_what_it_sees_and_does() -> None:
+    states: list[JointControllerState] = []
+    subscriber = rospy.Subscriber("push/state", JointControllerState, states.append)
     publisher("push/command", Float64).publish(0.3)
-    until(lambda: told and abs(told[-1].process_value - 0.3) < 1e-3, "the slide at its goal")
+    until(lambda: states and abs(states[-1].process_value - 0.3) < 1e-3, "the slide at its goal")
     subscriber.unregister()
-    for state in told:
+    for state in states:
         assert (state.p, state.i, state.d, state.i_clamp, state.antiwindup) == (5.0, 1.0, 0.0, 0.5, False)
         assert state.error == pytest.approx(state.set_point - state.process_value)
         assert abs(state.command - 5.0 * state.error) <= 0.5 + 1e-9
-    gaps = np.diff([state.header.stamp.to_sec() for state in told])
+    gaps = np.diff([state.header.stamp.to_sec() for state in states])
     assert gaps.min() > 0.04, "every tenth cycle of 8 ms, of which some are late"
 
 

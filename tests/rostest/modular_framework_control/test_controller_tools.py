@@ -115,7 +115,7 @@ def test_an_unspawner_keeps_controllers_stopped_and_starts_them_at_its_end(tool:
     assert states() == {}
 
 
-def test_a_spawner_starts_what_it_can_and_tells_what_it_cannot(tool: Callable[..., Any]) -> None:
+def test_a_spawner_starts_what_it_can_and_reports_what_it_cannot(tool: Callable[..., Any]) -> None:
     process = tool("spawner", "--timeout", "1", "--wait-for", "robot_awake", "states", "absent", "arm")
     awake = rospy.Publisher("robot_awake", Bool, queue_size=1, latch=True)
     for line in process.stdout:

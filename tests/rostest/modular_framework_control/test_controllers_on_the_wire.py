@@ -209,7 +209,7 @@ def test_the_command_topic_moves_and_the_empty_command_stops(robot: Any) -> None
     assert state.desired.positions[0] == pytest.approx(stopped, abs=1e-9)
 
 
-def test_query_state_tells_what_will_be_desired(arm: actionlib.SimpleActionClient) -> None:
+def test_query_state_returns_what_will_be_desired(arm: actionlib.SimpleActionClient) -> None:
     here = positions()
     arm.send_goal(goal((1.0, [here["shoulder"] + 0.4, here["elbow"]])))
     wait_until_shoulder(lambda position: position > here["shoulder"])

@@ -42,7 +42,7 @@ def test_each_serves_its_own_namespace_and_none_the_root(robots: Any) -> None:
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_each_tells_the_states_of_its_own_joints(robots: Any, robot: str) -> None:
+def test_each_publishes_the_states_of_its_own_joints(robots: Any, robot: str) -> None:
     assert rospy.wait_for_message(f"/{robot}/joint_states", JointState, 30.0).name == [f"{robot}_joint"]
     assert not any(topic == "/joint_states" for topic, _ in rospy.get_published_topics())
 
@@ -69,7 +69,7 @@ def test_each_moves_its_own_joint_within_its_own_limits(robots: Any, robot: str)
         assert time.monotonic() < deadline
 
 
-def test_readiness_and_figures_are_told_under_the_names_of_each(robots: Any) -> None:
+def test_readiness_and_figures_are_published_under_the_names_of_each(robots: Any) -> None:
     assert rospy.wait_for_message("/left/arm_ready", Bool, 30.0).data is True
     seen: set[str] = set()
     deadline = time.monotonic() + 30.0

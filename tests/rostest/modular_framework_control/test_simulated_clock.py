@@ -125,7 +125,7 @@ def test_after_the_clock_jumps_back_goals_end_and_new_ones_are_followed(
     subscriber.unregister()
 
 
-def test_while_the_clock_stands_still_the_node_ends_when_it_is_told_to(clock: ClockSource) -> None:
+def test_while_the_clock_stands_still_the_node_ends_on_request(clock: ClockSource) -> None:
     clock.running = False
     _, _, uri = rospy.get_master().lookupNode("/robot_hw")
     node = xmlrpc.client.ServerProxy(uri)

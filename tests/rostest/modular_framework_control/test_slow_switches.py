@@ -105,7 +105,7 @@ def test_when_the_time_is_up_the_rest_is_not_started_and_the_answer_is_no(
     assert states(robot) == {"arm": arm, "gripper": "aborted"}, "what was given up must not start later"
 
 
-def test_hardware_that_cannot_switch_is_told(robot: SteppedRobot, caplog: pytest.LogCaptureFixture) -> None:
+def test_hardware_that_cannot_switch_is_reported(robot: SteppedRobot, caplog: pytest.LogCaptureFixture) -> None:
     switch = Switch(robot, True, 5.0)
     robot.hardware["slow"].switching = SwitchState.ERROR
     assert not switch.ok()

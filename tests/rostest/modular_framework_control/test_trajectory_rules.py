@@ -404,7 +404,7 @@ def shortest_gap_s(messages: list[Any]) -> float:
     return float(np.diff([message.header.stamp.to_sec() for message in messages]).min())
 
 
-def test_states_and_feedback_come_at_their_rates_and_tell_how_far_the_trajectory_is(
+def test_states_and_feedback_come_at_their_rates_and_have_the_progress_of_the_trajectory(
     robot: SteppedRobot, arm: Arm, clients: dict[str, Arm]
 ) -> None:
     feedback: list[Any] = []
@@ -427,7 +427,7 @@ def test_states_and_feedback_come_at_their_rates_and_tell_how_far_the_trajectory
     assert arm.result(handle)[1] == OK
 
 
-def test_query_state_tells_what_is_desired_when(robot: SteppedRobot, arm: Arm) -> None:
+def test_query_state_returns_what_is_desired_when(robot: SteppedRobot, arm: Arm) -> None:
     query = rospy.ServiceProxy("arm/query_state", QueryTrajectoryState)
     arm.send((1.0, [0.4, 0.0, 0.0]))
     begun_s = robot.time_s
@@ -602,7 +602,9 @@ def test_at_half_speed_a_trajectory_takes_twice_as_long_and_a_pause_violates_not
     assert arm.result(handle)[:2] == ("SUCCEEDED", OK)
 
 
-def test_a_stopped_controller_ends_its_goal_refuses_others_and_tells_no_state(robot: SteppedRobot, arm: Arm) -> None:
+def test_a_stopped_controller_ends_its_goal_refuses_others_and_publishes_no_state(
+    robot: SteppedRobot, arm: Arm
+) -> None:
     switch = rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)
     handle = arm.send((1.0, [0.4, 0.0, 0.0]))
     robot.run(0.2)

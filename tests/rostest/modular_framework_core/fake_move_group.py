@@ -64,7 +64,7 @@ class FakeMoveGroup:
         execution_error: Error code of executing.
         slow: True lets a motion last until it is cancelled.
         moving: Set when a motion begins.
-        looks: How often the scene was asked for.
+        scene_requests: How often the scene was asked for.
         objects: Collision objects of the scene.
     """
 
@@ -72,7 +72,7 @@ class FakeMoveGroup:
         self.reach, self.blocked, self.blocked_for_current_fingers = 1.0, 1.0, 1.0
         self.plan_error, self.reason = 0, ""
         self.execution_error, self.slow, self.canceled = 0, False, False
-        self.moving, self.looks = threading.Event(), 0
+        self.moving, self.scene_requests = threading.Event(), 0
         self.positions = {"jx": 0.0, "jy": 0.0, "f": 0.02}
         self.objects: list[CollisionObject] = []
         self.requests: list = []
@@ -149,7 +149,7 @@ class FakeMoveGroup:
         )
 
     def _scene(self, request):
-        self.looks += 1
+        self.scene_requests += 1
         response = GetPlanningSceneResponse()
         response.scene.world.collision_objects = self.objects
         return response

@@ -110,7 +110,7 @@ def test_threads_do_not_mix_their_targets(commander) -> None:
     assert ends == {number: number / 10 for number in range(6)}
 
 
-def test_a_failed_plan_tells_the_reported_reason_and_falls_back_on_the_codes_name(commander) -> None:
+def test_a_failed_plan_has_the_reported_reason_and_falls_back_on_the_codes_name(commander) -> None:
     commander.fake.wait_for_listeners()
     commander.fake.plan_error, commander.fake.reason = MoveItErrorCodes.GOAL_IN_COLLISION, "'palm' touches 'wall'"
     result = commander.plan_to_joint_value_target({"jx": 0.0})
@@ -122,7 +122,7 @@ def test_a_failed_plan_tells_the_reported_reason_and_falls_back_on_the_codes_nam
     assert "none of them" in commander.plan_to_joint_value_target({"knee": 0.0}).reason
 
 
-def test_inverse_kinematics_tells_out_of_reach_from_collision(commander) -> None:
+def test_inverse_kinematics_distinguishes_out_of_reach_from_collision(commander) -> None:
     assert commander.get_ik(pose(0.3, 0.2)) == {"jx": 0.3, "jy": 0.2}
     commander.fake.blocked = 0.1
     result = commander.solve_ik(pose(0.3, 0.2))
@@ -133,7 +133,7 @@ def test_inverse_kinematics_tells_out_of_reach_from_collision(commander) -> None
     assert commander.get_ik(pose(0.3)) is None
 
 
-def test_executing_tells_the_truth(commander) -> None:
+def test_the_result_of_an_execution_is_true(commander) -> None:
     plan = commander.plan_to_joint_value_target({"jx": 0.0})
     assert commander.execute_plan(plan)
     commander.fake.execution_error = MoveItErrorCodes.CONTROL_FAILED

@@ -281,7 +281,7 @@ def test_messages_are_listed_removed_and_cleared(managers):
     assert lists("poses") == ([], 0)
 
 
-def test_every_change_is_told_in_order(managers):
+def test_every_change_is_published_in_order(managers):
     change = ManagerChange
     heard: list[tuple[int, str, int, int]] = []
     subscriber = rospy.Subscriber(

@@ -189,7 +189,7 @@ def test_the_success_outcome_exits_with_0_and_says_so_in_the_last_line(run) -> N
     assert "first state running: A after" in output
 
 
-def test_another_outcome_exits_with_1_and_tells_the_reason_of_the_state(run) -> None:
+def test_another_outcome_exits_with_1_and_reports_the_reason_of_the_state(run) -> None:
     code, output = run(BAD).end()
     assert code == 1, output
     assert output.strip().splitlines()[-1] == "Task 'tiny' ended with outcome 'gave_up': FAILED"
@@ -312,7 +312,7 @@ def test_what_a_running_state_says_it_does_is_published(run, status: Heard) -> N
     process.end()
 
 
-def test_the_record_of_a_run_tells_of_every_state(run, tmp_path: Path) -> None:
+def test_the_record_of_a_run_has_every_state(run, tmp_path: Path) -> None:
     run(BAD, f"_record_directory:={tmp_path / 'records'}").end()
     (file,) = (tmp_path / "records").glob("tiny_*.json")
     record = json.loads(file.read_text())

@@ -97,7 +97,7 @@ def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_
     assert arm.client.get_result().error_code == 0, arm.client.get_goal_status_text()
 
 
-def test_a_dashboard_that_does_not_answer_is_told(arm: Arm) -> None:
+def test_a_dashboard_that_does_not_answer_is_reported(arm: Arm) -> None:
     arm.command("cut")
     success, text = arm.call("dashboard/power_on")
     assert not success and f"{arm.address}:29999" in text

@@ -102,7 +102,7 @@ class FakeArm:
         place = START[ARM.index(joint)]
         until(lambda: abs(self.positions[joint] - place) > 1e-3, "the begin of the motion")
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publishes joint states at once."""
         self._publish(None)
 

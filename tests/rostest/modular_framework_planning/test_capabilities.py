@@ -44,7 +44,7 @@ def test_an_unknown_capability_is_a_warning_with_the_list_of_known_ones(session:
     assert "/move_group/capabilities" in warning and "move_group/MoveGroupMoveAction" in warning
 
 
-def test_the_tf_publisher_tells_where_objects_and_their_subframes_are() -> None:
+def test_the_tf_publisher_publishes_objects_and_their_subframes() -> None:
     heard: dict[str, Any] = {}
     rospy.Subscriber(
         "/tf", TFMessage, lambda message: heard.update({item.child_frame_id: item for item in message.transforms})

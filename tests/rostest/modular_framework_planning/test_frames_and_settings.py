@@ -58,7 +58,7 @@ def broadcaster(session: Any) -> Any:
     return tf2_ros.StaticTransformBroadcaster()
 
 
-def tell_frame(broadcaster: Any, name: str, place: tuple[float, float, float], parent: str = "world") -> None:
+def publish_frame(broadcaster: Any, name: str, place: tuple[float, float, float], parent: str = "world") -> None:
     """Puts a frame on tf and waits until the node knows it."""
     message = TransformStamped(Header(stamp=rospy.Time.now(), frame_id=parent), name, None)
     message.transform.translation, message.transform.rotation = Vector3(*place), UNTURNED
@@ -92,7 +92,7 @@ def test_goals_objects_and_ik_may_be_given_in_a_frame_that_only_tf_knows(broadca
         plan(request(pose_constraints(0, 0, 0, frame="camera"))).error_code.val
         == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
     )
-    tell_frame(broadcaster, "camera", (0.1, 0.4, 0.9))
+    publish_frame(broadcaster, "camera", (0.1, 0.4, 0.9))
     answer = plan(request(pose_constraints(0.0, 0.1, 0.05, frame="camera")))
     assert answer.error_code.val == OK and np.allclose(end_of(answer), (0.1, 0.5, 0.95), atol=1e-5)
     crate = box("crate", 0.3, 0.0, 1.0, (0.1, 0.1, 0.1))
@@ -107,14 +107,14 @@ def test_goals_objects_and_ik_may_be_given_in_a_frame_that_only_tf_knows(broadca
 
 
 def test_a_frame_that_moves_counts_where_it_is_now(broadcaster: Any) -> None:
-    tell_frame(broadcaster, "cart", (0.0, 0.4, 0.9))
-    tell_frame(broadcaster, "cart", (0.15, 0.4, 0.9))
+    publish_frame(broadcaster, "cart", (0.0, 0.4, 0.9))
+    publish_frame(broadcaster, "cart", (0.15, 0.4, 0.9))
     answer = plan(request(pose_constraints(0.0, 0.1, 0.05, frame="cart")))
     assert answer.error_code.val == OK and np.allclose(end_of(answer), (0.15, 0.5, 0.95), atol=1e-5)
 
 
 def test_an_object_comes_before_a_frame_of_tf_with_its_name(broadcaster: Any) -> None:
-    tell_frame(broadcaster, "part", (0.0, 0.3, 0.5))
+    publish_frame(broadcaster, "part", (0.0, 0.3, 0.5))
     part = box("part", 0.0, 0.0, 0.0, (0.04, 0.04, 0.04))
     part.header.frame_id = "part"
     assert add(part) and np.allclose(places_of_objects()["part"], (0.0, 0.3, 0.5)), "placed by tf"
@@ -125,10 +125,10 @@ def test_an_object_comes_before_a_frame_of_tf_with_its_name(broadcaster: Any) ->
     assert answer.error_code.val == OK and np.allclose(end_of(answer), (0.1, 0.5, 0.95), atol=1e-5)
 
 
-def test_the_monitored_scene_tells_frames_of_tf(broadcaster: Any) -> None:
+def test_the_monitored_scene_has_frames_of_tf(broadcaster: Any) -> None:
     with heard("monitored_planning_scene", PlanningScene) as messages:
         until(lambda: messages, "the scene")
-        tell_frame(broadcaster, "bench", (1.0, 0.0, 0.0))
+        publish_frame(broadcaster, "bench", (1.0, 0.0, 0.0))
         until(
             lambda: [
                 item
@@ -232,13 +232,13 @@ def test_the_monitored_scene_is_silent_while_it_is_switched_off_and_whole_afterw
     with heard("monitored_planning_scene", PlanningScene) as messages:
         until(lambda: messages, "the scene")
         with adjusted("planning_scene_monitor", publish_planning_scene=False):
-            time.sleep(0.5)  # what was on its way is told
+            time.sleep(0.5)  # until pending messages have arrived
             assert add(box("crate", 0.5, 0.4, 1.5, (0.1, 0.1, 0.1)))
             time.sleep(0.5)
             assert not [message for message in messages if message.world.collision_objects]
         until(lambda: [message for message in messages if message.world.collision_objects], "the crate")
-        whole = next(message for message in messages if message.world.collision_objects)
-        assert not whole.is_diff and [item.id for item in whole.world.collision_objects] == ["crate"]
+        scene = next(message for message in messages if message.world.collision_objects)
+        assert not scene.is_diff and [item.id for item in scene.world.collision_objects] == ["crate"]
 
 
 def test_a_parameter_of_the_wrong_type_is_named_and_its_default_used(session: Any) -> None:
@@ -265,7 +265,7 @@ def test_contacts_that_made_a_plan_fail_are_shown_until_the_next_plan() -> None:
         until(lambda: len(messages[-1].markers) == 1, "their end")
 
 
-def test_requests_are_told_where_the_launch_file_asks_for_it() -> None:
+def test_requests_are_published_where_the_launch_file_asks_for_it() -> None:
     assert plan(request(planner_id="RRTConnect")).error_code.val == OK
     with heard("motion_plan_request", MotionPlanRequest) as messages:  # latched
         until(lambda: messages, "the request")

@@ -186,7 +186,7 @@ def test_an_empty_sequence_is_done_at_once() -> None:
     assert answer.error_code.val == OK and not answer.planned_trajectories
 
 
-def test_rules_of_a_sequence_are_kept_and_told(home: Pose) -> None:
+def test_rules_of_a_sequence_are_kept_and_reported(home: Pose) -> None:
     first, second, third = to(home, 0.1, 0, 0), to(home, 0.1, 0, -0.1), to(home, 0, 0, -0.1)
     here = RobotState(joint_state=JointState(name=ARM, position=START))
     started = to(home, 0.1, 0, -0.1, start_state=here)

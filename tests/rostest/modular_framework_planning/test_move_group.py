@@ -109,11 +109,11 @@ def test_a_subscriber_gets_the_whole_scene_first_and_then_every_change(arm: Fake
         until(lambda: any(item.id == "crate" for m in heard for item in m.world.collision_objects), "the crate")
         arm.positions[ARM[5]] = 0.5
 
-        def tells_of_the_wrist() -> bool:
+        def has_the_wrist() -> bool:
             states = [m.robot_state.joint_state for m in heard]
             return any(dict(zip(s.name, s.position, strict=True)).get(ARM[5]) == 0.5 for s in states)
 
-        until(tells_of_the_wrist, "the wrist's new position")
+        until(has_the_wrist, "the wrist's new position")
         assert all(message.is_diff for message in heard[1:])
         assert all(m.robot_state.is_diff for m in heard[1:] if m.robot_state.joint_state.name), "held objects stay"
     finally:
@@ -247,7 +247,7 @@ def test_malformed_ik_and_fk_requests_get_a_code() -> None:
         assert call("compute_fk", GetPositionFK, header, links, RobotState()).error_code.val == code
 
 
-def test_malformed_scenes_are_refused_whole_and_leave_the_scene_alone() -> None:
+def test_malformed_scenes_are_refused_completely_and_leave_the_scene_alone() -> None:
     bad = [
         box("", 0, 0, 3, (1, 1, 1)),
         box("x", NAN, 0, 3, (1, 1, 1)),

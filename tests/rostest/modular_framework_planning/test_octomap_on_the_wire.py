@@ -27,7 +27,7 @@ from modular_framework_planning.octomap.encoding import read_file, read_stream
 from modular_framework_planning.octomap.voxel_map import VoxelMap
 
 CAMERA_AT = np.array([-2.5, 0.0, 1.2])
-LOOK_ALONG_X = Quaternion(-0.5, 0.5, -0.5, 0.5)  # optical frame: z forward along the world's x, x right along -y
+CAMERA_ALONG_X = Quaternion(-0.5, 0.5, -0.5, 0.5)  # optical frame: z forward along the world's x, x right along -y
 FOCUS, CENTER = 525.0, (319.5, 239.5)
 WALL_X = 1.0  # world x of a wall behind the robot
 pytestmark = pytest.mark.move_group(service="get_planning_scene")
@@ -45,7 +45,7 @@ class Camera:
         self._broadcaster = tf2_ros.StaticTransformBroadcaster()
         transform = TransformStamped(child_frame_id="camera_optical")
         transform.header.frame_id = "world"
-        transform.transform.translation, transform.transform.rotation = Vector3(*CAMERA_AT), LOOK_ALONG_X
+        transform.transform.translation, transform.transform.rotation = Vector3(*CAMERA_AT), CAMERA_ALONG_X
         self._broadcaster.sendTransform(transform)
         self._image = rospy.Publisher("/camera/depth/image_rect_raw", Image, queue_size=1)
         self._info = rospy.Publisher("/camera/depth/camera_info", CameraInfo, queue_size=1, latch=True)
@@ -247,7 +247,7 @@ def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_se
         axis = np.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x**2 + q.y**2)])
         poses[turn] = np.array([pose.position.x, pose.position.y, pose.position.z]) + 0.4 * axis
     message = cloud(np.repeat(ahead, 5, axis=0), "wrist_1_link")
-    arm.tell()
+    arm.publish()
     arm.positions["shoulder_pan_joint"] = START[0] + 0.7
     arm.settle()
     publisher.publish(message)
@@ -261,17 +261,17 @@ def test_points_in_a_moving_links_frame_lie_where_the_link_was_when_they_were_se
     arm.positions["shoulder_pan_joint"] = START[0]
 
 
-def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> None:
+def test_maps_are_saved_loaded_sent_and_published(camera: Camera, tmp_path: Path) -> None:
     clear()
-    told: list[PlanningScene] = []
-    rospy.Subscriber("/move_group/monitored_planning_scene", PlanningScene, told.append, queue_size=50)
+    scenes: list[PlanningScene] = []
+    rospy.Subscriber("/move_group/monitored_planning_scene", PlanningScene, scenes.append, queue_size=50)
     cubes: list[MarkerArray] = []
     rospy.Subscriber("/move_group/octomap_markers", MarkerArray, cubes.append, queue_size=5)
-    until(lambda: bool(told), "the whole scene came first")
+    until(lambda: bool(scenes), "the whole scene came first")
     depth = camera.depth([OBSTACLE])
     until_seen(
         lambda: camera.show(depth),
-        lambda: any(item.world.octomap.octomap.id == "OcTree" for item in told),
+        lambda: any(item.world.octomap.octomap.id == "OcTree" for item in scenes),
         "the map is published",
     )
     path = tmp_path / "room.bt"
@@ -279,9 +279,11 @@ def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> 
     before = octomap()
     assert before is not None and np.array_equal(read_file(path).occupied_keys, before.occupied_keys)
     until(lambda: bool(cubes) and len(cubes[-1].markers[-1].points) == len(before.occupied_keys), "the cubes are shown")
-    known = len(told)
+    known = len(scenes)
     clear()
-    until(lambda: any(item.world.octomap.octomap.id == "cleared" for item in told[known:]), "the clearing is told")
+    until(
+        lambda: any(item.world.octomap.octomap.id == "cleared" for item in scenes[known:]), "the clearing is published"
+    )
     assert call("/move_group/load_map", LoadMap, str(path)).success
     after = octomap()
     assert after is not None and np.array_equal(after.occupied_keys, before.occupied_keys)
@@ -300,7 +302,7 @@ def test_maps_are_saved_loaded_sent_and_told(camera: Camera, tmp_path: Path) -> 
     until(lambda: octomap() is not None, "an octomap that was sent is in the scene")
 
 
-def test_looks_that_cannot_be_placed_are_left_out(camera: Camera) -> None:
+def test_point_clouds_that_cannot_be_placed_are_left_out(camera: Camera) -> None:
     clear()
     publisher = rospy.Publisher("/scanner/points", PointCloud2, queue_size=5)
     until(lambda: publisher.get_num_connections() > 0, "move_group listens to the scanner")

@@ -74,8 +74,8 @@ def fingers(value: float) -> JointTrajectory:
     return JointTrajectory(joint_names=[GRIPPER], points=[JointTrajectoryPoint(positions=[value])])
 
 
-def along(x: float, y: float, z: float, wished: float = 0.1, least: float = 0.05, frame: str = "world") -> Any:
-    message = GripperTranslation(desired_distance=wished, min_distance=least)
+def along(x: float, y: float, z: float, desired: float = 0.1, least: float = 0.05, frame: str = "world") -> Any:
+    message = GripperTranslation(desired_distance=desired, min_distance=least)
     message.direction.header.frame_id = frame
     message.direction.vector.x, message.direction.vector.y, message.direction.vector.z = x, y, z
     return message
@@ -221,7 +221,7 @@ def test_the_best_grasp_that_can_be_done_is_taken_and_the_others_say_why_not(pic
     assert "retreat: only" in reasons["downwards"] and "of 0.100 m" in reasons["downwards"]
 
 
-def test_when_no_grasp_can_be_done_every_reason_is_told(pickup: Any) -> None:
+def test_when_no_grasp_can_be_done_every_reason_is_reported(pickup: Any) -> None:
     result, report = ask(pickup, pick_goal(grasp("far", 0.9, (0.1, 2.0, 0.9)), grasp("below", 0.8, (0.1, 0.5, 0.8))))
     assert result.error_code.val == CODES.PLANNING_FAILED and not result.trajectory_stages
     for text in (report["reason"], pickup.get_goal_status_text()):

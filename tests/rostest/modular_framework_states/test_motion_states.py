@@ -157,7 +157,7 @@ def test_a_trajectory_that_ends_elsewhere_has_failed(arm: Arm) -> None:
     assert "joint 'j' is 1.5000 away from its last point, allowed is 0.03" in state.reason
 
 
-def test_a_straight_line_is_moved_as_a_whole_or_not_at_all(arm: Arm) -> None:
+def test_a_straight_line_is_moved_completely_or_not_at_all(arm: Arm) -> None:
     assert run(CartesianMove(offset=(1.5, 0.0, 0.0)), arm_commander=arm) == "success"
     assert arm.position == 1.5
     state = CartesianMove(offset=(1.0, 0.0, 0.0))

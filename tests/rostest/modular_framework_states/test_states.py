@@ -82,14 +82,14 @@ class FakeArm:
 
 
 class Answer(SimpleNamespace):
-    """Fields with a truth value."""
+    """Fields with a boolean value."""
 
-    def __init__(self, truth: bool, **fields: object) -> None:
+    def __init__(self, value: bool, **fields: object) -> None:
         super().__init__(**fields)
-        self._truth = truth
+        self._value = value
 
     def __bool__(self) -> bool:
-        return self._truth
+        return self._value
 
 
 def trajectory(*positions: float) -> RobotTrajectory:

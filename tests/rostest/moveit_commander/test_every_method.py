@@ -282,10 +282,10 @@ def planning(arm: MoveGroupCommander) -> Iterator[None]:
 @pytest.mark.usefixtures("planning")
 def test_pipelines_and_planners_with_their_parameters(arm: MoveGroupCommander) -> None:
     ask = rospy.ServiceProxy("get_planner_params", GetPlannerParams)
-    tell = rospy.ServiceProxy("set_planner_params", SetPlannerParams)
+    set_planner_params = rospy.ServiceProxy("set_planner_params", SetPlannerParams)
     params = ask(pipeline_id="ompl", planner_config="RRTConnect", group="panda_arm").params
     params.keys, params.values = ["range"], ["0.5"]
-    tell(pipeline_id="ompl", planner_config="RRTConnect", group="panda_arm", params=params, replace=True)
+    set_planner_params(pipeline_id="ompl", planner_config="RRTConnect", group="panda_arm", params=params, replace=True)
     now = ask(pipeline_id="ompl", planner_config="RRTConnect", group="panda_arm").params
     assert float(dict(zip(now.keys, now.values, strict=True))["range"]) == 0.5
     for pipeline, planner in (

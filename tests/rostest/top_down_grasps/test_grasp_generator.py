@@ -110,7 +110,7 @@ def test_new_grasps_replace_the_ones_that_are_left(scene) -> None:
     assert get_grasp().grasp_message.grasp.pose.pose.position.x == pytest.approx(0.08, abs=1e-6)
 
 
-def test_on_demand_the_reason_tells_what_is_wrong(scene) -> None:
+def test_on_demand_the_reason_reports_what_is_wrong(scene) -> None:
     scene.reach = -1.0
     success, text = generate()
     assert not success
@@ -161,8 +161,10 @@ def test_an_object_that_comes_back_under_its_name_gives_grasps_again(scene) -> N
     rospy.set_param("top_down_grasp_generator/object_name", "")
     rospy.set_param("top_down_grasp_generator/name_prefix", "again_")
     scene.objects = [item for item in scene.objects if item.id != "box__link"]
-    looks, deadline = scene.looks, time.monotonic() + 60.0
-    while scene.looks < looks + 4:  # what was signalled of the box before has been heard, and that it is gone was seen
+    before, deadline = scene.scene_requests, time.monotonic() + 60.0
+    while (
+        scene.scene_requests < before + 4
+    ):  # what was signalled of the box before has been heard, and that it is gone was seen
         assert time.monotonic() < deadline, "the generator does not look at the scene any more"
         time.sleep(0.02)
     count = len(scene.watcher.signals)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one-line deployer makes the right calls, recorded by a stand-in for the docker command."""
+"""The one-line deployer makes the right calls, recorded by a fake docker command."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 DEPLOY = Path(__file__).parents[3] / "docker" / "deploy.sh"
 
 # Records each call on a line of $RECORD; fails for the calls listed in $FAILING (by their first words).
-STAND_IN = """#!/bin/bash
+FAKE_DOCKER = """#!/bin/bash
 printf '%s\\n' "$*" >> "$RECORD"
 while IFS= read -r prefix; do
   [ -n "$prefix" ] && [[ "$*" == "$prefix"* ]] && exit 1
@@ -24,7 +24,7 @@ exit 0
 
 @dataclass
 class Recorder:
-    """Runs the deployer with the stand-in first in PATH."""
+    """Runs the deployer with the fake docker first in PATH."""
 
     folder: Path
     failing: list[str] = field(default_factory=list)
@@ -48,9 +48,9 @@ class Recorder:
 
 @pytest.fixture
 def docker(tmp_path: Path) -> Recorder:
-    stand_in = tmp_path / "docker"
-    stand_in.write_text(STAND_IN)
-    stand_in.chmod(0o755)
+    fake_docker = tmp_path / "docker"
+    fake_docker.write_text(FAKE_DOCKER)
+    fake_docker.chmod(0o755)
     return Recorder(tmp_path, failing=["container inspect", "image inspect"])
 
 

@@ -226,7 +226,7 @@ def test_missing_gains_are_named(make_loop: Callable[..., Any]) -> None:
         ),
     ],
 )
-def test_a_command_controller_does_what_it_is_told_and_refuses_nonsense(
+def test_a_command_controller_follows_its_commands_and_refuses_nonsense(
     start: Callable[..., Any],
     family: str,
     controller: str,

@@ -115,7 +115,7 @@ def test_a_joint_measured_by_two_parts_is_that_of_the_later_with_a_warning(caplo
     assert "joint 'j' is in hardware 'one' and in 'other'; the latter is used" in caplog.text
 
 
-def test_a_switch_tells_each_part_of_its_own_joints_only() -> None:
+def test_a_switch_notifies_each_part_of_its_own_joints_only() -> None:
     one, other = Recorder(joints=["a", "b"]), Recorder(joints=["c"])
     robot_hw = two(one, other)
     both, mine = info("both", Position=["a", "c"]), info("mine", Position=["b"])

@@ -37,7 +37,7 @@ PARAMETERS: dict[str, Any] = {
 
 
 class Recorder(Controller):
-    """Notes what is done to it; raises where it is told to."""
+    """Notes what is done to it; raises where asked to."""
 
     interface_class = PositionJointInterface
 
@@ -145,11 +145,11 @@ def test_switch_rules(
     assert {name for name, state in loop.states().items() if state == "running"} == running
 
 
-@pytest.mark.parametrize(("told", "text"), [(OSError("line is dead"), "line is dead"), (("a", 1), "('a', 1)")])
-def test_a_fault_that_is_no_text_is_told_as_one(loop: Any, told: Any, text: str) -> None:
+@pytest.mark.parametrize(("fault", "text"), [(OSError("line is dead"), "line is dead"), (("a", 1), "('a', 1)")])
+def test_a_fault_that_is_no_text_is_reported_as_one(loop: Any, fault: Any, text: str) -> None:
     heard: list[str] = []
     loop.controllers["left"].on_hardware_fault = lambda time_s, reason: heard.append(reason)
-    loop.robot_hw.fault = lambda: told
+    loop.robot_hw.fault = lambda: fault
     loop.step(2)
     assert loop.manager.fault == text and heard == [text]
     assert loop.states()["left"] == "running"
@@ -421,7 +421,7 @@ def test_hardware_that_raises_in_a_switch_leaves_nothing_waiting(slow: Any) -> N
 
 
 @pytest.mark.parametrize("asked", ["check_for_conflict", "prepare_switch"])
-def test_hardware_that_raises_before_a_switch_is_told_and_nothing_is_switched(slow: Any, asked: str) -> None:
+def test_hardware_that_raises_before_a_switch_is_reported_and_nothing_is_switched(slow: Any, asked: str) -> None:
     def break_down(*arguments: Any) -> Any:
         raise OSError("line is dead")
 

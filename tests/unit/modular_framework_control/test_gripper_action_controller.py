@@ -213,8 +213,8 @@ def test_a_goal_that_comes_while_the_controller_is_stopped_is_rejected_and_not_l
 
 
 def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(loop: Any) -> None:
-    def fail(told: GripperGoalHandle) -> None:
-        if told.status is GoalStatus.CANCELED:
+    def fail(goal_handle: GripperGoalHandle) -> None:
+        if goal_handle.status is GoalStatus.CANCELED:
             raise ArithmeticError("nobody listens")
 
     active = GripperGoalHandle(fail)

@@ -107,7 +107,7 @@ def heard(loop: Any, name: str) -> list[str]:
     return [text for text in loop.controllers[name].heard if text]
 
 
-def test_a_fault_is_told_in_the_next_cycle_once_to_the_controllers_of_that_hardware(loop: Any) -> None:
+def test_a_fault_is_reported_in_the_next_cycle_once_to_the_controllers_of_that_hardware(loop: Any) -> None:
     loop.arm.text = "protective stop"
     updates = loop.controllers["arm_controller"].updates
     loop.step()
@@ -119,7 +119,7 @@ def test_a_fault_is_told_in_the_next_cycle_once_to_the_controllers_of_that_hardw
     assert set(loop.states().values()) == {"running"}
 
 
-def test_another_fault_and_the_recovery_are_told(loop: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_another_fault_and_the_recovery_are_reported(loop: Any, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
     for loop.arm.text in ("protective stop", "link lost", ""):
         loop.step(2)
@@ -132,7 +132,7 @@ def test_another_fault_and_the_recovery_are_told(loop: Any, caplog: pytest.LogCa
     assert caplog.text.count("the hardware follows again (it did not for: hardware 'arm': link lost)") == 1
 
 
-def test_a_controller_started_during_a_fault_is_told_before_its_first_update(loop: Any) -> None:
+def test_a_controller_started_during_a_fault_is_notified_before_its_first_update(loop: Any) -> None:
     loop.switch([], ["gripper_controller"])
     loop.gripper.text = "overload"
     listener = loop.controllers["gripper_controller"]
@@ -142,7 +142,7 @@ def test_a_controller_started_during_a_fault_is_told_before_its_first_update(loo
     assert listener.heard == ["hardware 'gripper': overload"]
 
 
-def test_a_controller_that_raises_when_told_is_stopped_and_the_others_go_on(loop: Any) -> None:
+def test_a_controller_that_raises_when_notified_is_stopped_and_the_others_go_on(loop: Any) -> None:
     loop.controllers["arm_controller"].raises = True
     loop.arm.text = "protective stop"
     loop.step(2)
@@ -162,7 +162,7 @@ def test_a_part_that_raises_is_a_fault_of_that_part_until_it_no_longer_does(loop
     assert heard(loop, "arm_controller")[-1] == "recovered"
 
 
-def test_hardware_that_cannot_even_tell_is_a_fault_of_all_of_it(loop: Any) -> None:
+def test_hardware_whose_faults_cannot_be_read_has_a_fault_of_all_joints(loop: Any) -> None:
     loop.gripper.raises = "fault"
     loop.step()
     for name in ("arm_controller", "gripper_controller"):
@@ -183,7 +183,7 @@ def test_the_fault_of_a_combination_is_that_of_its_parts(loop: Any) -> None:
     assert loop.robot_hw.fault() == "hardware 'arm': link lost; hardware 'gripper': too hot"
 
 
-def test_single_hardware_tells_of_all_its_commanded_joints() -> None:
+def test_single_hardware_reports_all_its_commanded_joints() -> None:
     robot_hw = Fragile()
     assert list(robot_hw.faults()) == []
     robot_hw.text = "off"

@@ -161,7 +161,7 @@ def test_a_velocity_ends_at_the_end_of_the_range_whatever_change_that_takes() ->
 
 
 @pytest.mark.parametrize("limiter_class", [VelocityJointSaturation, EffortJointSaturation])
-def test_what_is_given_in_place_of_a_command_is_nobodys_wish(limiter_class: Any) -> None:
+def test_a_limited_command_is_not_taken_for_a_command_of_a_controller(limiter_class: Any) -> None:
     joint = handle(1.1, command=0.0)
     limiter = limiter_class(joint, LIMITS, SOFT)
     limiter.enforce_limits(0.01)
@@ -265,7 +265,7 @@ def test_velocity_and_acceleration_beside_a_position_are_bounded_too() -> None:
     assert (joint.command, joint.command_velocity, joint.command_acceleration) == (0.2, -2.0, 0.0)
 
 
-def test_soft_limits_are_read_from_the_description_and_replaced_as_a_whole_by_parameters() -> None:
+def test_soft_limits_are_read_from_the_description_and_all_replaced_by_parameters() -> None:
     known = soft_limits_from_urdf(URDF)
     assert known["j"] == SOFT
     assert (known["wheel"].min_position, known["wheel"].max_position) == (-math.inf, math.inf)
@@ -400,7 +400,7 @@ def test_between_controller_and_hardware_the_limits_hold(
     assert 1.0 < fastest <= 2.0 + 5.0 * 0.01 + 1e-9
 
 
-def test_a_guard_forgets_the_joints_it_is_told_to_forget() -> None:
+def test_a_guard_resets_the_joints_it_is_asked_to_reset() -> None:
     robot_hw = MockRobotHW()
     root = MappingNodeHandle(
         {

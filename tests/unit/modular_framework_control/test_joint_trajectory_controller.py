@@ -119,7 +119,7 @@ def test_a_random_trajectory_of_ten_points_is_tracked_to_a_millionth(make_loop: 
     assert goal_handle.status is GoalStatus.ACTIVE
 
 
-def test_success_is_told_with_its_code(loop: Any) -> None:
+def test_success_is_reported_with_its_code(loop: Any) -> None:
     goal_handle = send(loop, (0.5, (0.3, 0.1, 0.1)))
     loop.run(0.45)
     assert goal_handle.status is GoalStatus.ACTIVE

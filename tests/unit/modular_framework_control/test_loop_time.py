@@ -70,7 +70,7 @@ def test_time_stands_still_while_the_loop_is_held_up(caplog: pytest.LogCaptureFi
     ]
 
 
-def test_a_step_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_step_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
     clocks = Clocks()
     loop_time = LoopTime(clocks.system, clocks.steady)
     clocks.set_by_s -= 3600.0
@@ -87,5 +87,5 @@ def test_stamps_of_messages_differ_from_the_time_of_the_loop_by_what_the_clock_i
     sent.header.stamp = genpy.Time(1500)
     assert trajectory_from_msg(sent, 400.0).stamp_s == 1100.0
     assert trajectory_from_msg(JointTrajectory(), 400.0).stamp_s == 0.0, "now stays now"
-    told = joint_state_to_msg(JointStateSnapshot(1100.0, ["a"], [0.0], [0.0], [0.0]), 400.0)
-    assert told.header.stamp == genpy.Time(1500)
+    message = joint_state_to_msg(JointStateSnapshot(1100.0, ["a"], [0.0], [0.0], [0.0]), 400.0)
+    assert message.header.stamp == genpy.Time(1500)

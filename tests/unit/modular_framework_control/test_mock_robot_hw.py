@@ -30,7 +30,7 @@ def test_it_starts_at_the_initial_positions() -> None:
     assert make_robot_hw().get(PositionJointInterface).get_handle("shoulder").position == 0.5
 
 
-def test_it_is_where_it_was_told_to_be_one_cycle_later() -> None:
+def test_it_is_at_its_command_one_cycle_later() -> None:
     robot_hw = make_robot_hw()
     handle = robot_hw.get(PositionJointInterface).get_handle("shoulder")
     robot_hw.read(0.0, 0.01)

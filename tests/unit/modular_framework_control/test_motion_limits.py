@@ -56,7 +56,7 @@ def refusal(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int =
         ((point(0.0, -1e9, 1e6), point(1.0, 1e9, -1e6)), "point 0: position of joint 'a' is -1e+09"),
     ],
 )
-def test_what_is_beyond_a_limit_is_told_with_point_joint_value_and_limit(
+def test_what_is_beyond_a_limit_is_reported_with_point_joint_value_and_limit(
     points: tuple[TrajectoryPoint, ...], words: str
 ) -> None:
     assert words in refusal(*points)
@@ -85,7 +85,7 @@ def test_points_that_are_left_out_do_not_count() -> None:
     assert refusal(*points) and refusal(*points, first=1) == ""
 
 
-def test_of_very_many_faults_only_a_few_are_told_and_the_rest_counted() -> None:
+def test_of_very_many_faults_only_a_few_are_reported_and_the_rest_counted() -> None:
     text = refusal(*(point(0.001 * i, (-1.0) ** i * 5.0) for i in range(5000)))
     assert "point 7: position" in text and "point 8: position" not in text
     assert text.endswith("and 9991 more")  # 5000 positions, and the velocities of 4999 ways

@@ -90,7 +90,7 @@ def test_a_module_that_was_changed_is_imported_anew_after_a_reload(
         ),
     ],
 )
-def test_a_class_that_cannot_be_loaded_is_told_with_its_origin(
+def test_a_class_that_cannot_be_loaded_is_reported_with_its_origin(
     lab: Callable[..., PluginIndex], cls: str, module: str, words: str
 ) -> None:
     index = lab(("lab_arms/LabArm", cls, ROBOT_HW_BASE), module=module)
@@ -99,7 +99,7 @@ def test_a_class_that_cannot_be_loaded_is_told_with_its_origin(
     assert "offered as lab_arms/LabArm by" in str(caught.value)
 
 
-def test_all_faults_of_a_description_are_told_at_once(tmp_path: Path) -> None:
+def test_all_faults_of_a_description_are_reported_at_once(tmp_path: Path) -> None:
     path = tmp_path / "p.xml"
     path.write_text(
         '<plugins><library path="m"><class name="a/A"/><class name="B" type="B" base_class_type="c"/>'
@@ -109,12 +109,14 @@ def test_all_faults_of_a_description_are_told_at_once(tmp_path: Path) -> None:
         read_description(path)
 
 
-def test_two_packages_with_one_name_are_told(lab: Callable[..., PluginIndex], tmp_path: Path) -> None:
+def test_two_packages_with_one_name_are_reported(lab: Callable[..., PluginIndex], tmp_path: Path) -> None:
     entry = ("lab_arms/LabArm", "LabArm", ROBOT_HW_BASE)
     assert "already offered by" in lab(entry, entry).faults[0]
 
 
-def test_a_broken_manifest_is_told_and_hides_no_other_package(lab: Callable[..., PluginIndex], tmp_path: Path) -> None:
+def test_a_broken_manifest_is_reported_and_hides_no_other_package(
+    lab: Callable[..., PluginIndex], tmp_path: Path
+) -> None:
     lab(("lab_arms/LabArm", "LabArm", ROBOT_HW_BASE))
     broken = tmp_path / "broken"
     broken.mkdir()

@@ -150,7 +150,7 @@ def test_all_faults_of_a_trajectory_are_listed() -> None:
         assert words in str(caught.value)
 
 
-def test_of_very_many_faults_the_first_are_told_and_the_others_counted() -> None:
+def test_of_very_many_faults_the_first_are_reported_and_the_others_counted() -> None:
     trajectory = JointTrajectory(("a",), tuple(TrajectoryPoint(i + 1.0, (math.nan,)) for i in range(1000)))
     with pytest.raises(InvalidTrajectoryError, match="point 7: .* and 992 more$"):
         check_points(trajectory)

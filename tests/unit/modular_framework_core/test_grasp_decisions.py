@@ -130,7 +130,7 @@ def test_torque_intensities_that_do_not_fit_the_hand_are_refused(
         torque_intensities(names, values, HAND)
 
 
-def test_torque_intensities_are_told_by_joint_and_none_are_none() -> None:
+def test_torque_intensities_are_reported_by_joint_and_none_are_none() -> None:
     assert torque_intensities(["f"], [-0.5], HAND) == {"f": -0.5}
     assert torque_intensities([], [], HAND) == {}
     assert torque_intensities(["f"], [], HAND) == {}

@@ -45,7 +45,7 @@ def test_a_text_comes_back_as_it_was(text):
     assert message_files.parsed(message_files.flow_text(String(text))) == {"data": text}
 
 
-def test_times_lists_bytes_and_truth_come_back(tmp_path):
+def test_times_lists_bytes_and_bools_come_back(tmp_path):
     state = JointState(name=["a", "b"], position=[0.1 + 0.2, 1e-300], velocity=(1e22, -0.0))
     state.header.stamp = rospy.Time(7, 999999999)
     back = read(written(tmp_path, state), state)

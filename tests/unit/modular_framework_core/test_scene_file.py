@@ -90,13 +90,13 @@ def test_objects_with_poses_meshes_and_subframes_are_read(tmp_path: Path) -> Non
         ("handle\n0 0 1\n0 0 0 1\n.", "handle\n0 0 1\n0 0 0 1\n* shelf one\n0\n.", "no object above"),
     ],
 )
-def test_a_fault_is_told_with_its_line(tmp_path: Path, old: str, new: str, hint: str) -> None:
+def test_a_fault_is_reported_with_its_line(tmp_path: Path, old: str, new: str, hint: str) -> None:
     assert old in NEWER
     with pytest.raises(SceneFileError, match=hint):
         read_scene_file(write(tmp_path, NEWER.replace(old, new, 1)))
 
 
-def test_a_missing_file_is_told_with_those_that_are_there(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported_with_those_that_are_there(tmp_path: Path) -> None:
     write(tmp_path, NEWER)
     with pytest.raises(SceneFileError, match="room.scene"):
         read_scene_file(tmp_path / "rom.scene")

@@ -277,7 +277,7 @@ def test_turns_of_the_shaft_are_counted_anew_after_a_loss_of_power(line: Dynamix
     assert gripper.state().reading.position == pytest.approx(1.9, abs=TOLERANCE)
 
 
-def test_an_overload_while_the_cable_is_out_is_told_before_the_motor_gets_its_torque_again(
+def test_an_overload_while_the_cable_is_out_is_reported_before_the_motor_gets_its_torque_again(
     line: DynamixelLine, gripper: EzGripper
 ) -> None:
     line.unplug()
@@ -297,7 +297,7 @@ def cut_supply(line: DynamixelLine) -> None:
         finger.servo.shut_down(ServoErrors.VOLTAGE)
 
 
-def test_fingers_told_to_stay_do_so_when_the_cable_was_out_until_the_motor_was_well(
+def test_fingers_commanded_to_hold_do_so_when_the_cable_was_out_until_the_motor_was_well(
     line: DynamixelLine, gripper: EzGripper
 ) -> None:
     line.place_object(OBJECT_POSITION)
@@ -321,7 +321,7 @@ def test_fingers_told_to_stay_do_so_when_the_cable_was_out_until_the_motor_was_w
     [cut_supply, lambda line: line.fingers[0].servo.shut_down(ServoErrors.OVERLOAD)],
     ids=["all out of voltage", "one of two overloaded"],
 )
-def test_no_finger_goes_on_once_a_fault_of_a_motor_is_told(
+def test_no_finger_goes_on_once_a_fault_of_a_motor_is_reported(
     make_gripper: MakeGripper, fault: Callable[[DynamixelLine], None]
 ) -> None:
     line, gripper = make_gripper(1, 2)

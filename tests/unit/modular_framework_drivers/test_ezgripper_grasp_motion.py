@@ -49,7 +49,7 @@ class FaultyGripper(ObedientGripper):
         return replace(self._state, stamp_s=time.monotonic(), motion=Motion.REACHED)
 
 
-def test_a_fault_that_came_and_went_between_two_looks_ends_the_motion_with_its_reason() -> None:
+def test_a_fault_that_came_and_went_between_two_reads_ends_the_motion_with_its_reason() -> None:
     wanted = WantedMotion({"knuckle": 1.0}, {}, 5.0, lambda: False)
     with pytest.raises(GraspCommandError, match="EzGripper: a blink"):
         EzGripperManipulator(FaultyGripper(), "knuckle").move(wanted)

@@ -107,7 +107,7 @@ def test_what_gives_way_is_followed_and_lost_at_the_goal() -> None:
     assert fingers.position == pytest.approx(1.5, abs=0.03)
 
 
-def test_fingers_told_to_stay_do_not_go_far_when_what_they_hold_is_taken() -> None:
+def test_fingers_commanded_to_hold_do_not_go_far_when_what_they_hold_is_taken() -> None:
     fingers = Fingers(0.2, 1.5)
     fingers.high = 0.9
     fingers.run(2.0)
@@ -148,19 +148,19 @@ def test_ticks_and_joint_positions_belong_together(position: float) -> None:
     assert joint_from_ticks(ticks_from_joint(position)) == pytest.approx(position, abs=1.94 / 2500)
 
 
-def times_of_standing(velocities: list[float]) -> list[float]:
+def standstill_times(velocities: list[float]) -> list[float]:
     """When fingers with these velocities, measured every PERIOD_S, are said to stand [s]."""
     standstill = StandstillDetector(0.05, 0.1)
     return [round(i * PERIOD_S, 6) for i, v in enumerate(velocities) if standstill.update(v, i * PERIOD_S)]
 
 
 def test_fingers_stand_when_they_have_been_slow_for_a_while() -> None:
-    assert times_of_standing([1.0, 0.5, *[0.01] * 8]) == [0.14, 0.16, 0.18]
+    assert standstill_times([1.0, 0.5, *[0.01] * 8]) == [0.14, 0.16, 0.18]
 
 
 @pytest.mark.parametrize("frequency", [0.7, 1.0, 3.0, 12.0])
 def test_fingers_that_swing_do_not_stand_where_they_turn_round(frequency: float) -> None:
-    assert not times_of_standing([math.cos(2.0 * math.pi * frequency * i * PERIOD_S) for i in range(500)])
+    assert not standstill_times([math.cos(2.0 * math.pi * frequency * i * PERIOD_S) for i in range(500)])
 
 
 def test_open_is_0_and_closed_1_94() -> None:
@@ -179,7 +179,7 @@ def test_the_parameters_of_the_guide_are_read() -> None:
     assert (settings.name, settings.poll_period_s, settings.rules.hold_torque) == ("EzGripper", 0.01, 200)
 
 
-def test_all_faults_of_the_parameters_are_told_at_once() -> None:
+def test_all_faults_of_the_parameters_are_reported_at_once() -> None:
     with pytest.raises(ParameterError) as error:
         read_gripper_settings(
             MappingNodeHandle({"baudrate": 12345, "servo_ids": [1, 1]}),

@@ -287,7 +287,7 @@ def test_fingers_of_which_nothing_is_known_have_no_velocity(steady: tuple[EzGrip
     assert handle.velocity == 0.0
 
 
-def test_a_fault_that_came_and_went_between_two_looks_is_told_once_and_ends_what_was_commanded(
+def test_a_fault_that_came_and_went_between_two_reads_is_reported_once_and_ends_what_was_commanded(
     steady: tuple[EzGripperRobotHW, SteadyGripper],
 ) -> None:
     robot_hw, gripper = steady

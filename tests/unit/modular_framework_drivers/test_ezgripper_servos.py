@@ -73,7 +73,7 @@ def test_a_motor_that_gets_its_torque_back_has_its_new_goal_before(bus: DirectBu
     ]
 
 
-def test_less_torque_is_told_before_the_goal_it_is_for(bus: DirectBus, servos: GripperServos) -> None:
+def test_less_torque_is_sent_before_the_goal_it_is_for(bus: DirectBus, servos: GripperServos) -> None:
     servos.drive(Drive(1.94, 100))
     assert bus.new_words() == [(mx64.TORQUE_LIMIT, 100), (mx64.GOAL_POSITION, CLOSED)]
 
@@ -95,7 +95,7 @@ def test_staying_leaves_a_motor_off_that_has_shut_down(bus: DirectBus, servos: G
 
 
 @pytest.mark.parametrize("lost", [mx64.GOAL_TORQUE, mx64.TORQUE_CONTROL_MODE])
-def test_a_servo_that_did_what_it_was_told_though_its_answer_was_lost_had_power(
+def test_a_servo_that_followed_a_command_whose_answer_was_lost_had_power(
     bus: DirectBus, servos: GripperServos, lost: Register
 ) -> None:
     servos.drive(Drive(None, 200))
@@ -121,7 +121,7 @@ def test_a_servo_of_which_only_the_place_is_known_is_not_taken_for_faithful(
     assert servos.read().position == pytest.approx(0.97)
 
 
-def test_a_shaft_where_the_fingers_cannot_be_is_a_fault_until_it_is_back_and_nothing_is_told_to_it(
+def test_a_shaft_where_the_fingers_cannot_be_is_a_fault_until_it_is_back_and_nothing_is_sent_to_it(
     bus: DirectBus, servos: GripperServos
 ) -> None:
     bus.servo.power_cycle()

@@ -170,7 +170,7 @@ def until(link: RtdeLink, condition: Callable[[], bool]) -> None:
         time.sleep(0.002)
 
 
-def test_a_process_that_cannot_be_started_is_told_and_tried_again(link: RtdeLink) -> None:
+def test_a_process_that_cannot_be_started_is_reported_and_tried_again(link: RtdeLink) -> None:
     FakeProcess.refused = OSError(24, "Too many open files")
     link.connect()
     link.request_program()
@@ -237,7 +237,7 @@ def test_a_control_loop_that_comes_late_does_not_take_the_link_for_lost(link: Rt
     ("role", "said"),
     [("state", "reads the arm's state has said nothing"), ("control", "commands the arm has taken no command")],
 )
-def test_a_process_that_hangs_is_told_and_replaced(link: RtdeLink, role: str, said: str) -> None:
+def test_a_process_that_hangs_is_reported_and_replaced(link: RtdeLink, role: str, said: str) -> None:
     link.connect()
     link.request_program()
     until(link, lambda: link.commanding)

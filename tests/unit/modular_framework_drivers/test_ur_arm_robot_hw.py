@@ -182,7 +182,7 @@ def test_the_wrench_at_the_tool_is_a_sensor(make_rig: Callable[..., Rig]) -> Non
         ("garbage", "link to the arm"),
     ],
 )
-def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, command: str, reason: str) -> None:
+def test_a_fault_is_reported_the_arm_holds_and_comes_back_on_resume(rig: Rig, command: str, reason: str) -> None:
     start = rig.positions
     commands = ([position + 0.001 * step for position in start] for step in itertools.count())
     for _ in range(40):
@@ -193,22 +193,22 @@ def test_a_fault_is_told_the_arm_holds_and_comes_back_on_resume(rig: Rig, comman
         assert time.monotonic() < deadline_s
         rig.cycle(next(commands))
     assert reason in rig.hw.fault()
-    told_at = rig.arm.positions()
+    position_at_report = rig.arm.positions()
     rig.run(0.2)
-    standing = rig.arm.positions()
-    assert standing == pytest.approx(told_at, abs=0.02)  # its way to rest, from 0.125 rad/s
+    rest_position = rig.arm.positions()
+    assert rest_position == pytest.approx(position_at_report, abs=0.02)  # its way to rest, from 0.125 rad/s
     rig.run(0.2)
-    assert rig.hw.fault() != "" and rig.arm.positions() == pytest.approx(standing, abs=1e-4)
+    assert rig.hw.fault() != "" and rig.arm.positions() == pytest.approx(rest_position, abs=1e-4)
     for remedy in ("restore", "unlock", "release_emergency_stop", "power_on"):
         rig.arm.command(remedy)
     rig.until(lambda: "takes no commands" in rig.hw.fault() and "call resume" in rig.hw.fault())
     rig.run(0.2)
     assert "resume" in rig.hw.fault(), "it must not go on by itself"
-    assert rig.arm.positions() == pytest.approx(standing, abs=1e-4)
-    assert [handle.command for handle in rig.handles] == pytest.approx(standing, abs=1e-4)
+    assert rig.arm.positions() == pytest.approx(rest_position, abs=1e-4)
+    assert [handle.command for handle in rig.handles] == pytest.approx(rest_position, abs=1e-4)
     assert rig.resume() == "" and rig.hw.fault() == ""
     rig.run(0.3)
-    assert rig.arm.positions() == pytest.approx(standing, abs=1e-4)
+    assert rig.arm.positions() == pytest.approx(rest_position, abs=1e-4)
     rig.cycle(start)
     rig.until(lambda: rig.positions == pytest.approx(start, abs=1e-3))
 

@@ -30,7 +30,7 @@ def checked(max_jump: float = 0.5, soft: SoftJointLimits | None = None) -> Comma
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(WILD, WILD, st.sampled_from(PERIODS_S)), max_size=60))
-def test_whatever_is_commanded_the_arm_is_told_what_it_can_do(steps: list[tuple[float, float, float]]) -> None:
+def test_whatever_is_commanded_the_arm_is_sent_what_it_can_do(steps: list[tuple[float, float, float]]) -> None:
     check = checked()
     velocities = [0.0, 0.0]
     longer_cycles = 3.0 * (PERIODS_S[-1] - PERIODS_S[1]) / 2.0  # what cycles that become shorter take from braking

@@ -109,9 +109,7 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
     assert commanded == sorted(commanded)
 
 
-def test_the_log_tells_of_every_cycle_when_asked_to_and_else_of_streamed_positions(
-    arm: EmulatedArm, tmp_path: Path
-) -> None:
+def test_the_log_has_every_cycle_when_asked_to_and_else_streamed_positions(arm: EmulatedArm, tmp_path: Path) -> None:
     def lines(**arguments: object) -> list[str]:
         arm.command("log", path=tmp_path / "log.csv", **arguments)
         time.sleep(0.3)

@@ -28,7 +28,7 @@ def test_it_speaks_version_two_only(server: RtdeServer) -> None:
     assert session.receive(package("V", b"\x00\x03")) == package("V", b"\x00")
 
 
-def test_it_tells_the_version_of_its_software(server: RtdeServer) -> None:
+def test_it_reports_the_version_of_its_software(server: RtdeServer) -> None:
     assert RtdeSession(server).receive(package("v")) == package("v", struct.pack(">4I", 5, 12, 4, 1101661))
 
 

@@ -195,9 +195,9 @@ def violations(
 def _goal_faults(model: RobotModel, problem: Problem, end: np.ndarray) -> list[str]:
     if isinstance(problem.goal, np.ndarray):
         return [] if np.allclose(end, problem.goal, atol=1e-6) else ["the motion does not end at the goal"]
-    whole = problem.request.scene.positions.copy()
-    whole[model.group(GROUP).indices] = end
-    error = pin.log6(model.link_transforms(whole)[TIP].actInv(problem.goal)).vector
+    full_positions = problem.request.scene.positions.copy()
+    full_positions[model.group(GROUP).indices] = end
+    error = pin.log6(model.link_transforms(full_positions)[TIP].actInv(problem.goal)).vector
     return [] if np.abs(error).max() < 1e-3 else [f"the motion ends {np.abs(error).max():.4f} from the goal"]
 
 

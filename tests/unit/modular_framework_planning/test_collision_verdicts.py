@@ -46,6 +46,6 @@ def test_states_on_a_path_called_free_touch_nothing(model: RobotModel, second: I
         count = int(np.ceil(np.abs(end - start).max() / 0.02))
         checked += count
         for number in range(1, count + 1):
-            whole = motion.full_positions(start + number / count * (end - start))
-            assert not second.collisions(dict(zip(model.joint_names, whole.tolist(), strict=True)))
+            full_positions = motion.full_positions(start + number / count * (end - start))
+            assert not second.collisions(dict(zip(model.joint_names, full_positions.tolist(), strict=True)))
     assert checked > 200

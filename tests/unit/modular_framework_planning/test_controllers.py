@@ -122,7 +122,7 @@ def test_entries_that_cannot_be_used_are_left_out_and_named() -> None:
     ]
 
 
-def test_fake_controllers_interpolate_unless_told_otherwise() -> None:
+def test_fake_controllers_interpolate_unless_configured_otherwise() -> None:
     specs, faults = parse_controllers(
         [{"name": "a", "joints": ["x"]}, {"name": "b", "joints": ["x"], "type": "last point", "rate": 50}],
         FAKE_KINDS,

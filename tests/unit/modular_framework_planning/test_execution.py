@@ -143,8 +143,8 @@ def test_a_motion_that_names_no_joint_is_refused() -> None:
 
 def test_a_motion_is_cut_by_the_joints_of_its_controllers_and_mimicking_joints_are_nobodys() -> None:
     controllers = RecordedControllers(ARM, GRIPPER)
-    whole = motion("finger mirror elbow", (0.0, [0.3, 0.0, 0.3]), (2.0, [0.1, 0.0, 0.7]))
-    executor(controllers).execute(whole, threading.Event())
+    all_joints = motion("finger mirror elbow", (0.0, [0.3, 0.0, 0.3]), (2.0, [0.1, 0.0, 0.7]))
+    executor(controllers).execute(all_joints, threading.Event())
     sent = {part.controller.name: part.trajectory for part in controllers.sent}
     assert {name: part.joint_names for name, part in sent.items()} == {"arm": ["elbow"], "gripper": ["finger"]}
     assert sent["arm"].points[-1].positions == [0.7]

@@ -85,7 +85,7 @@ def pose_constraints(model: RobotModel, size: float, tolerances: tuple[float, fl
     )
 
 
-def whole(model: RobotModel, values: np.ndarray) -> np.ndarray:
+def full_positions(model: RobotModel, values: np.ndarray) -> np.ndarray:
     positions = model.default_positions()
     positions[model.group(GROUP).indices] = values
     return positions
@@ -107,7 +107,7 @@ def test_a_tolerant_pose_is_met_where_the_exact_one_collides(
         resolve(PoseGoal(TIP, goal.target), world=blocked)
     assert caught.value.code is ErrorCode.GOAL_IN_COLLISION
     for values in resolve(goal, world=blocked):
-        assert loose.satisfied(whole(model, values))
+        assert loose.satisfied(full_positions(model, values))
 
 
 def test_a_free_rotation_makes_a_goal_nearer_than_the_exact_pose(
@@ -128,7 +128,7 @@ def test_any_mix_of_constraints_is_a_goal(model: RobotModel, resolve: Resolve) -
     )
     found = resolve(ConstraintGoal(mixed))
     assert len(found) > 1
-    assert all(mixed.satisfied(whole(model, values)) for values in found)
+    assert all(mixed.satisfied(full_positions(model, values)) for values in found)
 
 
 def test_goal_states_are_chosen_among_those_that_keep_the_path_constraints(model: RobotModel, resolve: Resolve) -> None:
@@ -143,7 +143,7 @@ def test_goal_states_are_chosen_among_those_that_keep_the_path_constraints(model
     assert caught.value.code is ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS
 
 
-def test_reasons_tell_an_empty_region_from_one_that_only_collides(
+def test_reasons_distinguish_an_empty_region_from_one_that_only_collides(
     model: RobotModel, scene: PlanningScene, resolve: Resolve
 ) -> None:
     far = KinematicConstraints(
@@ -177,7 +177,7 @@ def test_joint_goals_are_exact_where_they_can_be(resolve: Resolve, scene: Planni
     goal = JointGoal({"shoulder_pan_joint": 0.4}, {"shoulder_pan_joint": 0.5}, {"shoulder_pan_joint": 0.5})
     found = resolve(goal)
     assert found.shape == (1, 6) and found[0, 0] == 0.4
-    at = model.link_transforms(whole(model, found[0]))["wrist_2_link"].translation
+    at = model.link_transforms(full_positions(model, found[0]))["wrist_2_link"].translation
     moved = resolve(goal, world=with_block(scene, at, 0.1))
     assert 1e-3 < abs(moved[0, 0] - 0.4) <= 0.5
 

@@ -87,11 +87,11 @@ def test_translation_and_rotation_arrive_together() -> None:
 def test_a_line_is_straight_and_turns_about_one_axis() -> None:
     start, end = at(0.1, -0.2, 0.3, (0.3, 0.2, 0.1)), at(0.5, 0.3, 0.2, (-1.0, 0.4, 2.0))
     path = LinePath.between(start, end)
-    whole = pin.log3(start.rotation.T @ end.rotation)
+    rotation = pin.log3(start.rotation.T @ end.rotation)
     for share in np.linspace(0.0, 1.0, 11):
         pose = path.pose(float(share))
         assert np.allclose(pose.translation, (1 - share) * start.translation + share * end.translation, atol=1e-12)
-        assert np.allclose(pin.log3(start.rotation.T @ pose.rotation), share * whole, atol=1e-9)
+        assert np.allclose(pin.log3(start.rotation.T @ pose.rotation), share * rotation, atol=1e-9)
 
 
 def test_a_centre_gives_the_shorter_arc() -> None:

@@ -243,7 +243,7 @@ def test_a_position_out_of_reach_has_no_solution(model: RobotModel, solver: Inve
     assert not solver.position_solutions(TIP, np.zeros(3), np.array([0.0, 0.0, 4.0]), seed, 0.05)
 
 
-def test_kinematics_yaml_is_read_and_its_faults_are_told(model: RobotModel) -> None:
+def test_kinematics_yaml_is_read_and_its_faults_are_reported(model: RobotModel) -> None:
     read = settings_from(
         {
             "arm": {

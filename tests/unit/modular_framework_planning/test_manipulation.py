@@ -67,10 +67,10 @@ def test_the_palm_belongs_to_the_hand_and_the_flange_does_not(model: RobotModel)
     assert "ee_link" not in links and "wrist_3_link" not in links
 
 
-def moving(x: float, y: float, z: float, frame: str, wished: float = 0.1, least: float = 0.05) -> Any:
+def moving(x: float, y: float, z: float, frame: str, desired: float = 0.1, least: float = 0.05) -> Any:
     vector = SimpleNamespace(x=x, y=y, z=z)
     direction = SimpleNamespace(header=SimpleNamespace(frame_id=frame), vector=vector)
-    return SimpleNamespace(direction=direction, desired_distance=wished, min_distance=least)
+    return SimpleNamespace(direction=direction, desired_distance=desired, min_distance=least)
 
 
 def test_a_direction_turns_with_the_hand_only_in_a_frame_fixed_to_it(scene: PlanningScene) -> None:

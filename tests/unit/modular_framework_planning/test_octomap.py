@@ -38,12 +38,12 @@ def keys_of_cells(cells: np.ndarray) -> np.ndarray:
 
 def looked() -> VoxelMap:
     voxels = empty_map(REFERENCE["resolution"])
-    for look in REFERENCE["looks"]:
-        voxels = voxels.with_point_cloud(np.array(look["origin"]), np.array(look["points"]), NOTHING, NOTHING)
+    for cloud in REFERENCE["looks"]:
+        voxels = voxels.with_point_cloud(np.array(cloud["origin"]), np.array(cloud["points"]), NOTHING, NOTHING)
     return voxels
 
 
-def test_looks_give_the_voxels_and_odds_that_octomap_has() -> None:
+def test_point_clouds_give_the_voxels_and_odds_that_octomap_has() -> None:
     voxels, leaves = looked(), np.array(REFERENCE["leaves"])
     cells = np.column_stack([cells_of_keys(voxels.keys), voxels.values])
     order, expected = np.lexsort(cells.T[:3]), np.lexsort(leaves.T[:3])
@@ -78,8 +78,8 @@ def test_a_file_of_octomap_is_read_and_a_written_one_says_the_same(tmp_path: Pat
     ),
     st.booleans(),
 )
-def test_a_map_survives_its_streams(cells: dict[tuple[int, int, int], float], whole_block: bool) -> None:
-    if whole_block:  # 64 equal voxels that are pruned into one leaf
+def test_a_map_survives_its_streams(cells: dict[tuple[int, int, int], float], full_block: bool) -> None:
+    if full_block:  # 64 equal voxels that are pruned into one leaf
         cells |= {(32768 + x, 32768 + y, 32768 + z): 3.5 for x in range(4) for y in range(4) for z in range(4)}
     keys = keys_of_cells(np.array(list(cells), dtype=np.int64))
     order = np.argsort(keys)
@@ -133,14 +133,14 @@ def test_files_that_are_no_maps_are_refused(tmp_path: Path, content: bytes, text
         read_file(tmp_path)
 
 
-def test_a_ray_clears_what_it_goes_through_and_repeated_looks_win() -> None:
+def test_a_ray_clears_what_it_goes_through_and_repeated_clouds_win() -> None:
     origin, wall, behind = np.zeros(3) + 0.01, np.array([[1.0, 0.02, 0.03]]), np.array([[2.0, 0.04, 0.06]])
     voxels = empty_map(0.1).with_point_cloud(origin, wall, NOTHING, NOTHING)
     assert value_at(voxels, wall[0]) > 0.0 > value_at(voxels, wall[0] / 2)
     assert value_at(voxels, behind[0]) is None
     for _ in range(3):
         voxels = voxels.with_point_cloud(origin, behind, NOTHING, NOTHING)
-    assert value_at(voxels, wall[0]) < 0.0, "three looks through it against one that saw it"
+    assert value_at(voxels, wall[0]) < 0.0, "three clouds through it against one that hit it"
     assert value_at(voxels.with_point_cloud(origin, NOTHING, behind, NOTHING), behind[0]) < 0.0, "robot: free at once"
     assert value_at(voxels.with_point_cloud(origin, NOTHING, NOTHING, 2 * behind), behind[0]) == pytest.approx(
         value_at(voxels, behind[0]) - 0.405, abs=1e-3

@@ -56,7 +56,7 @@ class Neighbourhood:
         self._rest = scene.model.default_positions()
         self.ours = ExactCollisionChecker(scene, self.indices)
 
-    def whole(self, values: np.ndarray) -> np.ndarray:
+    def full_positions(self, values: np.ndarray) -> np.ndarray:
         """Positions of the whole robot."""
         positions = self._rest.copy()
         positions[self.indices] = values
@@ -68,7 +68,7 @@ class Neighbourhood:
             (
                 number - 1
                 for number in range(1, LONGEST_WAY + 1)
-                if not self.ours.is_free(self.whole(start + number * way))
+                if not self.ours.is_free(self.full_positions(start + number * way))
             ),
             LONGEST_WAY,
         )
@@ -82,7 +82,7 @@ class Neighbourhood:
         while True:
             start = rng.uniform(-np.pi, np.pi, count) + 2.0 * np.pi * rng.integers(-1, 2, count)
             moves = np.arange(count) == rng.integers(count) if rng.random() < 0.5 else rng.random(count) < 0.6
-            if not moves.any() or not self.ours.is_free(self.whole(start)):
+            if not moves.any() or not self.ours.is_free(self.full_positions(start)):
                 continue
             way = rng.normal(size=count) * moves
             way *= 0.999 * STEP / np.abs(way).max()
@@ -96,7 +96,7 @@ class Neighbourhood:
         behind = self.free_steps(start, -way)
         turn = start + (free + rng.integers(0, 3)) * way
         ends = [start - rng.random() * behind * way for _ in range(3)]
-        return np.array([self.whole(row) for row in (ends[0], ends[1], turn, turn, ends[2])])
+        return np.array([self.full_positions(row) for row in (ends[0], ends[1], turn, turn, ends[2])])
 
     def path_up_to_contact(self, rng: np.random.Generator) -> np.ndarray:
         """A free path that ends within FINE_STEP of contact; vertices (2, joints)."""
@@ -105,9 +105,9 @@ class Neighbourhood:
         while (touching - apart) * STEP > FINE_STEP:
             middle = 0.5 * (apart + touching)
             apart, touching = (
-                (middle, touching) if self.ours.is_free(self.whole(start + middle * way)) else (apart, middle)
+                (middle, touching) if self.ours.is_free(self.full_positions(start + middle * way)) else (apart, middle)
             )
-        return np.array([self.whole(start + free * way), self.whole(start + apart * way)])
+        return np.array([self.full_positions(start + free * way), self.full_positions(start + apart * way)])
 
     def touching_samples(self, path: np.ndarray) -> int:
         """Compares the verdicts on a path with those on its samples; returns how many of these touch."""
@@ -203,7 +203,7 @@ def test_the_end_of_an_edge_is_looked_at_and_its_start_is_not(bars: Neighbourhoo
     rng = np.random.default_rng(43)
     for _ in range(20):
         start, way, number = bars.way_into_contact(rng)
-        free, touching = bars.whole(start), bars.whole(start + (number + 1) * way)
+        free, touching = bars.full_positions(start), bars.full_positions(start + (number + 1) * way)
         for edge, first, is_free in (
             ((free, touching), 1, False),
             ((touching, free), 1, True),

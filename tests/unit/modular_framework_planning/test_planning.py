@@ -213,7 +213,7 @@ def test_failures_have_a_code_and_name_the_culprit(model: RobotModel, pipeline: 
         assert re.search(text, error.reason), error.reason
 
 
-def test_time_that_runs_out_is_told(model: RobotModel, pipeline: PlanningPipeline) -> None:
+def test_time_that_runs_out_is_reported(model: RobotModel, pipeline: PlanningPipeline) -> None:
     rng = np.random.default_rng(21)
     scene, _ = random_world(model, rng)
     indices = model.group(GROUP).indices

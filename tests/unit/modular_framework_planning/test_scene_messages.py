@@ -326,8 +326,8 @@ def test_each_component_is_answered_alone(scene: Scene) -> None:
             overlap = {part, other} == {parts.WORLD_OBJECT_NAMES, parts.WORLD_OBJECT_GEOMETRY}
             if not overlap:
                 assert bool(is_filled(message)) == (part == other), (part, other)
-    whole = scene_message(scene, 0)
-    assert all(is_filled(whole) for part, is_filled in filled.items() if part != parts.WORLD_OBJECT_NAMES)
+    complete = scene_message(scene, 0)
+    assert all(is_filled(complete) for part, is_filled in filled.items() if part != parts.WORLD_OBJECT_NAMES)
 
 
 def summary(scene: Scene) -> dict[str, object]:
@@ -381,8 +381,8 @@ def random_change(scene: Scene, dice: random.Random) -> Scene:
     matrix = scene.acm.with_entry(name, link, dice.random() < 0.5)
     pan = scene.model.merge(scene.positions, {"shoulder_pan_joint": dice.uniform(-3, 3)})
     diff.link_padding = [LinkPadding(link, dice.uniform(0, 0.1))]
-    whole = PlanningScene(is_diff=False, name="anew")
-    whole.world.collision_objects = [everything(name)]
+    full_scene = PlanningScene(is_diff=False, name="anew")
+    full_scene.world.collision_objects = [everything(name)]
     choices: list[Callable[[], Scene]] = [
         lambda: apply_collision_object(scene, body(name, "add", at, dice.randint(1, 3), dice.choice(["", link]))),
         lambda: apply_collision_object(scene, body(name, "append", at, 1)),
@@ -397,7 +397,7 @@ def random_change(scene: Scene, dice: random.Random) -> Scene:
         lambda: apply_scene(scene, diff),
         lambda: apply_scene(scene, PlanningScene(is_diff=True, object_colors=[color], fixed_frame_transforms=[frame])),
         lambda: scene.with_octomap(Octree(voxels(dice.randint(0, 9))) if dice.random() < 0.6 else None),
-        lambda: apply_scene(scene, whole) if dice.random() < 0.3 else scene,
+        lambda: apply_scene(scene, full_scene) if dice.random() < 0.3 else scene,
     ]
     try:
         return dice.choice(choices)()
@@ -409,13 +409,13 @@ def random_change(scene: Scene, dice: random.Random) -> Scene:
 def test_a_client_that_applies_every_diff_has_the_same_scene(scene: Scene, seed: int) -> None:
     dice = random.Random(seed)
     client = apply_scene(empty_scene(scene.model), scene_message(scene, 0))
-    told = scene
+    published = scene
     for step in range(40):
         scene = random_change(scene, dice)
         if dice.random() < 0.3:
-            continue  # several changes are told as one
-        message = difference_message(told, scene)
-        told = scene
+            continue  # several changes are published as one
+        message = difference_message(published, scene)
+        published = scene
         if message is not None:
             client = apply_scene(client, message)
         assert summary(client) == summary(scene), f"step {step}"

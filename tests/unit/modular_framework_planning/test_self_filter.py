@@ -251,7 +251,7 @@ def test_joints_are_remembered_and_interpolated() -> None:
     assert history.at(1.0) == 7.0, "a clock that was set back begins anew"
 
 
-def test_a_look_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) -> None:
+def test_a_filter_keeps_no_geometry_of_objects_that_are_gone(model: RobotModel) -> None:
     """Needs no master: whatever is asked of the scene monitor is answered here."""
     scene, caches = empty_scene(model), []
 

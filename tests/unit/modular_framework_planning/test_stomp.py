@@ -74,7 +74,7 @@ def test_path_constraints_are_kept(model: RobotModel) -> None:
     assert np.abs(answer.trajectory.curve(0.01)[:, column] + 1.57).max() <= 0.1 + 1e-6
 
 
-def test_failure_tells_how_many_timesteps_collide_and_with_what(model: RobotModel) -> None:
+def test_failure_reports_how_many_timesteps_collide_and_with_what(model: RobotModel) -> None:
     with pytest.raises(PlanningError) as caught:
         planned(model, 0.7, {"num_iterations": 1, "num_attempts": 1, "stddev": 0.001})
     assert caught.value.code == ErrorCode.PLANNING_FAILED

@@ -142,7 +142,7 @@ def test_dense_curve_has_no_gap_wider_than_asked() -> None:
     assert np.array_equal(curve[0], motion.positions[0]) and np.array_equal(curve[-1], motion.positions[-1])
 
 
-def test_chords_are_told_where_the_curve_leaves_them_and_nowhere_else() -> None:
+def test_chords_are_found_where_the_curve_leaves_them_and_nowhere_else() -> None:
     straight = parameterize(JOINTS[:2], np.array([[0.0, 0.0], [1.0, 0.5]]), np.zeros(0), VELOCITY[:2], ACCELERATION[:2])
     assert straight.chords() == []
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
@@ -172,7 +172,7 @@ def checked_problem(colliding_state: Callable[[np.ndarray, float], np.ndarray | 
     )
 
 
-def test_the_validator_looks_at_every_motion_once() -> None:
+def test_the_validator_checks_every_motion_once() -> None:
     looked: list[int] = []
     problem = checked_problem(lambda line, step: looked.append(len(line)))
     motion = parameterize(("a",), np.array([[0.0], [1.0]]), np.zeros(0), VELOCITY[:1], ACCELERATION[:1])

@@ -197,8 +197,8 @@ def speeds_by_difference(model: RobotModel, motion: Trajectory, link: str) -> np
     def places(moments: np.ndarray) -> np.ndarray:
         result = []
         for values in motion.at(moments)[0]:
-            whole = model.merge(model.default_positions(), dict(zip(motion.joint_names, values, strict=True)))
-            pin.framesForwardKinematics(model.pin_model, data, whole)
+            positions = model.merge(model.default_positions(), dict(zip(motion.joint_names, values, strict=True)))
+            pin.framesForwardKinematics(model.pin_model, data, positions)
             result.append(data.oMf[frame].translation.copy())
         return np.array(result)
 

@@ -87,7 +87,7 @@ def lifter(world: PhysicsWorld, convex_parts: ConvexParts) -> Lifter:
     return Lifter(world, convex_parts)
 
 
-def test_every_movable_joint_has_a_state_and_starts_where_it_was_told(lifter: Lifter) -> None:
+def test_every_movable_joint_has_a_state_and_starts_at_the_given_position(lifter: Lifter) -> None:
     assert {name: state.position for name, state in lifter.states.items()} == pytest.approx(
         {"lift": 0.1, "slide_1": 0.0, "slide_2": 0.0}
     )

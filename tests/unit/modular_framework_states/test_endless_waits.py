@@ -98,6 +98,6 @@ def test_calls_take_an_infinite_timeout() -> None:
     assert call_service(Proxy(), "me", INF) == "answer to me"
 
 
-def test_an_infinite_step_looks_at_the_points_alone() -> None:
+def test_an_infinite_step_checks_the_points_alone() -> None:
     points = [SimpleNamespace(positions=[0.0]), SimpleNamespace(positions=[1.0])]
     assert samples(SimpleNamespace(points=points), INF) == [(0, [0.0]), (1, [1.0])]

@@ -76,7 +76,7 @@ def test_what_is_no_file_of_constraints_is_refused_with_a_reason(tmp_path: Path)
         ConstraintsStorage(str(tmp_path / "new.sqlite")).add_constraints(Constraints())
 
 
-def test_the_command_database_tells_which_file_is_used(tmp_path: Path) -> None:
+def test_the_command_database_prints_which_file_is_used(tmp_path: Path) -> None:
     group = SimpleNamespace(constraints_storage=None)
     group.set_constraints_database = lambda host, _: setattr(group, "constraints_storage", ConstraintsStorage(host))
     commands = GroupCommands(group, None, "base")

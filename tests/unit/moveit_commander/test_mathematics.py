@@ -127,7 +127,7 @@ def test_both_signatures_of_a_cartesian_path_are_understood() -> None:
             cartesian_options(options, named)
 
 
-def test_the_arguments_after_a_pose_are_told_apart_by_type() -> None:
+def test_the_arguments_after_a_pose_are_distinguished_by_type() -> None:
     assert link_and_approximate("tool0", True) == link_and_approximate(True, "tool0") == ("tool0", True)
     assert link_and_approximate(None, None) == ("", False)
     with pytest.raises(MoveItCommanderException, match="Unexpected type"):

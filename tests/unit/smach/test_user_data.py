@@ -121,6 +121,6 @@ def test_remapping_gives_a_state_its_own_names() -> None:
     assert "mine" in seen and "number" not in seen
 
 
-def test_a_declared_key_without_a_value_is_told_with_both_names() -> None:
+def test_a_declared_key_without_a_value_is_reported_with_both_names() -> None:
     with pytest.raises(AttributeError, match="'mine' has no value yet.*'nothing'"):
         _ = view(["mine"], [], {"mine": "nothing"}).mine

@@ -57,7 +57,7 @@ FOLLOWED_UP = {
 """Several slips, or one with two true statements: a name that is unknown, and one that is missing."""
 
 
-def test_all_faults_are_told_at_once_in_the_order_of_the_file(world: World) -> None:
+def test_all_faults_are_reported_at_once_in_the_order_of_the_file(world: World) -> None:
     text = GOOD_TASK.replace("source: plan", "source: pan").replace("{success: done, fail: gave_up}", "{success: dne}")
     faults = world.faults(text.replace("name: tiny", "name: my task"))
     assert len(faults) == 4
@@ -65,7 +65,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(world: World) -> N
     assert lines == sorted(lines)
 
 
-def test_a_missing_key_is_told_beside_wrong_transitions_and_a_repeated_label_beside_what_is_wrong_below_it(
+def test_a_missing_key_is_reported_beside_wrong_transitions_and_a_repeated_label_beside_what_is_wrong_below_it(
     world: World,
 ) -> None:
     states = "{target: home, source: plan, transitions: {success: dne, fail: gave_up}}"
@@ -78,7 +78,7 @@ def test_a_missing_key_is_told_beside_wrong_transitions_and_a_repeated_label_bes
     assert "did you mean 'speed'?" in faults[2]
 
 
-def test_faults_of_values_links_ways_outcomes_and_userdata_are_told_together(world: World) -> None:
+def test_faults_of_values_links_ways_outcomes_and_userdata_are_reported_together(world: World) -> None:
     faults = world.faults("""name: t
 source: state_machine
 outcomes: [done, gave_up, never]

@@ -23,7 +23,7 @@ def arguments(tmp_path: Path) -> list[str]:
     return [str(tmp_path / "t.yaml"), str(write_states(tmp_path)), str(TEMPLATES), str(tmp_path / "out")]
 
 
-def test_four_arguments_write_the_module_and_tell_where(
+def test_four_arguments_write_the_module_and_print_where(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 0

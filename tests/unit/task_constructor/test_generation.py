@@ -144,7 +144,7 @@ def test_values_below_anchors_are_written_once_and_merged_where_they_are_referre
     assert task.root.states[0].options == {"speed": 0.9, "plan_name": "q", "target": "x"}
 
 
-def test_a_state_that_cannot_be_made_is_told_with_its_place_in_the_task(world: World, tmp_path: Path) -> None:
+def test_a_state_that_cannot_be_made_is_reported_with_its_place_in_the_task(world: World, tmp_path: Path) -> None:
     (tmp_path / "own_states" / "picky.py").write_text(
         "import smach\n\n\nclass Picky(smach.State):\n    def __init__(self, size):\n"
         "        raise ValueError(f'size is {size}, allowed is 0 or more')\n"

@@ -66,7 +66,7 @@ def test_both_ways_to_write_the_first_example_mean_the_same() -> None:
 
 
 @pytest.mark.parametrize(
-    ("script", "told"),
+    ("script", "reported"),
     [
         (
             "just_planning_all_options",
@@ -93,11 +93,11 @@ def test_both_ways_to_write_the_first_example_mean_the_same() -> None:
     ],
 )
 def test_what_the_guide_prints_with_slips_is_refused_with_all_corrections_at_once(
-    script: str, told: tuple[str, ...]
+    script: str, reported: tuple[str, ...]
 ) -> None:
     with pytest.raises(TaskFault) as caught:
         check_task(GUIDE_TASKS / f"{script}.yaml", [STATES], [TEMPLATES])
-    assert all(f"{script}.yaml:{line}" in str(caught.value) for line in told), str(caught.value)
+    assert all(f"{script}.yaml:{line}" in str(caught.value) for line in reported), str(caught.value)
 
 
 def test_following_the_corrections_puts_the_printed_examples_in_order() -> None:
@@ -108,7 +108,7 @@ def test_following_the_corrections_puts_the_printed_examples_in_order() -> None:
     build(printed.replace("sucess_plans", "success_plans").replace("- PlanStabPose:", "- PlanInitPose:", 1))
 
 
-def test_the_placeholders_of_the_layout_are_told_to_be_no_names() -> None:
+def test_the_placeholders_of_the_layout_are_reported_as_no_names() -> None:
     message = faults((GUIDE_TASKS / "layout.yaml").read_text().replace("<state_outcome3>: <another", "x: <another"))
     for placeholder in ("<state_machine_name>", "<template_filename>", "<state_filename>"):
         assert placeholder in message

@@ -44,7 +44,7 @@ def test_without_it_the_last_container_class_is_taken(tmp_path: Path) -> None:
     ("text", "message"),
     [("x = 1", "defines neither"), ("1 / 0", "raised ZeroDivisionError"), ("class (:", "raised SyntaxError")],
 )
-def test_what_cannot_be_run_is_told(tmp_path: Path, text: str, message: str) -> None:
+def test_what_cannot_be_run_is_reported(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(loading.LoadingError, match=message):
         loading.machine_factory(module(tmp_path, text))  # type: ignore[arg-type]
 

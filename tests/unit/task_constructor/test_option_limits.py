@@ -127,7 +127,7 @@ def check(states: Path, option: str, value: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("option", "value", "expected"), REFUSED)
-def test_a_value_beyond_the_limits_is_told_before_the_run_with_its_place(
+def test_a_value_beyond_the_limits_is_reported_before_the_run_with_its_place(
     states: Path, option: str, value: str, expected: str
 ) -> None:
     (found,) = check(states, option, value)
@@ -158,7 +158,7 @@ def test_the_same_limits_hold_where_a_state_is_made(states: Path, option: str, v
     assert expected in str(caught.value)
 
 
-def test_all_options_beyond_their_limits_are_told_together_and_good_ones_arrive(states: Path) -> None:
+def test_all_options_beyond_their_limits_are_reported_together_and_good_ones_arrive(states: Path) -> None:
     reach = load_state_class(str(states / "reach.py"), "Reach")
     with pytest.raises(ValueError, match="option 'speed' .*; option 'tries' .*"):
         reach(2.0, 9)
@@ -167,7 +167,7 @@ def test_all_options_beyond_their_limits_are_told_together_and_good_ones_arrive(
         reach(nonsense=1)
 
 
-def test_explain_and_schema_tell_the_limits(states: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_explain_and_schema_report_the_limits(states: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--explain", "reach", "", str(states), str(TEMPLATES)]) == 0
     page = capsys.readouterr().out
     assert "  speed: a number above 0 and at most 1, default 1.0\n      How fast." in page

@@ -69,7 +69,7 @@ INSTALL = "install it, or add the folder that has it to PYTHONPATH"
         ),
     ],
 )
-def test_a_module_that_is_not_found_is_told_once_with_both_places_and_would_indeed_fail(
+def test_a_module_that_is_not_found_is_reported_once_with_both_places_and_would_indeed_fail(
     folder: Path, imports: str, expected: str
 ) -> None:
     assert faults(folder, imports) == [f"/t.yaml:5:17: state 'A': /states/open_door.py:{expected}"]
@@ -77,7 +77,9 @@ def test_a_module_that_is_not_found_is_told_once_with_both_places_and_would_inde
         load_module(folder / "open_door.py")
 
 
-def test_a_module_beside_the_state_is_told_how_to_be_found(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_module_beside_the_state_is_reported_with_how_to_make_it_found(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (folder / "my_doors.py").write_text("raise RuntimeError('this must not be run')\n")
     (found,) = faults(folder, "import my_doors")
     assert found.endswith(
@@ -108,11 +110,11 @@ def test_imports_relative_to_a_package_are_looked_for_there(folder: Path, monkey
         "import sys\nsys.path.insert(0, '/my/doors')\nimport nowhere_at_all",
     ],
 )
-def test_what_is_there_or_optional_or_cannot_be_told_is_no_fault(folder: Path, imports: str) -> None:
+def test_what_is_there_or_optional_or_cannot_be_known_is_no_fault(folder: Path, imports: str) -> None:
     assert faults(folder, imports) == []
 
 
-def test_a_module_of_the_states_own_package_that_is_no_python_is_told(
+def test_a_module_of_the_states_own_package_that_is_no_python_is_reported(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "__init__.py").write_text("")

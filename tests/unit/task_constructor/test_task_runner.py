@@ -93,7 +93,7 @@ def test_a_reason_is_not_kept_for_the_next_execution() -> None:
     assert state.reason == ""
 
 
-def test_a_state_that_gives_no_reason_is_told_by_its_outcome() -> None:
+def test_a_state_that_gives_no_reason_is_reported_by_its_outcome() -> None:
     end = threading.Event()
     end.set()
     result = run(machine(A=(Blind(end), ENDS)))

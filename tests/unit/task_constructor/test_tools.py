@@ -50,7 +50,7 @@ def test_a_shipped_task_is_drawn_with_all_its_states_and_machines(script: Path, 
     assert len(frames) == len(list(task.root.machines()))
 
 
-def test_a_drawing_that_cannot_be_written_is_told_with_its_path(world: World, tmp_path: Path) -> None:
+def test_a_drawing_that_cannot_be_written_is_reported_with_its_path(world: World, tmp_path: Path) -> None:
     with pytest.raises(task_graph.GraphError, match=r"absent/out\.svg cannot be written.*name a file in a folder"):
         task_graph.write(world.build(GOOD_TASK), tmp_path / "absent" / "out.svg")
 

@@ -70,7 +70,7 @@ def test_a_task_without_manipulator_needs_neither() -> None:
         ("arm_group_name", ["arm"]),
     ],
 )
-def test_a_wrong_value_is_told_with_what_is_allowed(name: str, value: Any) -> None:
+def test_a_wrong_value_is_reported_with_what_is_allowed(name: str, value: Any) -> None:
     text = message(**{name: value})
     assert f"'{name}' is {value!r}; in " in text and "it must be" in text
 

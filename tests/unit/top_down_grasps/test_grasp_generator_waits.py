@@ -33,19 +33,19 @@ def test_patience_begins_when_the_clock_of_a_simulation_does_and_again_when_it_i
 
 
 class Scripted(node.TopDownGraspGenerator):
-    """Sees what a script says, one look after the other, and remembers what it signalled."""
+    """Sees what a script says, one scene after the other, and stores what it signalled."""
 
-    def __init__(self, looks: list[object], makes: Callable[[], list[object]], attached: Iterable[str]) -> None:
+    def __init__(self, scenes: list[object], makes: Callable[[], list[object]], attached: Iterable[str]) -> None:
         super().__init__()
         self._attached = set(attached)
-        self.looks, self.makes, self.signals = list(looks), makes, []
+        self.scenes, self.makes, self.signals = list(scenes), makes, []
         self._stored = SimpleNamespace(replace=lambda grasps, prefix: None)
 
     def _candidates(self, settings):
-        look = self.looks.pop(0)
-        if isinstance(look, Exception):
-            raise look
-        return look
+        scene = self.scenes.pop(0)
+        if isinstance(scene, Exception):
+            raise scene
+        return scene
 
     def _generate(self, settings, objects):
         return self.makes()
@@ -58,8 +58,8 @@ class Scripted(node.TopDownGraspGenerator):
 def watched(monkeypatch):
     """Lets a generator look at scripted scenes, some seconds of the ROS clock apart; returns what it signalled."""
 
-    def watch(looks, period_s=1.0, makes=lambda: [SimpleNamespace(object_id="box__link")], attached=frozenset()):
-        generator = Scripted(looks, makes, attached)
+    def watch(scenes, period_s=1.0, makes=lambda: [SimpleNamespace(object_id="box__link")], attached=frozenset()):
+        generator = Scripted(scenes, makes, attached)
         clock = SimpleNamespace(now=50.0)
 
         def sleep(_wall_s: float) -> None:
@@ -71,7 +71,7 @@ def watched(monkeypatch):
             "rospy",
             SimpleNamespace(
                 get_time=lambda: clock.now,
-                is_shutdown=lambda: not generator.looks,
+                is_shutdown=lambda: not generator.scenes,
                 loginfo_throttle=lambda *_: None,
                 rostime=SimpleNamespace(wallsleep=sleep),
             ),

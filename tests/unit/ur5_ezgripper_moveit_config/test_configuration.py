@@ -91,7 +91,7 @@ def test_controllers_are_those_of_the_robot_package_with_the_same_joints(package
 
 
 @pytest.mark.parametrize("group", ["arm", "arm_and_manipulator"])
-def test_a_group_plans_with_rrtconnect_unless_told_otherwise(package: Path, group: str) -> None:
+def test_a_group_plans_with_rrtconnect_unless_configured_otherwise(package: Path, group: str) -> None:
     planning = config(package, "ompl_planning.yaml")
     assert planning[group]["default_planner_config"] == "RRTConnect"
     assert set(planning[group]["planner_configs"]) == set(planning["planner_configs"])
