@@ -54,21 +54,23 @@ class Sphere:
 
 
 @dataclass(frozen=True, slots=True)
-class Cylinder:
-    """Radius, and length along z [m]."""
+class _RoundShape:
+    """A shape around the z axis, by its radius and its length [m]."""
+
+    radius: float
+    length: float
+
+
+class Cylinder(_RoundShape):
+    """A cylinder."""
 
     tag: ClassVar[str] = "cylinder"
-    radius: float
-    length: float
 
 
-@dataclass(frozen=True, slots=True)
-class Capsule:
-    """Radius, and length of the cylinder between its ends, along z [m]."""
+class Capsule(_RoundShape):
+    """A cylinder with half spheres on both ends, which its length leaves out."""
 
     tag: ClassVar[str] = "capsule"
-    radius: float
-    length: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A <limit>: positions [rad or m], largest effort [N m or N] and velocity [rad/s or m/s]; None is not given."""
+    """A <limit>; None is not given.
+
+    Attributes:
+        lower, upper: positions [rad or m].
+        effort: the largest [N m or N].
+        velocity: the largest [rad/s or m/s].
+    """
 
     lower: float
     upper: float

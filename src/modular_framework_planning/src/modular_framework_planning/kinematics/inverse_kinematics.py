@@ -141,13 +141,7 @@ class InverseKinematics:
         return self._ranked(problem, found)
 
     def position_solutions(
-        self,
-        tip_link: str,
-        point: Array,
-        position: Array,
-        seed: Array,
-        timeout_s: float | None = None,
-        rng: Generator | None = None,
+        self, tip_link: str, point: Array, position: Array, seed: Array, timeout_s: float | None = None
     ) -> list[Array]:
         """As `solutions`, for the position of a point alone; the orientation is left open, and kept where it can be.
 
@@ -157,13 +151,12 @@ class InverseKinematics:
             position: where the point shall be, in the planning frame (3,) [m].
             seed: as for `solutions`.
             timeout_s: as for `solutions`.
-            rng: as for `solutions`.
         """
         joint = self.tip_offset(tip_link).inverse() * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
         turn = self.model.link_transforms(seed)[tip_link].rotation
         target = pin.SE3(turn, np.asarray(position, dtype=float))
         problem = self._problem(target, seed, timeout_s).with_ball_joint(joint)
-        return self._ranked(problem, self._from_search(problem, rng or np.random.default_rng(0)))
+        return self._ranked(problem, self._from_search(problem, np.random.default_rng(0)))
 
     def _problem(self, target: Transform, seed: Array, timeout_s: float | None = None) -> _Problem:
         allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
