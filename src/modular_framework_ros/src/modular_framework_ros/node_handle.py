@@ -2,7 +2,7 @@
 """The parameters of controllers and hardware, readable with and without a ROS master.
 
 `NodeHandle` is the small part of a ROS node handle they need. `MappingNodeHandle` serves it from a plain mapping
-(tests, programs without a master); the ROS edge has one that asks the parameter server.
+(tests, programs without a master); `RosNodeHandle` reads the parameter server.
 """
 
 from __future__ import annotations

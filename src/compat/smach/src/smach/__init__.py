@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hierarchical state machines: the public interface of smach 2.5.2, written anew."""
+"""Hierarchical state machines: a new implementation of the public interface of smach 2.5.2."""
 
 from smach.concurrence import Concurrence
 from smach.container import Container

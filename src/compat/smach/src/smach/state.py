@@ -84,7 +84,7 @@ class State:
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
-        """Withdraws the request: called by whoever asked."""
+        """Withdraws the request; called by the requester."""
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:

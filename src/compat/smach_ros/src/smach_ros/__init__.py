@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""smach for ROS: the public interface of smach_ros 2.5.2, written anew.
+"""smach for ROS: a new implementation of the public interface of smach_ros 2.5.2.
 
 Importing the package makes smach log through rospy and stop when rospy shuts down.
 """

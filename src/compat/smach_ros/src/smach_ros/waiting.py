@@ -43,7 +43,7 @@ def going_down() -> bool:
 
 
 class RosTimeLimit:
-    """A limit in ROS time; a clock that jumps back starts it anew."""
+    """A limit in ROS time; a clock that jumps back restarts it."""
 
     def __init__(self, limit_s: float | None) -> None:
         """Starts the limit [s]; None: there is none."""

@@ -270,7 +270,7 @@ class RtdeLink:
     def _control_arguments(self) -> list[str]:
         settings, wanted = self._settings, self._settings.speed_scale
         if wanted is not None and self._has_commanded and self.state is not None:
-            wanted = min(wanted, self.state.speed_fraction)  # somebody at the robot has lowered it meanwhile
+            wanted = min(wanted, self.state.speed_fraction)  # a person at the robot may have lowered it
         scale = [] if wanted is None else ["--speed-scale", _written(wanted)]
         return [
             *scale,

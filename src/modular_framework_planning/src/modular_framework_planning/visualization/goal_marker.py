@@ -76,7 +76,7 @@ class GoalMarker:
         return tick
 
     def show(self, frame: str, pose: Pose, scale_m: float) -> None:
-        """Shows the marker, or shows it anew at another pose."""
+        """Shows the marker, or moves it to another pose and resets it."""
         marker = InteractiveMarker(name=NAME, description="", pose=pose, scale=scale_m)
         marker.header.frame_id = frame
         ball = Marker(type=Marker.SPHERE)

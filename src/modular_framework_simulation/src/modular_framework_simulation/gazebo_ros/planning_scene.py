@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the planning scene of move_group equal to the simulated world, so that nobody has to do it by hand.
+"""Keeps the planning scene of move_group equal to the simulated world.
 
 A thread of its own compares the latest snapshot of the world with what the scene has and sends the differences to
 move_group's service. What the scene has is read back after changes and from time to time: other nodes change it too,
