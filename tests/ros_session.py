@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import signal
 import socket
@@ -17,6 +18,7 @@ from urllib.parse import urlparse
 from xmlrpc.client import ServerProxy
 
 import rosgraph
+import roslib.packages
 import rospkg
 
 STOP_TIMEOUT_S = 15.0
@@ -50,6 +52,12 @@ def processes_with(variable: str, value: str) -> list[int]:
             if mark in (folder / "environ").read_bytes().split(b"\0") and int(folder.name) != os.getpid():
                 found.append(int(folder.name))
     return found
+
+
+@functools.cache
+def executable(package: str, name: str) -> str:
+    """Answers what rosrun would run, searched once: rosrun takes as long for that as some nodes live."""
+    return str(roslib.packages.find_node(package, name)[0])
 
 
 class Launch:

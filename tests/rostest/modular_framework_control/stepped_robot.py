@@ -81,6 +81,7 @@ class SteppedRobot:
     """
 
     def __init__(self, parameters: Mapping[str, Any], controllers: list[str]) -> None:
+        self._parameters = [f"/{key}" for key in parameters]
         for key, value in parameters.items():
             rospy.set_param(f"/{key}", value)
         parts = {name: HinderedRobotHW() for name in parameters["robot_hardware"]}
@@ -97,6 +98,8 @@ class SteppedRobot:
     def close(self) -> None:
         self._manager.close()
         self._robot_hw.close()
+        for name in self._parameters:
+            rospy.delete_param(name)
 
     def _cycle(self, period_s: float) -> None:
         self._robot_hw.read(self.time_s, period_s)

@@ -15,6 +15,7 @@ import pytest
 import rospy
 from controller_manager_msgs.msg import ControllersStatistics
 from controller_manager_msgs.srv import ListControllers
+from ros_session import executable
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
@@ -29,7 +30,7 @@ def tool(session: Any) -> Iterator[Callable[..., Any]]:
     started: list[subprocess.Popen[str]] = []
 
     def start(name: str, *arguments: str) -> subprocess.Popen[str]:
-        command = ["rosrun", "controller_manager", name, *arguments]
+        command = [executable("controller_manager", name), *arguments]
         started.append(
             subprocess.Popen(command, env=session.env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         )

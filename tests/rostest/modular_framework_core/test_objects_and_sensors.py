@@ -11,6 +11,7 @@ import rospy
 import tf2_ros
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from ros_session import executable
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -69,7 +70,7 @@ def simulation(ros_session, ros_launch, tmp_path_factory: pytest.TempPathFactory
 
 def manage(simulation: FakeSimulation, *arguments: str) -> tuple[int, str]:
     done = subprocess.run(
-        ["rosrun", "modular_framework_core", "manage_object", *arguments],
+        [executable("modular_framework_core", "manage_object"), *arguments],
         env=simulation.session.env,
         capture_output=True,
         text=True,

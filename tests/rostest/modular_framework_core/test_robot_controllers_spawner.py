@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import rospy
 from controller_manager_msgs.srv import ListControllers, LoadController, SwitchController
+from ros_session import executable
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
@@ -50,7 +51,7 @@ def spawn(ros_session: Any, robot_package: Path) -> Iterator[Callable[..., Any]]
 
     def start(*arguments: str) -> subprocess.Popen[str]:
         process = subprocess.Popen(
-            ["rosrun", "modular_framework_core", "robot_controllers_spawner", *arguments],
+            [executable("modular_framework_core", "robot_controllers_spawner"), *arguments],
             env=env,
             text=True,
             stdout=subprocess.PIPE,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import rospy
-from ros_session import RosSession
+from ros_session import RosSession, executable
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
@@ -106,7 +106,7 @@ class TaskProcess:
         script = folder / "tiny.yaml"
         if text is not None:
             script.write_text(text)
-        command = ["rosrun", "modular_framework_core", "run_task", *([str(script)] if text is not None else [])]
+        command = [executable("modular_framework_core", "run_task"), *([str(script)] if text is not None else [])]
         command += [f"_states_directory:={folder / 'states'}"] if own else []
         command += extra
         self.process = subprocess.Popen(

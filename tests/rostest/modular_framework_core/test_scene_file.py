@@ -10,6 +10,7 @@ import pytest
 import rospy
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene
+from ros_session import executable
 from shape_msgs.msg import SolidPrimitive
 
 SCENE = Path(__file__).parents[3] / "src" / "modular_framework_description" / "scenes" / "ur5_setup.scene"
@@ -17,7 +18,7 @@ SCENE = Path(__file__).parents[3] / "src" / "modular_framework_description" / "s
 
 def publish(session, *arguments: object, node: str = "moveit_publish_scene_from_text") -> tuple[int, str]:
     done = subprocess.run(
-        ["rosrun", "modular_framework_core", node, *map(str, arguments)],
+        [executable("modular_framework_core", node), *map(str, arguments)],
         env=session.env,
         capture_output=True,
         text=True,

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from xmlrpc.client import ServerProxy
@@ -243,9 +244,10 @@ def test_pick_and_place_name_what_is_missing_and_use_what_is_there(
     locations = [None, pose, pose.pose, PlaceLocation(place_pose=pose), [pose, pose], [PlaceLocation(place_pose=pose)]]
     assert arm.pick("block", Grasp(), plan_only=True) == MoveItErrorCodes.ROBOT_STATE_STALE, "this robot has no joints"
     arm = elsewhere("fake")
-    for act in (lambda: arm.pick("block", Grasp()), lambda: arm.place("block", pose)):
-        with pytest.raises(MoveItCommanderException, match="Unable to connect"):
-            act()
+    with ThreadPoolExecutor() as pool:  # both wait until nobody has answered for long
+        for act in [pool.submit(arm.pick, "block", Grasp()), pool.submit(arm.place, "block", pose)]:
+            with pytest.raises(MoveItCommanderException, match="Unable to connect"):
+                act.result()
     success = MoveItErrorCodes(MoveItErrorCodes.SUCCESS)
     pickup = FakeTask("fake/pickup", PickupAction, PickupResult(error_code=success))
     arm.set_support_surface_name("table")
