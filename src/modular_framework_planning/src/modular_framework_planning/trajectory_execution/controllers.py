@@ -14,7 +14,6 @@ TRAJECTORY = "FollowJointTrajectory"
 GRIPPER = "GripperCommand"
 ACTION_KINDS = (TRAJECTORY, GRIPPER)
 FAKE_KINDS = ("interpolate", "via points", "last point")
-TOLERANCE_KEYS = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +24,9 @@ class JointTolerance:
     position: float = 0.0
     velocity: float = 0.0
     acceleration: float = 0.0
+
+
+TOLERANCE_KEYS = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, slots=True)
